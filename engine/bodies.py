@@ -1,0 +1,118 @@
+"""What moves: particles, and rigid bodies with a shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from engine import check
+from engine.check import Rotation, Vector
+from engine.errors import SceneError
+from engine.shapes import Plane, Shape
+
+WORLD = "world"  # the name that stands for the fixed world at one end of a constraint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Particle:
+    """A point mass: three unknowns, no inertia, no rotation, no contacts."""
+
+    name: str
+    position: Vector  # m
+    mass: float  # kg
+    velocity: Vector = (0.0, 0.0, 0.0)  # m/s
+
+    def __post_init__(self) -> None:
+        check.name("particle", self.name)
+        owner = f"particle {self.name!r}"
+        object.__setattr__(self, "position", check.vector(owner, "position", self.position))
+        object.__setattr__(self, "velocity", check.vector(owner, "velocity", self.velocity))
+        object.__setattr__(self, "mass", check.positive(owner, "mass", self.mass))
+        if self.name == WORLD:
+            raise SceneError(f"{owner}: the name {WORLD!r} is taken by the fixed world; choose another")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """How a surface behaves in contact.
+
+    Two surfaces combine: friction by the geometric mean, restitution by the larger, compliance by the sum.
+    """
+
+    friction: float = 0.0  # Coulomb's mu, 1
+    restitution: float = 0.0  # psi, between 0 and 1
+    compliance: float = 0.0  # m/N per contact point
+    damping: float | None = None  # s; None means 4.5 time steps
+    slip_compliance: float = 0.0  # gamma, m/(N s): creep speed per tangential force
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "compliance", "slip_compliance"):
+            object.__setattr__(self, name, check.not_negative("material", name, getattr(self, name)))
+        restitution = check.not_negative("material", "restitution", self.restitution)
+        if restitution > 1.0:
+            raise SceneError(f"material: restitution must lie between 0 and 1, not {restitution:g}")
+        object.__setattr__(self, "restitution", restitution)
+        if self.damping is not None:
+            object.__setattr__(self, "damping", check.not_negative("material", "damping", self.damping))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigidBody:
+    """A body with orientation. Mass and inertia of a dynamic body must be positive.
+
+    `inertia` holds the principal moments [kg m²] about the body axes; None takes those of the shape, of
+    uniform density. A static body never moves; a kinematic one moves with its given velocities whatever
+    pushes it; neither needs a mass. `shape` None means the body has no surface and touches nothing.
+    """
+
+    name: str
+    position: Vector  # centre of mass, m
+    mass: float | None = None  # kg
+    shape: Shape | None = None
+    inertia: Vector | None = None  # kg m²
+    orientation: Rotation = (1.0, 0.0, 0.0, 0.0)  # unit quaternion (w, x, y, z), body to world
+    velocity: Vector = (0.0, 0.0, 0.0)  # m/s
+    angular_velocity: Vector = (0.0, 0.0, 0.0)  # world frame, rad/s
+    motion: Literal["dynamic", "static", "kinematic"] = "dynamic"
+    material: Material = field(default_factory=Material)
+
+    def __post_init__(self) -> None:
+        check.name("rigid body", self.name)
+        owner = f"rigid body {self.name!r}"
+        if self.name == WORLD:
+            raise SceneError(f"{owner}: the name {WORLD!r} is taken by the fixed world; choose another")
+        if self.motion not in ("dynamic", "static", "kinematic"):
+            raise SceneError(f"{owner}: motion must be dynamic, static or kinematic, not {self.motion!r}")
+        if self.shape is not None and not isinstance(self.shape, Shape):
+            raise SceneError(f"{owner}: shape must be one of engine's shapes, not {self.shape!r}")
+        if not isinstance(self.material, Material):
+            raise SceneError(f"{owner}: material must be a Material, not {self.material!r}")
+        for name in ("position", "velocity", "angular_velocity"):
+            object.__setattr__(self, name, check.vector(owner, name, getattr(self, name)))
+        object.__setattr__(self, "orientation", check.rotation(owner, "orientation", self.orientation))
+        if self.motion == "static" and (any(self.velocity) or any(self.angular_velocity)):
+            raise SceneError(f"{owner}: a static body cannot have a velocity; make it kinematic")
+        if self.motion != "dynamic":
+            return
+        if self.mass is None:
+            raise SceneError(f"{owner}: a dynamic body needs a mass; give one or make it static")
+        object.__setattr__(self, "mass", check.positive(owner, "mass", self.mass))
+        if isinstance(self.shape, Plane):
+            raise SceneError(f"{owner}: a plane has no inertia; make the body static or kinematic")
+        inertia = self.inertia
+        if inertia is None:
+            if self.shape is None:
+                raise SceneError(f"{owner}: a body without a shape needs an inertia; or use a Particle")
+            inertia = self.shape.inertia(self.mass)
+        x, y, z = (
+            check.positive(owner, "inertia", moment) for moment in check.vector(owner, "inertia", inertia)
+        )
+        largest = max(x, y, z)
+        if largest > (x + y + z - largest) * (1.0 + 1e-12):
+            raise SceneError(
+                f"{owner}: inertia {(x, y, z)} breaks the triangle rule; no mass distribution has it"
+            )
+        object.__setattr__(self, "inertia", (x, y, z))
+
+
+Body = Particle | RigidBody

@@ -1,0 +1,78 @@
+"""Checks shared by the scene's dataclasses: each returns the clean value or names the culprit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from engine.errors import SceneError
+
+Vector = tuple[float, float, float]
+Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), body to world
+
+
+def number(owner: str, field: str, value: object) -> float:
+    """A finite float, or a SceneError naming owner and field."""
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise SceneError(f"{owner}: {field} must be a number, not {value!r}") from None
+    if not math.isfinite(result):
+        raise SceneError(f"{owner}: {field} must be finite, not {result}")
+    return result
+
+
+def positive(owner: str, field: str, value: object) -> float:
+    """A finite float above zero."""
+    result = number(owner, field, value)
+    if result <= 0.0:
+        raise SceneError(f"{owner}: {field} must be positive, not {result:g}")
+    return result
+
+
+def not_negative(owner: str, field: str, value: object) -> float:
+    """A finite float, zero or above."""
+    result = number(owner, field, value)
+    if result < 0.0:
+        raise SceneError(f"{owner}: {field} must not be negative, not {result:g}")
+    return result
+
+
+def vector(owner: str, field: str, value: object) -> Vector:
+    """Three finite floats."""
+    if isinstance(value, str) or not isinstance(value, Sequence) and not hasattr(value, "__len__"):
+        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}")
+    if len(value) != 3:  # type: ignore[arg-type]
+        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}")
+    x, y, z = (number(owner, field, component) for component in value)  # type: ignore[attr-defined]
+    return (x, y, z)
+
+
+def direction(owner: str, field: str, value: object) -> Vector:
+    """Three finite floats, scaled to unit length; the zero vector has no direction and is refused."""
+    x, y, z = vector(owner, field, value)
+    length = math.hypot(x, y, z)
+    if length == 0.0:
+        raise SceneError(f"{owner}: {field} must not be the zero vector")
+    return (x / length, y / length, z / length)
+
+
+def rotation(owner: str, field: str, value: object) -> Rotation:
+    """Four finite floats (w, x, y, z), scaled to unit length."""
+    try:
+        w, x, y, z = (number(owner, field, component) for component in value)  # type: ignore[attr-defined]
+    except (TypeError, ValueError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError(f"{owner}: {field} must be a quaternion (w, x, y, z), not {value!r}") from None
+    length = math.sqrt(w * w + x * x + y * y + z * z)
+    if length == 0.0:
+        raise SceneError(f"{owner}: {field} must not be the zero quaternion")
+    return (w / length, x / length, y / length, z / length)
+
+
+def name(kind: str, value: object) -> str:
+    """A body's, constraint's or force's name: any text that is not blank."""
+    if not isinstance(value, str) or not value.strip():
+        raise SceneError(f"a {kind} needs a name, not {value!r}")
+    return value

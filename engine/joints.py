@@ -1,0 +1,209 @@
+"""Constraints: the distance between two points, and the joints of rigid bodies.
+
+Every constraint has a compliance (inverse stiffness; 0 is rigid) and a damping time per constrained degree
+of freedom: one number for all, or one for each in the order its docstring gives. A damping of None means two
+time steps, chosen at compile time: a scene knows no time step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from engine import check
+from engine.check import Vector
+from engine.errors import SceneError
+from engine.forces import End, check_ends
+
+PerDegree = float | tuple[float, ...]
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+
+def _per_degree(owner: str, field: str, value: object, count: int) -> PerDegree:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        if len(value) != count:
+            raise SceneError(f"{owner}: {field} needs one number or {count}, not {len(value)}")
+        return tuple(check.not_negative(owner, field, entry) for entry in value)
+    return check.not_negative(owner, field, value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distance:
+    """Keeps two points `rest_length` apart: g = |d| − rest_length [m], one row.
+
+    `anchors` are the points in body axes, from each centre of mass (ignored at a world point); a particle has
+    only its centre. A rest_length of None is the distance at the start.
+    """
+
+    rows: ClassVar[int] = 1
+    name: str
+    between: tuple[End, End]
+    rest_length: float | None = None  # m
+    compliance: float = 1e-8  # m/N
+    damping: float | None = None  # s
+    anchors: tuple[Vector, Vector] = (ORIGIN, ORIGIN)  # m
+
+    def __post_init__(self) -> None:
+        check.name("distance", self.name)
+        owner = f"distance {self.name!r}"
+        object.__setattr__(self, "between", check_ends(owner, self.between))
+        if self.rest_length is not None:
+            object.__setattr__(self, "rest_length", check.positive(owner, "rest_length", self.rest_length))
+        object.__setattr__(self, "compliance", check.not_negative(owner, "compliance", self.compliance))
+        if self.damping is not None:
+            object.__setattr__(self, "damping", check.not_negative(owner, "damping", self.damping))
+        if not hasattr(self.anchors, "__len__") or len(self.anchors) != 2:
+            raise SceneError(f"{owner}: anchors must be two points, not {self.anchors!r}")
+        anchors = tuple(check.vector(owner, "anchors", anchor) for anchor in self.anchors)
+        object.__setattr__(self, "anchors", anchors)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motor:
+    """Drives a joint's free coordinate at a speed, with at most `max_force` [N or N m]; None is unbounded."""
+
+    speed: float  # m/s or rad/s
+    max_force: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "speed", check.number("motor", "speed", self.speed))
+        if self.max_force is not None:
+            object.__setattr__(self, "max_force", check.not_negative("motor", "max_force", self.max_force))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """Keeps a joint's free coordinate between lower and upper [m or rad], zero being the start."""
+
+    lower: float
+    upper: float
+    compliance: float = 1e-8  # m/N or rad/(N m)
+    damping: float | None = None  # s
+
+    def __post_init__(self) -> None:
+        for name in ("lower", "upper"):
+            object.__setattr__(self, name, check.number("limit", name, getattr(self, name)))
+        object.__setattr__(self, "compliance", check.not_negative("limit", "compliance", self.compliance))
+        if self.damping is not None:
+            object.__setattr__(self, "damping", check.not_negative("limit", "damping", self.damping))
+        if self.lower > self.upper:
+            raise SceneError(f"limit: lower {self.lower:g} lies above upper {self.upper:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSpring:
+    """Pulls a joint's free coordinate to `rest` as a compliant row of compliance 1/stiffness."""
+
+    stiffness: float  # N/m or N m/rad
+    rest: float = 0.0  # m or rad
+    damping: float | None = None  # s
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stiffness", check.positive("joint spring", "stiffness", self.stiffness))
+        object.__setattr__(self, "rest", check.number("joint spring", "rest", self.rest))
+        if self.damping is not None:
+            object.__setattr__(self, "damping", check.not_negative("joint spring", "damping", self.damping))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """What all joints share. `between` names two bodies, or WORLD and a body; the joint frame is fixed to the
+    first and coincides with the second at the start. `at` is a world point at the start (None: the second
+    body's centre). Forces are read as those on the second body at the joint, in world axes.
+    """
+
+    rows: ClassVar[int] = 0
+    kind: ClassVar[str] = "joint"
+    name: str
+    between: tuple[str, str]
+    at: Vector | None = None  # m
+    compliance: PerDegree = 1e-8  # m/N, then rad/(N m)
+    damping: PerDegree | None = None  # s
+
+    def __post_init__(self) -> None:
+        check.name(self.kind, self.name)
+        owner = f"{self.kind} {self.name!r}"
+        ends = check_ends(owner, self.between)
+        if not all(isinstance(end, str) for end in ends):
+            raise SceneError(f"{owner}: ends must be names; use WORLD and `at` for a point of the world")
+        object.__setattr__(self, "between", ends)
+        if self.at is not None:
+            object.__setattr__(self, "at", check.vector(owner, "at", self.at))
+        object.__setattr__(self, "compliance", _per_degree(owner, "compliance", self.compliance, self.rows))
+        if self.damping is not None:
+            object.__setattr__(self, "damping", _per_degree(owner, "damping", self.damping, self.rows))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lock(Joint):
+    """Holds both bodies together: translations along world x, y, z at the start, then rotations about them."""
+
+    rows: ClassVar[int] = 6
+    kind: ClassVar[str] = "lock"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ball(Joint):
+    """Keeps one point common: three translations (world x, y, z at the start)."""
+
+    rows: ClassVar[int] = 3
+    kind: ClassVar[str] = "ball"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxialJoint(Joint):
+    """A joint with a free coordinate about or along `axis` (world direction at the start)."""
+
+    axis: Vector = (0.0, 0.0, 1.0)
+    motor: Motor | None = None
+    limit: Limit | None = None
+    spring: JointSpring | None = None
+
+    def __post_init__(self) -> None:
+        Joint.__post_init__(self)
+        owner = f"{self.kind} {self.name!r}"
+        object.__setattr__(self, "axis", check.direction(owner, "axis", self.axis))
+        for name, kind in (("motor", Motor), ("limit", Limit), ("spring", JointSpring)):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                raise SceneError(f"{owner}: {name} must be a {kind.__name__}, not {value!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hinge(AxialJoint):
+    """Leaves rotation about `axis` free: translations along axis and two normals, then rotations about the normals."""
+
+    rows: ClassVar[int] = 5
+    kind: ClassVar[str] = "hinge"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prismatic(AxialJoint):
+    """Leaves translation along `axis` free: translations along two normals, then rotations about axis and normals."""
+
+    rows: ClassVar[int] = 5
+    kind: ClassVar[str] = "prismatic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Universal(Joint):
+    """Ball plus the condition that `axis` (fixed to the first) stays normal to `cross_axis` (to the second)."""
+
+    rows: ClassVar[int] = 4
+    kind: ClassVar[str] = "universal"
+    axis: Vector = (1.0, 0.0, 0.0)
+    cross_axis: Vector = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        Joint.__post_init__(self)
+        owner = f"universal {self.name!r}"
+        axis = check.direction(owner, "axis", self.axis)
+        cross_axis = check.direction(owner, "cross_axis", self.cross_axis)
+        if abs(sum(a * b for a, b in zip(axis, cross_axis, strict=True))) > 1e-9:
+            raise SceneError(f"{owner}: axis and cross_axis must be normal to each other")
+        object.__setattr__(self, "axis", axis)
+        object.__setattr__(self, "cross_axis", cross_axis)
+
+
+Constraint = Distance | Lock | Ball | Hinge | Prismatic | Universal

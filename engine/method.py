@@ -1,0 +1,77 @@
+"""How a scene is simulated: the options of the SPOOK step. The defaults are plain SPOOK, directly solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from engine.errors import MethodError
+
+STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "tangents", "rotation")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Method:
+    """Options of the stepper. Anything but the defaults is a separate configuration in every table.
+
+    corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step
+    correction_cap     largest curvature correction, as a fraction of the rest length
+    half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out
+    string_stiffness   treat the transverse stiffness of taut links implicitly
+    substeps           steps of h/substeps per reported step
+    composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes
+    solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
+    iterations, residual_tolerance   when an iterative solve stops
+    friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
+    refinements        iterative refinements against the true equations after each factorisation
+    floor              pivot floor in the factor only, relative to the diagonal
+    force_stages       stages to keep although the scene does not need them, to measure what they cost
+    """
+
+    corrections: int = 0
+    correction_cap: float = 0.3
+    half_step_velocities: bool = False
+    string_stiffness: bool = False
+    substeps: int = 1
+    composition: Literal["none", "order4", "order6", "order8"] = "none"
+    solver: Literal["direct", "iterative", "hybrid"] = "direct"
+    iterations: int = 50
+    residual_tolerance: float = 1e-10
+    friction: Literal["cone", "box", "scaled_box"] = "cone"
+    refinements: int = 1
+    floor: float = 1e-12
+    force_stages: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        def refuse(field: str, rule: str) -> None:
+            raise MethodError(f"method: {field} must be {rule}, not {getattr(self, field)!r}")
+
+        if self.corrections not in (0, 1, 2):
+            refuse("corrections", "0, 1 or 2")
+        if not 0.0 < self.correction_cap <= 1.0:
+            refuse("correction_cap", "above 0 and at most 1")
+        if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 1_000_000:
+            refuse("substeps", "a whole number from 1")
+        if self.composition not in ("none", "order4", "order6", "order8"):
+            refuse("composition", "none, order4, order6 or order8")
+        if self.solver not in ("direct", "iterative", "hybrid"):
+            refuse("solver", "direct, iterative or hybrid")
+        if not isinstance(self.iterations, int) or self.iterations < 1:
+            refuse("iterations", "a whole number from 1")
+        if not self.residual_tolerance >= 0.0:
+            refuse("residual_tolerance", "zero or above")
+        if self.friction not in ("cone", "box", "scaled_box"):
+            refuse("friction", "cone, box or scaled_box")
+        if not isinstance(self.refinements, int) or not 0 <= self.refinements <= 10:
+            refuse("refinements", "a whole number from 0 to 10")
+        if not 0.0 <= self.floor < 1.0:
+            refuse("floor", "from 0 to below 1")
+        object.__setattr__(self, "force_stages", tuple(self.force_stages))
+        for stage in self.force_stages:
+            if stage not in STAGES_THAT_CAN_BE_FORCED:
+                raise MethodError(
+                    f"method: {stage!r} cannot be forced; try one of {', '.join(STAGES_THAT_CAN_BE_FORCED)}"
+                )
+
+
+PLAIN = Method()

@@ -1,0 +1,164 @@
+"""What to keep of a run: a quantity, reduced inside the native loop. Only what is asked for is computed.
+
+Quantities (per sample)                         shape            unit
+  Position, Velocity (body or all)              (3,) or (n, 3)   m, m/s
+  Orientation (body or all)                     (4,) or (n, 4)   1, quaternion (w, x, y, z)
+  AngularVelocity (body or all)                 (3,) or (n, 3)   rad/s, world axes
+  KineticEnergy, PotentialEnergy, Energy        ()               J; gravity −m g·x, central −m k/r, springs ½ k d²;
+                                                                 compliant rows store nothing here
+  Violation (constraint or all distances)       (rows,) or (n,)  m or rad; a distance: |d| − rest_length, () if one
+  ConstraintForce (constraint or all distances) (), (n,) or (6,) N, positive where the rod pulls (tension);
+                                                                 joints: force [N] and torque [N m] on the second body
+  Momentum, AngularMomentum(about)              (3,)             N s, kg m²/s
+  ContactForce (body, other or all)             (3,)             N, on `body`, sum over the contact points
+  ContactCount, Penetration                     ()               1; largest penetration depth, m
+  JointCoordinate (joint)                       ()               m or rad, the free coordinate of a hinge or prismatic
+
+Sample k is the state after k steps, sample 0 the start; forces and contact forces belong to the step that
+ended there and are zero at sample 0. With half-step velocities, velocities and energies are those at the
+sample's time, the mean of the half steps before and after.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from engine.check import Vector
+from engine.errors import MethodError
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Base of what can be observed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position(Quantity):
+    body: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity(Quantity):
+    body: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation(Quantity):
+    body: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AngularVelocity(Quantity):
+    body: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class KineticEnergy(Quantity):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class PotentialEnergy(Quantity):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class Energy(Quantity):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class Violation(Quantity):
+    constraint: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConstraintForce(Quantity):
+    constraint: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Momentum(Quantity):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class AngularMomentum(Quantity):
+    about: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ContactForce(Quantity):
+    body: str
+    other: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ContactCount(Quantity):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class Penetration(Quantity):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class JointCoordinate(Quantity):
+    joint: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observable:
+    """A quantity and how to reduce it over samples first … last (None: the last step), both included.
+
+    With `from_start` the quantity's value at sample 0 is subtracted from every sample first.
+    """
+
+    quantity: Quantity
+    first: int = 0
+    last: int | None = None
+    from_start: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.quantity, Quantity):
+            raise MethodError(f"observe: {self.quantity!r} is not a quantity")
+        if self.first < 0 or (self.last is not None and self.last < self.first):
+            raise MethodError(f"observe: samples {self.first} to {self.last} are not a range")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace(Observable):
+    """Every `every`-th sample from `first` on: shape (samples, *shape of the quantity)."""
+
+    every: int = 1
+
+    def __post_init__(self) -> None:
+        Observable.__post_init__(self)
+        if self.every < 1:
+            raise MethodError(f"observe: every must be a whole number from 1, not {self.every!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Final(Observable):
+    """The last sample of the range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maximum(Observable):
+    """The largest value of each component; NaN if any sample was."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Minimum(Observable):
+    """The smallest value of each component; NaN if any sample was."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaximumAbsolute(Observable):
+    """The largest magnitude of each component; NaN if any sample was."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mean(Observable):
+    """The mean of each component, summed in sample order."""

@@ -1,0 +1,60 @@
+"""What a run gave: a status, the observables asked for, exact work counters and a hash of the final state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import SimulationFailed
+
+Status = Literal["completed", "diverged", "not_finite", "timed_out"]
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """One run of a scene.
+
+    `result["name"]` is an observable (a NumPy array, 0-dimensional for scalars) and raises SimulationFailed if
+    the run did not complete; `partial` holds what was seen until then. `sample_times["name"]` are the times [s]
+    of a trace. `final_state` maps body name to (13,) position, orientation, velocity, angular velocity.
+    `counters` are exact integers, equal on every machine: steps, rows_assembled, block_operations, ...
+    `state_hash` is a hash of the bits of the final state.
+    """
+
+    status: Status
+    failure: str  # one sentence naming body and step; empty if completed
+    failed_body: str | None
+    failed_step: int | None
+    time_step: float  # s
+    steps: int  # steps done
+    seconds: float  # wall time of the native loop
+    observables: Mapping[str, Array]
+    sample_times: Mapping[str, Array]
+    final_state: Mapping[str, Array]
+    counters: Mapping[str, int]
+    state_hash: str
+    stages: tuple[str, ...]
+    stage_seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Any:
+        if self.status != "completed":
+            raise SimulationFailed(self)
+        if name not in self.observables:
+            asked = ", ".join(sorted(self.observables)) or "nothing"
+            raise KeyError(f"{name!r} was not observed; this run observed {asked}")
+        return self.observables[name]
+
+    @property
+    def partial(self) -> Mapping[str, Array]:
+        """The observables as far as the run went, whatever its status."""
+        return self.observables
+
+    @property
+    def completed(self) -> bool:
+        """Whether every step was done with finite, bounded values."""
+        return self.status == "completed"

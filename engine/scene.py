@@ -1,0 +1,161 @@
+"""A scene: what is simulated. Frozen and validated; no numerics, no time step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from engine import check
+from engine.bodies import WORLD, Body, Particle, RigidBody
+from engine.check import Vector
+from engine.errors import SceneError
+from engine.forces import CentralGravity, Force, Load, Spring
+from engine.joints import Constraint, Distance, Joint
+
+
+def _unique(kind: str, names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise SceneError(f"two {kind} are named {name!r}; give each its own name")
+        seen.add(name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Bodies, constraints and forces, in SI units and world axes.
+
+    Bodies with shapes touch each other unless `contacts` is False, a joint ties them, or `no_contact` lists
+    the pair. Raises SceneError with one sentence naming the culprit.
+    """
+
+    bodies: tuple[Body, ...]
+    constraints: tuple[Constraint, ...] = ()
+    forces: tuple[Force, ...] = ()
+    gravity: Vector = (0.0, 0.0, 0.0)  # m/s²
+    contacts: bool = True
+    no_contact: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for field in ("bodies", "constraints", "forces"):
+            object.__setattr__(self, field, tuple(getattr(self, field)))
+        if not self.bodies:
+            raise SceneError("a scene needs at least one body")
+        for body in self.bodies:
+            if not isinstance(body, Particle | RigidBody):
+                raise SceneError(f"bodies: {body!r} is neither a Particle nor a RigidBody")
+        for constraint in self.constraints:
+            if not isinstance(constraint, Distance | Joint):
+                raise SceneError(f"constraints: {constraint!r} is not a constraint")
+        for force in self.forces:
+            if not isinstance(force, Spring | CentralGravity | Load):
+                raise SceneError(f"forces: {force!r} is not a force")
+        object.__setattr__(self, "gravity", check.vector("scene", "gravity", self.gravity))
+        _unique("bodies", (body.name for body in self.bodies))
+        _unique("constraints", (constraint.name for constraint in self.constraints))
+        _unique("forces", (force.name for force in self.forces))
+        known = {body.name: body for body in self.bodies}
+        for constraint in self.constraints:
+            self._check_constraint(constraint, known)
+        for force in self.forces:
+            self._check_force(force, known)
+        object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
+
+    def _check_constraint(self, constraint: Constraint, known: dict[str, Body]) -> None:
+        owner = f"constraint {constraint.name!r}"
+        for end in constraint.between:
+            if (
+                isinstance(end, str)
+                and end not in known
+                and not (end == WORLD and isinstance(constraint, Joint))
+            ):
+                raise SceneError(f"{owner}: there is no body named {end!r}")
+        ends = [known.get(end) if isinstance(end, str) else None for end in constraint.between]
+        if not any(
+            isinstance(end, Particle) or (end is not None and end.motion == "dynamic") for end in ends
+        ):
+            raise SceneError(f"{owner}: neither end can move, so it constrains nothing")
+        if isinstance(constraint, Joint):
+            for end in ends:
+                if isinstance(end, Particle):
+                    raise SceneError(
+                        f"{owner}: {end.name!r} is a particle; joints need rigid bodies, use a Distance"
+                    )
+            return
+        for end, anchor in zip(ends, constraint.anchors, strict=True):
+            if isinstance(end, Particle) and any(anchor):
+                raise SceneError(
+                    f"{owner}: particle {end.name!r} has only its centre; leave its anchor at zero"
+                )
+        if self.length(constraint) == 0.0:
+            raise SceneError(f"{owner}: its ends coincide, so it has no direction; move one of them")
+
+    def _check_force(self, force: Force, known: dict[str, Body]) -> None:
+        owner = f"force {force.name!r}"
+        named = (
+            force.between if isinstance(force, Spring) else (force.body,) if isinstance(force, Load) else ()
+        )
+        for end in named:
+            if isinstance(end, str) and end not in known:
+                raise SceneError(f"{owner}: there is no body named {end!r}")
+        if isinstance(force, Load) and any(force.torque) and isinstance(known[force.body], Particle):
+            raise SceneError(f"{owner}: {force.body!r} is a particle and cannot take a torque")
+        if isinstance(force, Spring) and force.rest_length > 0.0:
+            first, second = (known[end].position if isinstance(end, str) else end for end in force.between)
+            if first == second:
+                raise SceneError(f"{owner}: its ends coincide, so it has no direction; move one of them")
+        if isinstance(force, CentralGravity):
+            for body in known.values():
+                if body.position == force.centre:
+                    raise SceneError(f"{owner}: body {body.name!r} sits at its centre, where it is infinite")
+
+    @staticmethod
+    def _pair(pair: tuple[str, str], known: dict[str, Body]) -> tuple[str, str]:
+        if isinstance(pair, str) or len(pair) != 2:
+            raise SceneError(f"no_contact: {pair!r} is not a pair of names")
+        for name in pair:
+            if name not in known:
+                raise SceneError(f"no_contact: there is no body named {name!r}")
+        return (pair[0], pair[1])
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise SceneError(f"there is no body named {name!r}")
+
+    def constraint(self, name: str) -> Constraint:
+        """The constraint of that name."""
+        for constraint in self.constraints:
+            if constraint.name == name:
+                return constraint
+        raise SceneError(f"there is no constraint named {name!r}")
+
+    def anchor(self, constraint: Distance, end: int) -> Vector:
+        """World position [m] at the start of one end (0 or 1) of a distance constraint."""
+        where = constraint.between[end]
+        if not isinstance(where, str):
+            return where
+        body, anchor = self.body(where), constraint.anchors[end]
+        if isinstance(body, Particle) or not any(anchor):
+            return body.position
+        return _placed(body, anchor)
+
+    def length(self, constraint: Distance) -> float:
+        """Distance [m] at the start between the two ends."""
+        return math.dist(self.anchor(constraint, 0), self.anchor(constraint, 1))
+
+
+def _placed(body: RigidBody, point: Vector) -> Vector:
+    """A point of the body's axes in world coordinates."""
+    w, x, y, z = body.orientation
+    px, py, pz = point
+    tx, ty, tz = 2.0 * (y * pz - z * py), 2.0 * (z * px - x * pz), 2.0 * (x * py - y * px)
+    bx, by, bz = body.position
+    return (
+        bx + px + w * tx + y * tz - z * ty,
+        by + py + w * ty + z * tx - x * tz,
+        bz + pz + w * tz + x * ty - y * tx,
+    )

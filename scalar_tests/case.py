@@ -1,0 +1,241 @@
+"""What a scalar test is: a physical question whose answer is a number with a unit, and how it is judged.
+
+A test file builds one ScalarTest. It never imports a simulator: `simulate` is handed in, so that the same
+question can be put to the native engine, to the NumPy oracle or to another engine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from engine.method import PLAIN, Method
+from engine.observe import Observable
+from engine.result import Result
+from engine.scene import Scene
+
+
+class Simulate(Protocol):
+    """The signature of `engine.simulate`; reading an observable of a failed run raises SimulationFailed."""
+
+    def __call__(
+        self,
+        scene: Scene,
+        *,
+        time_step: float,
+        duration: float | None = None,
+        steps: int | None = None,
+        method: Method = PLAIN,
+        observe: Mapping[str, Observable] = ...,
+        time_limit: float | None = None,
+    ) -> Result: ...
+
+
+Better = Literal["smaller_magnitude", "larger", "smaller", "inside"]
+Role = Literal["gate", "companion", "reported"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metric:
+    """One scalar of a test: a series over versions.
+
+    gate       decides green or red by `limit`
+    companion  keeps the gate honest; its `limit` and `set_point` are ours
+    reported   shown and followed, no limit
+
+    `limit` is a magnitude (smaller_magnitude), a bound (larger, smaller) or a band (inside). `set_point` is the
+    band theory lets us expect, far tighter than the limit: leaving it is a regression even inside the limit.
+    `tolerance` (absolute, in the metric's unit) and `relative_tolerance` say which change is only "changed".
+    """
+
+    name: str
+    description: str  # one sentence a reader of the table understands
+    unit: str
+    role: Role
+    better: Better = "smaller_magnitude"
+    limit: float | tuple[float, float] | None = None
+    limit_source: str = ""  # "thesis, section 3.5" or the derivation
+    set_point: tuple[float, float] | None = None
+    set_point_source: str = ""
+    reference: float | None = None  # the right value, where one exists
+    tolerance: float = 0.0
+    relative_tolerance: float = 1e-9
+
+    def passes(self, value: float) -> bool:
+        """Whether the value keeps the limit; NaN and infinities never do. No limit: any finite value."""
+        if not math.isfinite(value):
+            return False
+        if self.limit is None:
+            return True
+        if isinstance(self.limit, tuple):
+            low, high = self.limit
+            return low <= value <= high
+        if self.better == "larger":
+            return value >= self.limit
+        if self.better == "smaller":
+            return value <= self.limit
+        return abs(value) <= self.limit
+
+    def holds_set_point(self, value: float) -> bool:
+        """Whether the value lies where theory puts it; True if no set point is declared."""
+        if not math.isfinite(value):
+            return False
+        return self.set_point is None or self.set_point[0] <= value <= self.set_point[1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """Simulations that give the values of some metrics: one configuration at one time step.
+
+    `measure(simulate)` returns {metric name: value}. If it raises SimulationFailed, every metric of the
+    measurement is recorded with that outcome class.
+    """
+
+    configuration: str  # "plain", "curved", "half-step", ...: named in every table
+    time_step: float  # s
+    metrics: tuple[Metric, ...]
+    measure: Callable[[Simulate], Mapping[str, float]]
+    parameters: Mapping[str, float] = field(
+        default_factory=dict
+    )  # what else makes it another series: N, mass
+    note: str = ""  # what this configuration is, in one sentence
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """One line or cloud of points of a figure."""
+
+    name: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    style: Literal["line", "points", "both", "reference", "limit"] = "both"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """A figure's data, drawn from this run. NaN in y is a failed point."""
+
+    curves: tuple[Curve, ...]
+    x_label: str
+    y_label: str
+    x_scale: Literal["linear", "log", "angle"] = "linear"  # angle: polar plot, x in degrees
+    y_scale: Literal["linear", "log"] = "linear"
+    note: str = ""  # what to see; where it differs from the thesis and why
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """A figure of the thesis redrawn, or one of our own."""
+
+    name: str  # a slug: "length-deviation-against-time-step"
+    title: str
+    draw: Callable[[Simulate], Drawing]
+    thesis: str = ""  # "Fig 3.20"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Configuration:
+    """A named way to run a test on the error-against-run-time ladder, with its expected order of accuracy."""
+
+    name: str
+    method: Method
+    expected_order: float | None  # None: no order expected (rounding level, or no smooth error)
+    order_range: tuple[float, float] | None = None  # time steps [s] of the asymptotic range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ladder:
+    """Error against run time: time steps from coarse to fine, run in each configuration.
+
+    `error(simulate, time_step, method)` measures; `run(simulate, time_step, method)` does the same simulation
+    with nothing observed, to be timed.
+    """
+
+    name: str
+    description: str  # which error, against which reference
+    unit: str
+    time_steps: tuple[float, ...]  # s, coarse to fine
+    configurations: tuple[Configuration, ...]
+    error: Callable[[Simulate, float, Method], float]
+    run: Callable[[Simulate, float, Method], Result]
+    target_error: float | None = None  # for "time to reach a given error", in `unit`
+    target_seconds: float | None = None  # for "error reached in a given time", s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BreakPoint:
+    """The largest (or smallest) value of a parameter at which a scene is still stable, to a stated resolution."""
+
+    value: float
+    resolution: float  # relative width of the final bracket
+    evaluations: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StabilityMap:
+    """Cells over two parameters, each settled / bounded / growing / diverged / not_finite."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    cells: tuple[tuple[str, ...], ...]  # cells[row of y][column of x]
+    x_label: str
+    y_label: str
+    prediction: tuple[tuple[float, ...], ...] | None = None  # the method's own |eigenvalue|, same layout
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StabilityStudy:
+    """One question about where a scene stops being stable. `study` returns a break point or a map."""
+
+    name: str  # slug
+    title: str
+    configuration: str
+    definition: str  # what counts as stable: energy, violation and finiteness together
+    study: Callable[[Simulate], BreakPoint | StabilityMap]
+    unit: str = ""
+    better: Literal["larger", "smaller"] = "larger"
+    expected: tuple[float, float] | None = (
+        None  # band for a break point, with its source in `expected_source`
+    )
+    expected_source: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Example:
+    """The scene a test is about, as `tracker explain` compiles it and the page draws it."""
+
+    scene: Scene
+    time_step: float  # s
+    method: Method = PLAIN
+    observe: Mapping[str, Observable] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScalarTest:
+    """A physical question put to an engine. Texts are plain; formulas are Unicode, one per line in `theory`."""
+
+    title: str
+    question: str  # one sentence with a question mark
+    why: str  # why it matters
+    model: str  # what is simulated, in words
+    parameters: tuple[tuple[str, str], ...]  # ("mass", "1 kg"), for the reader
+    theory: tuple[str, ...]  # sentences and formulas
+    reference: str  # the right answer and its source
+    conclusion: str  # what to conclude from green and from red
+    source: str  # "thesis, section 3.6"
+    measurements: tuple[Measurement, ...]
+    example: Callable[[], Example]
+    figures: tuple[Figure, ...] = ()
+    ladders: tuple[Ladder, ...] = ()
+    stability: tuple[StabilityStudy, ...] = ()
+    misprints: tuple[str, ...] = ()  # where a reader comparing with the thesis would stumble
+    seven: bool = False  # one of the thesis' seven continuous tests
+
+    def metrics(self) -> tuple[tuple[Measurement, Metric], ...]:
+        """Every metric with the measurement it belongs to, gates first."""
+        order = {"gate": 0, "companion": 1, "reported": 2}
+        pairs = [(measurement, metric) for measurement in self.measurements for metric in measurement.metrics]
+        return tuple(sorted(pairs, key=lambda pair: order[pair[1].role]))

@@ -1,0 +1,198 @@
+"""One run as a document: what `run` measures, `record` stores, `export` writes and `import` reads.
+
+This is the one place where the published JSON Schema comes from (`tracker schema`). A document is complete in
+itself: it carries the definitions of its series, so that results of other machines, engines and tools can be
+imported with nothing else. Non-finite values travel as the strings "nan", "inf" and "-inf".
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import msgspec
+
+SCHEMA_VERSION = 1
+
+OutcomeClass = Literal["value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing"]
+Text = Annotated[str, msgspec.Meta(max_length=65_536)]
+Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+Number = float | Literal["nan", "inf", "-inf"]
+
+
+class Struct(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every part of the document: frozen, keyword only, nothing unknown accepted."""
+
+
+class EngineVersion(Struct):
+    """Which engine was measured."""
+
+    name: Name  # "spook"
+    version: Name  # from git: "1.2.0" or "1.2.1.dev3+g1a2b3c4"
+    git_hash: Text  # full hash; empty for engines without one
+    dirty: bool  # built from a tree with uncommitted changes
+    commit_time: Text  # ISO 8601 UTC; empty if unknown
+    parents: tuple[str, ...] = ()  # hashes; commit order comes from ancestry
+    compiler: Text = ""
+    flags: Text = ""
+
+
+class Machine(Struct):
+    """Where it ran. `fingerprint` decides whether run times may be compared."""
+
+    fingerprint: Name
+    processor: Text
+    cores: int
+    operating_system: Text
+    float_environment: Text  # hash of a few library functions' bits: values may differ where this does
+
+
+class SeriesDefinition(Struct):
+    """What is followed over versions: one metric of one test in one configuration."""
+
+    key: Name  # "pendulum/curved/max_length_deviation/h=0.0166667": unique and stable
+    test: Name
+    title: Text
+    configuration: Name
+    metric: Name
+    description: Text
+    unit: Text
+    role: Literal["gate", "companion", "reported"]
+    better: Literal["smaller_magnitude", "larger", "smaller", "inside"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point"]
+    time_step: float | None  # s
+    parameters: dict[str, float]
+    limit: float | tuple[float, float] | None
+    limit_source: Text
+    set_point: tuple[float, float] | None
+    set_point_source: Text
+    reference: float | None
+    tolerance: float
+    relative_tolerance: float
+    test_version: Name  # hash of the definition: when it changes, values are not comparable
+    aliases: tuple[str, ...] = ()  # earlier keys of the same series
+
+
+class Timing(Struct):
+    """Run time of one simulation, nothing recorded: every repeat, and the exact work."""
+
+    seconds: tuple[float, ...]  # per run
+    runs_per_repeat: int  # very short runs are repeated until the clock resolves them
+    instructions: int | None = None  # retired, where the machine counts them
+    stage_seconds: dict[str, float] = {}
+
+
+class Sample(Struct):
+    """One value of one series in this run."""
+
+    series: Name  # a SeriesDefinition's key
+    value: Number  # exactly the float64; "nan" if there is none
+    outcome: OutcomeClass
+    passed: bool  # against the limit of that night
+    set_point_held: bool
+    failure: Text = ""  # one sentence where there is no value
+    counters: dict[str, int] = {}  # exact work: steps, block operations, sweeps, contacts
+    state_hash: Text = ""  # of the final state bits of every simulation behind the value
+    timing: Timing | None = None
+
+
+class Curve(Struct):
+    """One line of a figure."""
+
+    name: Text
+    x: tuple[Number, ...]
+    y: tuple[Number, ...]
+    style: Literal["line", "points", "both", "reference", "limit"]
+
+
+class FigureData(Struct):
+    """A figure drawn from this run."""
+
+    test: Name
+    name: Name
+    title: Text
+    thesis: Text
+    x_label: Text
+    y_label: Text
+    x_scale: Literal["linear", "log", "angle"]
+    y_scale: Literal["linear", "log"]
+    note: Text
+    curves: tuple[Curve, ...]
+
+
+class MapData(Struct):
+    """A stability map of this run; cells[row of y][column of x]."""
+
+    test: Name
+    name: Name
+    title: Text
+    configuration: Name
+    definition: Text
+    x_label: Text
+    y_label: Text
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    cells: tuple[tuple[str, ...], ...]
+    prediction: tuple[tuple[Number, ...], ...] | None
+    note: Text
+
+
+class StageChoice(Struct):
+    """A stage kept or left out of a test's compiled scene, and why."""
+
+    stage: Name
+    kept: bool
+    reason: Text
+    saved_seconds_per_step: float | None = None  # measured by forcing the stage in
+
+
+class TestCard(Struct):
+    """What a page says about a test, as it was worded in this run."""
+
+    name: Name
+    title: Text
+    question: Text
+    why: Text
+    model: Text
+    parameters: tuple[tuple[Text, Text], ...]
+    theory: tuple[Text, ...]
+    reference: Text
+    conclusion: Text
+    source: Text
+    misprints: tuple[Text, ...]
+    seven: bool
+    stages: tuple[StageChoice, ...]
+
+
+class RunDocument(Struct):
+    """One run: everything measured at one engine version on one machine."""
+
+    schema_version: Literal[1]
+    id: Name  # UUID, made by the application
+    idempotency_key: Name  # importing the same key twice changes nothing
+    started: Text  # ISO 8601 UTC
+    finished: Text
+    trigger: Literal["manual", "nightly", "import", "test"]
+    tracker_version: Text
+    ci_address: Text
+    engine: EngineVersion
+    machine: Machine
+    tests: tuple[TestCard, ...]
+    series: tuple[SeriesDefinition, ...]
+    samples: tuple[Sample, ...]
+    figures: tuple[FigureData, ...] = ()
+    maps: tuple[MapData, ...] = ()
+
+
+def to_number(value: float) -> Number:
+    """A float as the document carries it."""
+    if math.isnan(value):
+        return "nan"
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return value
+
+
+def from_number(number: Number) -> float:
+    """The float a document's number stands for."""
+    return float(number)
