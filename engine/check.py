@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from engine.errors import SceneError
 
@@ -40,12 +39,11 @@ def not_negative(owner: str, field: str, value: object) -> float:
 
 def vector(owner: str, field: str, value: object) -> Vector:
     """Three finite floats."""
-    if isinstance(value, str) or not isinstance(value, Sequence) and not hasattr(value, "__len__"):
-        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}")
-    if len(value) != 3:  # type: ignore[arg-type]
-        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}")
-    x, y, z = (number(owner, field, component) for component in value)  # type: ignore[attr-defined]
-    return (x, y, z)
+    try:
+        x, y, z = value  # type: ignore[misc]
+    except (TypeError, ValueError):
+        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}") from None
+    return (number(owner, field, x), number(owner, field, y), number(owner, field, z))
 
 
 def direction(owner: str, field: str, value: object) -> Vector:
