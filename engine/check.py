@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import Any
 
 from engine.errors import SceneError
 
@@ -38,14 +38,13 @@ def not_negative(owner: str, field: str, value: object) -> float:
     return result
 
 
-def vector(owner: str, field: str, value: object) -> Vector:
+def vector(owner: str, field: str, value: Any) -> Vector:
     """Three finite floats."""
-    if isinstance(value, str) or not isinstance(value, Sequence) and not hasattr(value, "__len__"):
-        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}")
-    if len(value) != 3:  # type: ignore[arg-type]
-        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}")
-    x, y, z = (number(owner, field, component) for component in value)  # type: ignore[attr-defined]
-    return (x, y, z)
+    try:
+        x, y, z = value
+    except (TypeError, ValueError):
+        raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}") from None
+    return (number(owner, field, x), number(owner, field, y), number(owner, field, z))
 
 
 def direction(owner: str, field: str, value: object) -> Vector:

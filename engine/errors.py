@@ -3,7 +3,7 @@
 EngineError
 ├── SceneError (ValueError)       the scene cannot be simulated as written; the message names the culprit
 ├── MethodError (ValueError)      the time step, a method option or an observable makes no sense
-└── SimulationFailed              an observable of a run that did not complete was read; the run is in `.result`
+└── SimulationFailed              an observable of an incomplete run was read; the run is in `.result`
 
 A simulation that diverges is not an exception: `simulate` returns a Result whose status says so.
 """
@@ -29,7 +29,7 @@ class MethodError(EngineError, ValueError):
 
 
 class SimulationFailed(EngineError):
-    """An observable of a run that did not complete was read. `result` holds the run, with its partial data."""
+    """An observable of an incomplete run was read; `result` holds the run with its partial data."""
 
     def __init__(self, result: Result) -> None:
         super().__init__(result.failure)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from engine import check
 from engine.check import Vector
@@ -11,7 +12,7 @@ from engine.errors import SceneError
 End = str | Vector  # a body's name, or a fixed point of the world [m]
 
 
-def check_ends(owner: str, between: object) -> tuple[End, End]:
+def check_ends(owner: str, between: Any) -> tuple[End, End]:
     """Two ends, each a body's name or a world point; at least one must be a body."""
     if isinstance(between, str) or not hasattr(between, "__len__") or len(between) != 2:
         raise SceneError(f"{owner}: between must name two ends, not {between!r}")
@@ -25,7 +26,7 @@ def check_ends(owner: str, between: object) -> tuple[End, End]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spring:
-    """A plain force −stiffness (|d| − rest_length) along d, between centres of mass: symplectic Euler, no row.
+    """A plain force −stiffness (|d| − rest_length) along d, between centres of mass; not a row.
 
     With rest_length 0 the force is −stiffness d exactly, with no normalisation.
     """

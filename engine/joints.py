@@ -137,7 +137,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lock(Joint):
-    """Holds both bodies together: translations along world x, y, z at the start, then rotations about them."""
+    """Holds both bodies together: translations along world x, y, z of the start, then rotations."""
 
     rows: ClassVar[int] = 6
     kind: ClassVar[str] = "lock"
@@ -172,7 +172,10 @@ class AxialJoint(Joint):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hinge(AxialJoint):
-    """Leaves rotation about `axis` free: translations along axis and two normals, then rotations about the normals."""
+    """Leaves rotation about `axis` free.
+
+    Rows: translations along the axis and two normals, then rotations about the normals.
+    """
 
     rows: ClassVar[int] = 5
     kind: ClassVar[str] = "hinge"
@@ -180,7 +183,10 @@ class Hinge(AxialJoint):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prismatic(AxialJoint):
-    """Leaves translation along `axis` free: translations along two normals, then rotations about axis and normals."""
+    """Leaves translation along `axis` free.
+
+    Rows: translations along two normals, then rotations about the axis and the normals.
+    """
 
     rows: ClassVar[int] = 5
     kind: ClassVar[str] = "prismatic"
@@ -188,7 +194,7 @@ class Prismatic(AxialJoint):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Universal(Joint):
-    """Ball plus the condition that `axis` (fixed to the first) stays normal to `cross_axis` (to the second)."""
+    """Ball, and `axis` (fixed to the first body) stays normal to `cross_axis` (fixed to the second)."""
 
     rows: ClassVar[int] = 4
     kind: ClassVar[str] = "universal"

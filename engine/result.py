@@ -19,9 +19,10 @@ Array = npt.NDArray[np.float64]
 class Result:
     """One run of a scene.
 
-    `result["name"]` is an observable (a NumPy array, 0-dimensional for scalars) and raises SimulationFailed if
-    the run did not complete; `partial` holds what was seen until then. `sample_times["name"]` are the times [s]
-    of a trace. `final_state` maps body name to (13,) position, orientation, velocity, angular velocity.
+    `result["name"]` is an observable (a NumPy array, 0-dimensional for scalars) and raises SimulationFailed
+    if the run did not complete; `partial` holds what was seen until then. `sample_times["name"]` are the
+    times [s] of a trace. `final_state` maps body name to (13,) position,
+    orientation, velocity, angular velocity.
     `counters` are exact integers, equal on every machine: steps, rows_assembled, block_operations, ...
     `state_hash` is a hash of the bits of the final state.
     """

@@ -71,22 +71,20 @@ class Scene:
                 and not (end == WORLD and isinstance(constraint, Joint))
             ):
                 raise SceneError(f"{owner}: there is no body named {end!r}")
-        ends = [known.get(end) if isinstance(end, str) else None for end in constraint.between]
-        if not any(
-            isinstance(end, Particle) or (end is not None and end.motion == "dynamic") for end in ends
-        ):
+        tied = [known.get(end) if isinstance(end, str) else None for end in constraint.between]
+        if not any(isinstance(body, Particle) or (body and body.motion == "dynamic") for body in tied):
             raise SceneError(f"{owner}: neither end can move, so it constrains nothing")
         if isinstance(constraint, Joint):
-            for end in ends:
-                if isinstance(end, Particle):
+            for body in tied:
+                if isinstance(body, Particle):
                     raise SceneError(
-                        f"{owner}: {end.name!r} is a particle; joints need rigid bodies, use a Distance"
+                        f"{owner}: {body.name!r} is a particle; joints need rigid bodies, use a Distance"
                     )
             return
-        for end, anchor in zip(ends, constraint.anchors, strict=True):
-            if isinstance(end, Particle) and any(anchor):
+        for body, anchor in zip(tied, constraint.anchors, strict=True):
+            if isinstance(body, Particle) and any(anchor):
                 raise SceneError(
-                    f"{owner}: particle {end.name!r} has only its centre; leave its anchor at zero"
+                    f"{owner}: particle {body.name!r} has only its centre; leave its anchor at zero"
                 )
         if self.length(constraint) == 0.0:
             raise SceneError(f"{owner}: its ends coincide, so it has no direction; move one of them")

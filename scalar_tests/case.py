@@ -45,9 +45,10 @@ class Metric:
     companion  keeps the gate honest; its `limit` and `set_point` are ours
     reported   shown and followed, no limit
 
-    `limit` is a magnitude (smaller_magnitude), a bound (larger, smaller) or a band (inside). `set_point` is the
-    band theory lets us expect, far tighter than the limit: leaving it is a regression even inside the limit.
-    `tolerance` (absolute, in the metric's unit) and `relative_tolerance` say which change is only "changed".
+    `limit` is a magnitude (smaller_magnitude), a bound (larger, smaller) or a band (inside). `set_point` is
+    the band theory lets us expect, far tighter than the limit: leaving it is a regression even inside the
+    limit. `tolerance` (absolute, in the metric's unit) and `relative_tolerance` say which change is only
+    "changed".
     """
 
     name: str
@@ -166,7 +167,7 @@ class Ladder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BreakPoint:
-    """The largest (or smallest) value of a parameter at which a scene is still stable, to a stated resolution."""
+    """The last value of a parameter at which a scene is still stable, to a stated resolution."""
 
     value: float
     resolution: float  # relative width of the final bracket
@@ -215,7 +216,7 @@ class Example:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScalarTest:
-    """A physical question put to an engine. Texts are plain; formulas are Unicode, one per line in `theory`."""
+    """A physical question put to an engine. Texts are plain; `theory` has Unicode formulas, a line each."""
 
     title: str
     question: str  # one sentence with a question mark

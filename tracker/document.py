@@ -24,7 +24,7 @@ class Struct(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Base of every part of the document: frozen, keyword only, nothing unknown accepted."""
 
 
-class EngineVersion(Struct):
+class EngineVersion(Struct, frozen=True, kw_only=True):
     """Which engine was measured."""
 
     name: Name  # "spook"
@@ -37,7 +37,7 @@ class EngineVersion(Struct):
     flags: Text = ""
 
 
-class Machine(Struct):
+class Machine(Struct, frozen=True, kw_only=True):
     """Where it ran. `fingerprint` decides whether run times may be compared."""
 
     fingerprint: Name
@@ -47,7 +47,7 @@ class Machine(Struct):
     float_environment: Text  # hash of a few library functions' bits: values may differ where this does
 
 
-class SeriesDefinition(Struct):
+class SeriesDefinition(Struct, frozen=True, kw_only=True):
     """What is followed over versions: one metric of one test in one configuration."""
 
     key: Name  # "pendulum/curved/max_length_deviation/h=0.0166667": unique and stable
@@ -73,7 +73,7 @@ class SeriesDefinition(Struct):
     aliases: tuple[str, ...] = ()  # earlier keys of the same series
 
 
-class Timing(Struct):
+class Timing(Struct, frozen=True, kw_only=True):
     """Run time of one simulation, nothing recorded: every repeat, and the exact work."""
 
     seconds: tuple[float, ...]  # per run
@@ -82,7 +82,7 @@ class Timing(Struct):
     stage_seconds: dict[str, float] = {}
 
 
-class Sample(Struct):
+class Sample(Struct, frozen=True, kw_only=True):
     """One value of one series in this run."""
 
     series: Name  # a SeriesDefinition's key
@@ -96,7 +96,7 @@ class Sample(Struct):
     timing: Timing | None = None
 
 
-class Curve(Struct):
+class Curve(Struct, frozen=True, kw_only=True):
     """One line of a figure."""
 
     name: Text
@@ -105,7 +105,7 @@ class Curve(Struct):
     style: Literal["line", "points", "both", "reference", "limit"]
 
 
-class FigureData(Struct):
+class FigureData(Struct, frozen=True, kw_only=True):
     """A figure drawn from this run."""
 
     test: Name
@@ -120,7 +120,7 @@ class FigureData(Struct):
     curves: tuple[Curve, ...]
 
 
-class MapData(Struct):
+class MapData(Struct, frozen=True, kw_only=True):
     """A stability map of this run; cells[row of y][column of x]."""
 
     test: Name
@@ -137,7 +137,7 @@ class MapData(Struct):
     note: Text
 
 
-class StageChoice(Struct):
+class StageChoice(Struct, frozen=True, kw_only=True):
     """A stage kept or left out of a test's compiled scene, and why."""
 
     stage: Name
@@ -146,7 +146,7 @@ class StageChoice(Struct):
     saved_seconds_per_step: float | None = None  # measured by forcing the stage in
 
 
-class TestCard(Struct):
+class TestCard(Struct, frozen=True, kw_only=True):
     """What a page says about a test, as it was worded in this run."""
 
     name: Name
@@ -164,7 +164,7 @@ class TestCard(Struct):
     stages: tuple[StageChoice, ...]
 
 
-class RunDocument(Struct):
+class RunDocument(Struct, frozen=True, kw_only=True):
     """One run: everything measured at one engine version on one machine."""
 
     schema_version: Literal[1]

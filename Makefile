@@ -1,0 +1,72 @@
+# The things one does here, each from a fresh clone. They need Python >= 3.11, a C++20 compiler, git and make.
+PYTHON ?= python3
+VENV   ?= .venv
+DB     ?= sqlite:///tracker.db
+OUT    ?= public
+BIN    := $(VENV)/bin
+
+.PHONY: help nightly test check bench site serve clean require install develop native-tests FORCE
+help:
+	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
+	@echo "make test      set up, pass all tests (C++ and Python)"
+	@echo "make check     formatting, lint, types, import contracts"
+	@echo "make bench     our kernels against hand-written loops, side by side in one run"
+	@echo "make site      publish the website again from what is recorded"
+	@echo "make serve     look at the website on this machine"
+	@echo "make clean     remove what was built (the database stays)"
+
+nightly: install
+	$(BIN)/tracker nightly --db $(DB) --out $(OUT)
+
+test: develop native-tests
+	$(BIN)/pytest -q -n auto --dist loadfile
+
+check: develop
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: develop
+	$(BIN)/python bench/run.py
+
+site: install
+	$(BIN)/tracker publish --db $(DB) --out $(OUT)
+
+serve: install
+	$(BIN)/tracker serve $(OUT)
+
+native-tests: develop
+	$(BIN)/cmake -S engine/native -B build/native-tests -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
+	    -DCMAKE_BUILD_TYPE=Release -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON
+	$(BIN)/cmake --build build/native-tests
+	$(BIN)/ctest --test-dir build/native-tests --output-on-failure
+
+clean:
+	rm -rf build $(VENV) public .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+# --- set-up ---------------------------------------------------------------------------------------------
+# The engine carries the commit it was built from, so a new commit or a changed tree builds again.
+require:
+	@sh .ci/require "$(PYTHON)"
+
+$(VENV)/source-state: FORCE | require
+	@mkdir -p $(VENV)
+	@{ git rev-parse HEAD; git diff HEAD; git describe --tags --always; cat pyproject.toml; } 2>/dev/null | cksum > $@.new
+	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+
+$(BIN)/pip: | require
+	@test -x $@ || { $(PYTHON) -m venv $(VENV) && $(BIN)/pip install -q --upgrade pip; }
+
+$(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
+	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
+	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e .
+	@touch $@
+
+$(VENV)/developed: $(VENV)/installed
+	@version="$$(sh .ci/version 2>/dev/null)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
+	    echo "installing the tools of development into $(VENV)" && $(BIN)/pip install -q -e '.[dev]'
+	@touch $@
+
+install: $(VENV)/installed
+develop: $(VENV)/developed
