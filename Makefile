@@ -59,11 +59,13 @@ $(BIN)/pip: | require
 	@test -x $@ || { $(PYTHON) -m venv $(VENV) && $(BIN)/pip install -q --upgrade pip; }
 
 $(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
-	$(BIN)/pip install -q -e .
+	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
+	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e .
 	@touch $@
 
 $(VENV)/developed: $(VENV)/installed
-	$(BIN)/pip install -q -e '.[dev]'
+	@version="$$(sh .ci/version 2>/dev/null)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
+	    echo "installing the tools of development into $(VENV)" && $(BIN)/pip install -q -e '.[dev]'
 	@touch $@
 
 install: $(VENV)/installed

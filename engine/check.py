@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from engine.errors import SceneError
 
@@ -37,10 +38,10 @@ def not_negative(owner: str, field: str, value: object) -> float:
     return result
 
 
-def vector(owner: str, field: str, value: object) -> Vector:
+def vector(owner: str, field: str, value: Any) -> Vector:
     """Three finite floats."""
     try:
-        x, y, z = value  # type: ignore[misc]
+        x, y, z = value
     except (TypeError, ValueError):
         raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}") from None
     return (number(owner, field, x), number(owner, field, y), number(owner, field, z))
