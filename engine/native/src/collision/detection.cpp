@@ -1,0 +1,82 @@
+#include "collision/detection.hpp"
+
+#include <algorithm>
+
+#include "collision/narrow_phase.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int feature_bits = 16, collider_bits = 24;
+
+std::uint64_t pair_key(int i, int j) noexcept {
+    return (static_cast<std::uint64_t>(std::min(i, j)) << 32) | static_cast<std::uint64_t>(std::max(i, j));
+}
+
+}  // namespace
+
+Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic, const std::vector<IndexPair>& excluded)
+    : colliders_(std::move(colliders)), dynamic_(std::move(dynamic)), radius_(dynamic_.size(), 0.0) {
+    std::stable_sort(colliders_.begin(), colliders_.end(), [](const Collider& a, const Collider& b) { return a.body < b.body; });
+    for (auto [i, j] : excluded) excluded_.push_back(pair_key(i, j));
+    std::sort(excluded_.begin(), excluded_.end());
+    for (int k = 0; k < static_cast<int>(colliders_.size()); ++k) {
+        const Collider& c = colliders_[k];
+        if (c.shape.kind == ShapeKind::plane) {
+            planes_.push_back(k);
+        } else {
+            bounded_.push_back(k);
+            radius_[c.body] = std::max(radius_[c.body], norm(c.part.position) + reach(c.shape));
+        }
+    }
+    // A pair is missing only if no two bodies with surfaces may touch; stop at the first that may.
+    for (std::size_t i = 0; i < colliders_.size() && !possible_; ++i)
+        for (std::size_t j = i + 1; j < colliders_.size() && !possible_; ++j)
+            possible_ = may_touch(static_cast<int>(i), static_cast<int>(j));
+    poses_.resize(colliders_.size());
+    bounds_.resize(bounded_.size());
+}
+
+bool Detection::may_touch(int i, int j) const noexcept {
+    const int a = colliders_[i].body, b = colliders_[j].body;
+    if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;
+    if (colliders_[i].shape.kind == ShapeKind::plane && colliders_[j].shape.kind == ShapeKind::plane) return false;
+    return !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
+}
+
+void Detection::add(int i, int j, double margin, std::vector<Contact>& out) const {
+    if (i > j) std::swap(i, j);
+    const Manifold manifold = collide(colliders_[i].shape, poses_[i], colliders_[j].shape, poses_[j], margin);
+    for (int k = 0; k < manifold.count; ++k) {
+        const ContactPoint& point = manifold.points[k];
+        const std::uint64_t key = (static_cast<std::uint64_t>(i) << (collider_bits + feature_bits)) |
+                                  (static_cast<std::uint64_t>(j) << feature_bits) | point.feature;
+        out.push_back({colliders_[i].body, colliders_[j].body, point, key});
+    }
+}
+
+void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double>& margin, std::vector<Contact>& out) {
+    out.clear();
+    for (std::size_t k = 0; k < colliders_.size(); ++k) poses_[k] = placed(bodies[colliders_[k].body], colliders_[k].part);
+    for (std::size_t k = 0; k < bounded_.size(); ++k) {
+        const Collider& c = colliders_[bounded_[k]];
+        bounds_[k] = bounds(c.shape, poses_[bounded_[k]], margin[c.body]);
+    }
+    overlapping_pairs(bounds_, pairs_);
+    for (auto [p, q] : pairs_) {
+        const int i = bounded_[p], j = bounded_[q];
+        if (may_touch(i, j)) add(i, j, margin[colliders_[i].body] + margin[colliders_[j].body], out);
+    }
+    for (int plane : planes_)
+        for (int k : bounded_) {
+            if (!may_touch(plane, k)) continue;
+            const double sum = margin[colliders_[plane].body] + margin[colliders_[k].body];
+            const Vec3 normal = poses_[plane].rotation * colliders_[plane].shape.normal;
+            if (dot(normal, poses_[k].position - poses_[plane].position) <= reach(colliders_[k].shape) + sum)
+                add(plane, k, sum, out);
+        }
+    std::sort(out.begin(), out.end(), [](const Contact& a, const Contact& b) { return a.key < b.key; });
+}
+
+}  // namespace spook

@@ -1,0 +1,59 @@
+// The collision stage: from where the bodies stand to the list of contact points.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "collision/broad_phase.hpp"
+#include "collision/manifold.hpp"
+#include "collision/shape.hpp"
+
+namespace spook {
+
+/// One primitive of a body; a compound gives several.
+struct Collider {
+    int body = 0;
+    Primitive shape;
+    Pose part;  // in body axes
+};
+
+/// One contact point between two bodies; the normal points from second to first.
+struct Contact {
+    int first = 0, second = 0;  // body indices, first < second
+    ContactPoint point;
+    std::uint64_t key = 0;  // colliders and feature: the same point has the same key from step to step
+};
+
+/// Finds contacts among a fixed set of colliders. Pairs of one body, pairs in which neither body is dynamic and
+/// excluded pairs never touch.
+class Detection {
+public:
+    /// `dynamic` has one entry per body; `excluded` lists pairs of body indices in either order.
+    Detection(std::vector<Collider> colliders, std::vector<char> dynamic, const std::vector<IndexPair>& excluded);
+
+    /// Whether any pair of colliders could ever touch; if not, the stage can be left out.
+    bool possible() const noexcept { return possible_; }
+
+    /// Replaces `out` by all points with a gap of at most margin[first] + margin[second] [m], in ascending order
+    /// of key (so by body, collider and feature). `bodies` and `margin` have one entry per body.
+    void detect(const std::vector<Pose>& bodies, const std::vector<double>& margin, std::vector<Contact>& out);
+
+    /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.
+    const std::vector<double>& radius() const noexcept { return radius_; }
+
+private:
+    bool may_touch(int i, int j) const noexcept;
+    void add(int i, int j, double margin, std::vector<Contact>& out) const;
+
+    std::vector<Collider> colliders_;  // by body
+    std::vector<char> dynamic_;
+    std::vector<std::uint64_t> excluded_;  // sorted
+    std::vector<double> radius_;
+    std::vector<int> bounded_, planes_;  // indices into colliders_
+    bool possible_ = false;
+    std::vector<Pose> poses_;
+    std::vector<Bounds> bounds_;
+    std::vector<IndexPair> pairs_;
+};
+
+}  // namespace spook

@@ -1,0 +1,30 @@
+#include "collision/narrow_phase.hpp"
+
+namespace spook {
+
+namespace {
+
+using Pair = Manifold (*)(const Primitive&, const Pose&, const Primitive&, const Pose&, double) noexcept;
+
+Manifold never(const Primitive&, const Pose&, const Primitive&, const Pose&, double) noexcept { return {}; }
+
+// By kind of the first (row) and the second (column), in the order of ShapeKind.
+constexpr Pair pairs[4][4] = {
+    {sphere_sphere, sphere_capsule, sphere_box, sphere_plane},
+    {nullptr, capsule_capsule, capsule_box, capsule_plane},
+    {nullptr, nullptr, box_box, box_plane},
+    {nullptr, nullptr, nullptr, never},
+};
+
+}  // namespace
+
+Manifold collide(const Primitive& first, const Pose& at_first, const Primitive& second, const Pose& at_second,
+                 double margin) noexcept {
+    const int i = static_cast<int>(first.kind), j = static_cast<int>(second.kind);
+    if (i <= j) return pairs[i][j](first, at_first, second, at_second, margin);
+    Manifold swapped = pairs[j][i](second, at_second, first, at_first, margin);
+    for (int k = 0; k < swapped.count; ++k) swapped.points[k].normal = -swapped.points[k].normal;
+    return swapped;
+}
+
+}  // namespace spook

@@ -1,0 +1,55 @@
+// Surfaces as the narrow phase sees them: a convex primitive in its own axes, and where it stands.
+#pragma once
+
+#include <cstdint>
+
+#include "vec.hpp"
+
+namespace spook {
+
+/// The order matters: the narrow phase knows each pair with the lower kind first.
+enum class ShapeKind : std::uint8_t { sphere, capsule, box, plane };
+
+struct Pose {
+    Vec3 position;                     // m
+    Mat3 rotation = Mat3::identity();  // body axes to world axes
+};
+
+/// One convex primitive; fields not named for a kind are ignored.
+struct Primitive {
+    ShapeKind kind = ShapeKind::sphere;
+    double radius = 0.0;           // sphere, capsule, m
+    double half_length = 0.0;      // capsule: half its cylinder, along local z, m
+    Vec3 half;                     // box: half its edges, m
+    Vec3 normal{0.0, 0.0, 1.0};    // plane: unit, out of the solid half-space, local axes
+
+    static Primitive sphere(double radius) noexcept { return {ShapeKind::sphere, radius, 0.0, {}, {}}; }
+    static Primitive capsule(double radius, double length) noexcept {
+        return {ShapeKind::capsule, radius, 0.5 * length, {}, {}};
+    }
+    static Primitive box(Vec3 size) noexcept { return {ShapeKind::box, 0.0, 0.0, 0.5 * size, {}}; }
+    static Primitive plane(Vec3 normal) noexcept { return {ShapeKind::plane, 0.0, 0.0, {}, normal}; }
+};
+
+constexpr Vec3 column(const Mat3& a, int i) noexcept { return {a.m[i], a.m[3 + i], a.m[6 + i]}; }
+/// aᵀ v: a world vector in the axes of `a`.
+constexpr Vec3 local(const Mat3& a, Vec3 v) noexcept {
+    return {dot(column(a, 0), v), dot(column(a, 1), v), dot(column(a, 2), v)};
+}
+constexpr Vec3 apply(const Pose& pose, Vec3 point) noexcept { return pose.position + pose.rotation * point; }
+
+/// The pose of a part placed in the axes of a body that stands at `body`.
+constexpr Pose placed(const Pose& body, const Pose& part) noexcept {
+    return {apply(body, part.position), body.rotation * part.rotation};
+}
+
+/// A unit vector normal to the unit vector `n`, the same for the same bits of `n`.
+inline Vec3 any_normal_to(Vec3 n) noexcept {
+    const Vec3 least = std::abs(n.x) <= std::abs(n.y) && std::abs(n.x) <= std::abs(n.z) ? Vec3{1, 0, 0}
+                       : std::abs(n.y) <= std::abs(n.z)                                 ? Vec3{0, 1, 0}
+                                                                                        : Vec3{0, 0, 1};
+    const Vec3 t = cross(n, least);
+    return (1.0 / norm(t)) * t;
+}
+
+}  // namespace spook
