@@ -1,0 +1,102 @@
+"""The version of a definition changes with what is measured and with nothing else."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import sys
+from pathlib import Path
+
+import pytest
+
+from tracker.definition import definition_hash
+
+MODULE = '''"""A question."""
+from engine.method import Method
+
+MASS = 2.0  # kg
+WHY = "because"
+METHOD = Method(corrections=0)
+
+
+def scene(length):
+    """A rope."""
+    return {"mass": MASS, "length": length}
+
+
+def measure(simulate):
+    """Asks."""
+    return {"sag": simulate(scene(1.0), method=METHOD)}
+
+
+def draw(simulate):
+    return [simulate(1), WHY]
+
+
+VARIANT = lambda simulate: measure(simulate)
+'''
+COUNTER = itertools.count()
+
+
+@pytest.fixture
+def version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def of(source: str, function: str = "measure", facts: object = ("m", 0.1)) -> str:
+        name = f"question_{next(COUNTER)}"
+        (tmp_path / f"{name}.py").write_text(source, encoding="utf-8")
+        importlib.invalidate_caches()
+        module = importlib.import_module(name)
+        try:
+            return definition_hash(getattr(module, function), facts)
+        finally:
+            del sys.modules[name]
+
+    return of
+
+
+def test_the_same_source_has_the_same_version(version):
+    assert version(MODULE) == version(MODULE)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"""A rope."""', '"""A rope that is worded better."""'),
+        ('"because"', '"for a better reason"'),
+        ("# kg", "# kilograms"),
+        ("[simulate(1), WHY]", "[simulate(2)]"),
+        ("def scene(length):", "def scene(length: float) -> dict:"),
+        ("def measure", "\n\n\ndef measure"),
+    ],
+)
+def test_rewording_and_redrawing_keep_it(version, old, new):
+    assert old in MODULE
+    assert version(MODULE.replace(old, new)) == version(MODULE)
+
+
+@pytest.mark.parametrize("function", ["measure", "VARIANT"])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("MASS = 2.0", "MASS = 2.5"),
+        ('"length": length', '"length": 2 * length'),
+        ("scene(1.0)", "scene(1.5)"),
+        ("corrections=0", "corrections=1"),
+    ],
+)
+def test_another_scene_constant_or_method_is_another_version(version, function, old, new):
+    assert old in MODULE
+    assert version(MODULE.replace(old, new), function) != version(MODULE, function)
+
+
+def test_another_limit_is_another_version(version):
+    assert version(MODULE, facts=("m", 0.2)) != version(MODULE, facts=("m", 0.1))
+
+
+def test_values_caught_in_a_closure_count():
+    def asking(mass: float):
+        return lambda simulate: {"sag": simulate(mass)}
+
+    assert definition_hash(asking(1.0), ()) == definition_hash(asking(1.0), ())
+    assert definition_hash(asking(1.0), ()) != definition_hash(asking(2.0), ())

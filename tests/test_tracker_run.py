@@ -1,0 +1,149 @@
+"""A run asks everything, survives everything, and writes down exactly what it saw."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from tracker.document import RunDocument, from_number
+from tracker.run import Request, RunError, Source, ci_address, run
+
+SOURCE = Source(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
+
+
+@pytest.fixture(autouse=True)
+def _toys(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+
+
+def alone(**options) -> RunDocument:
+    return run(SOURCE, Request(workers=1, **options))
+
+
+def by_key(document: RunDocument):
+    return {sample.series: sample for sample in document.samples}
+
+
+def test_a_run_carries_value_counters_hash_and_verdict_of_the_night():
+    document = alone()
+    sample = by_key(document)["fall/plain/position_error/h=0.01"]
+
+    assert abs(from_number(sample.value) + 0.05) < 1e-12  # ½ g t h below the exact place
+    assert (sample.outcome, sample.passed, sample.set_point_held) == ("value", True, True)
+    assert sample.counters == {"steps": 100}
+    assert len(sample.state_hash) == 16
+    assert [card.name for card in document.tests] == ["fall", "stand"]
+    assert [(s.stage, s.kept) for s in document.tests[0].stages] == [
+        ("apply_gravity", True),
+        ("collision", False),
+    ]
+    assert document.engine.name == "toy"
+
+
+def test_a_second_run_gives_the_same_values_bit_for_bit():
+    first, second = alone(), run(SOURCE, Request(workers=2))
+
+    assert by_key(first) == by_key(second)
+    assert first.series == second.series
+    assert first.id != second.id
+
+
+def test_a_document_survives_its_way_through_json():
+    document = alone(figures=True, sweep=True, stability=True, repeats=2)
+
+    assert msgspec.json.decode(msgspec.json.encode(document), type=RunDocument) == document
+
+
+@pytest.mark.parametrize(
+    ("fault", "outcome", "sentence"),
+    [
+        ("diverge", "diverged", "body 'ball' left the finite numbers at step 7"),
+        ("nan", "not_finite", "the value is nan"),
+        ("raise", "crashed", "ValueError: the toy refuses"),
+    ],
+)
+def test_whatever_fails_is_a_sample_of_its_class_and_never_passes(monkeypatch, fault, outcome, sentence):
+    monkeypatch.setenv("TOY_FAULT", fault)
+    samples = by_key(alone())
+
+    assert len(samples) == 3
+    for sample in samples.values():
+        assert (sample.outcome, sample.passed, sample.set_point_held) == (outcome, False, False)
+        assert sample.failure == sentence
+        assert math.isnan(from_number(sample.value))
+
+
+def test_native_code_that_dies_loses_its_own_answers_only(monkeypatch):
+    monkeypatch.setenv("TOY_FAULT", "die")
+    document = run(SOURCE, Request(workers=2, tests=("stand",)))
+
+    (sample,) = document.samples
+    assert (sample.outcome, sample.failure) == ("crashed", "the engine's process died while answering")
+
+
+def test_out_of_limit_keeps_its_value(monkeypatch):
+    monkeypatch.setenv("TOY_ERROR", "-0.5")
+    sample = by_key(alone())["fall/plain/position_error/h=0.01"]
+
+    assert (sample.outcome, sample.passed, sample.set_point_held) == ("out_of_limit", False, False)
+    assert abs(from_number(sample.value) + 0.55) < 1e-12
+
+
+def test_an_unknown_test_is_refused_with_its_neighbour():
+    with pytest.raises(RunError, match="no test named 'fal'; did you mean fall"):
+        alone(tests=("fal",))
+
+
+def test_figures_maps_and_break_points_come_when_asked():
+    document = alone(tests=("fall",), figures=True, stability=True)
+    (figure,), (cells,) = document.figures, document.maps
+    point = by_key(document)["fall/plain/stability:largest-step"]
+
+    assert figure.curves[0].x == (0.1, 0.01)
+    assert cells.cells == (("settled", "bounded"),)
+    assert abs(from_number(point.value) - 1.5) < 1e-12
+    assert point.counters == {"evaluations": 8, "steps": 10}
+    assert not alone(tests=("fall",)).figures
+
+
+def test_the_ladder_gives_errors_timings_order_and_time_at_equal_error():
+    document = alone(tests=("fall",), sweep=True, repeats=3)
+    samples = by_key(document)
+    rung = samples["fall/plain/ladder:end-error/h=0.05"]
+
+    assert abs(from_number(rung.value) + 0.25) < 1e-12
+    assert len(rung.timing.seconds) >= 2
+    assert min(rung.timing.seconds) > 0.0
+    assert rung.timing.stage_seconds == {"apply_gravity": 1e-6}
+    assert abs(from_number(samples["fall/plain/ladder:end-error:order"].value) - 1.0) < 1e-9
+    assert 0.0 < from_number(samples["fall/plain/ladder:end-error:time-to-error"].value) < 1.0
+    assert abs(from_number(samples["fall/plain/ladder:end-error:error-in-time"].value) - 0.0625) < 1e-12
+    assert "fall/half-step/ladder:end-error:order" not in samples  # none is expected at rounding level
+
+
+def test_a_failed_rung_is_a_point_of_its_own_class(monkeypatch):
+    monkeypatch.setenv("TOY_FAULT", "diverge")
+    samples = by_key(alone(tests=("fall",), sweep=True, repeats=2))
+
+    assert samples["fall/plain/ladder:end-error/h=0.05"].outcome == "diverged"
+    assert samples["fall/plain/ladder:end-error/h=0.05"].timing is None
+    assert samples["fall/plain/ladder:end-error:order"].outcome == "missing"
+    assert samples["fall/plain/ladder:end-error:time-to-error"].value == "inf"
+
+
+def test_progress_names_every_test_once_it_is_finished():
+    seen = []
+    run(SOURCE, Request(workers=1), watch=seen.append)
+
+    assert [(p.done, p.total) for p in seen] == [(1, 2), (2, 2)]
+    assert [p.test for p in seen if p.finished] == ["fall", "stand"]
+
+
+def test_the_address_of_the_ci_log_is_kept():
+    github = {"GITHUB_RUN_ID": "7", "GITHUB_SERVER_URL": "https://x", "GITHUB_REPOSITORY": "a/b"}
+
+    assert ci_address(github) == "https://x/a/b/actions/runs/7"
+    assert ci_address({}) == ""

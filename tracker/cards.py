@@ -1,0 +1,65 @@
+"""What a run says about its tests and its engine: the words of each test and the stages its scene needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from scalar_tests.case import ScalarTest
+from tracker.document import EngineVersion, StageChoice, TestCard
+from tracker.measure import ask, sentence
+
+
+def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> TestCard:
+    """The test as it is worded now; `saved` are seconds per step by stage left out."""
+    return TestCard(
+        name=name,
+        title=test.title,
+        question=test.question,
+        why=test.why,
+        model=test.model,
+        parameters=test.parameters,
+        theory=test.theory,
+        reference=test.reference,
+        conclusion=test.conclusion,
+        source=test.source,
+        misprints=test.misprints,
+        seven=test.seven,
+        stages=stages(test, engine, saved),
+    )
+
+
+def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[StageChoice, ...]:
+    """Stages kept and left out of the test's example scene; empty where the engine cannot say."""
+    explained = ask(lambda: _explain(test, engine))
+    return tuple(
+        StageChoice(
+            stage=choice.stage,
+            kept=choice.kept,
+            reason=sentence(choice.reason),
+            saved_seconds_per_step=saved.get(choice.stage),
+        )
+        for choice in explained.value or ()
+    )
+
+
+def _explain(test: ScalarTest, engine: Any) -> Any:
+    example = test.example()
+    return engine.explain(
+        example.scene, time_step=example.time_step, method=example.method, observe=example.observe
+    )
+
+
+def engine_version(engine: Any) -> EngineVersion:
+    """The engine's own account of what it was built from."""
+    info = engine.build_info
+    return EngineVersion(
+        name=info.name,
+        version=info.version,
+        git_hash=info.git_hash,
+        dirty=bool(info.dirty),
+        commit_time=info.commit_time,
+        parents=tuple(info.parents),
+        compiler=info.compiler,
+        flags=info.flags,
+    )

@@ -1,0 +1,194 @@
+"""The version of a test's definition: a hash that changes when what is measured changes, and only then.
+
+Hashed are the parsed source of a measuring function and of every function of the test's own package it
+reaches, the values of the constants it reads (a Method, a mass, a table), and the facts of the metric: unit,
+direction, limit, reference, time step, parameters. Docstrings, comments, layout, names of tests and every
+text a reader sees are not reached, so rewording never makes two runs incomparable. The engine is not hashed
+either: it is what is being measured. Set points and tolerances judge a value and do not make another one.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import hashlib
+import inspect
+import struct
+import sys
+import types
+from collections.abc import Callable, Mapping, Set
+from typing import Any
+
+OWN_PACKAGES = ("scalar_tests",)
+
+
+def definition_hash(measure: Callable[..., Any], facts: object) -> str:
+    """Twelve hexadecimal digits over the function, all it reaches and the facts."""
+    seen = _Seen(home=_package(getattr(measure, "__module__", "") or ""))
+    described = (_describe(measure, seen), _describe(facts, seen))
+    return hashlib.sha256(repr(described).encode()).hexdigest()[:12]
+
+
+@dataclasses.dataclass
+class _Seen:
+    """What a walk has met already; a second meeting is named, not walked again."""
+
+    home: str
+    names: dict[int, int] = dataclasses.field(default_factory=dict)
+    alive: list[object] = dataclasses.field(default_factory=list)  # keeps ids unique during the walk
+
+    def meets(self, thing: object) -> int | None:
+        known = self.names.get(id(thing))
+        if known is None:
+            self.names[id(thing)] = len(self.names)
+            self.alive.append(thing)
+        return known
+
+    def owns(self, module: str) -> bool:
+        return _package(module) in (self.home, *OWN_PACKAGES)
+
+
+def _package(module: str) -> str:
+    return module.partition(".")[0]
+
+
+def _describe(thing: Any, seen: _Seen) -> Any:
+    """Nested tuples that stand for a value; floats by their bits."""
+    if isinstance(thing, float):
+        return ("f", struct.pack("<d", thing).hex())
+    if thing is None or isinstance(thing, bool | int | str | bytes | complex):
+        return thing
+    if isinstance(thing, tuple | list):
+        return ("list", *(_describe(item, seen) for item in thing))
+    if isinstance(thing, Mapping):
+        pairs = [(_describe(key, seen), _describe(value, seen)) for key, value in thing.items()]
+        return ("map", *sorted(pairs, key=repr))
+    if isinstance(thing, Set):
+        return ("set", *sorted((_describe(item, seen) for item in thing), key=repr))
+    known = seen.meets(thing)
+    if known is not None:
+        return ("again", known)
+    if isinstance(thing, functools.partial):
+        return ("partial", *(_describe(part, seen) for part in (thing.func, thing.args, thing.keywords)))
+    if isinstance(thing, types.MethodType):
+        return ("method", _describe(thing.__func__, seen), _describe(thing.__self__, seen))
+    if isinstance(thing, types.FunctionType):
+        return _describe_function(thing, seen)
+    if isinstance(thing, type):
+        return _describe_class(thing, seen)
+    if isinstance(thing, types.ModuleType):
+        return ("module", thing.__name__)
+    if dataclasses.is_dataclass(thing):
+        fields = tuple((f.name, _describe(getattr(thing, f.name), seen)) for f in dataclasses.fields(thing))
+        return (type(thing).__qualname__, _describe(type(thing), seen), fields)
+    if hasattr(thing, "tobytes") and hasattr(thing, "shape"):
+        return ("array", str(thing.dtype), tuple(thing.shape), thing.tobytes().hex())
+    if hasattr(thing, "__wrapped__"):
+        return ("wrapped", _describe(thing.__wrapped__, seen))
+    return (type(thing).__qualname__, getattr(thing, "__name__", ""))
+
+
+def _describe_class(kind: type, seen: _Seen) -> Any:
+    if not seen.owns(kind.__module__):
+        return ("class", kind.__module__, kind.__qualname__)
+    tree = _module_tree(kind.__module__)
+    for node in ast.walk(tree) if tree else ():
+        if isinstance(node, ast.ClassDef) and node.name == kind.__name__:
+            return ("class", _canonical(node))
+    return ("class", kind.__qualname__)
+
+
+def _describe_function(function: types.FunctionType, seen: _Seen) -> Any:
+    if not seen.owns(function.__module__ or ""):
+        return ("function", function.__module__, function.__qualname__)
+    code = function.__code__
+    nodes = _nodes_of(function)
+    body: Any = tuple(_canonical(node) for node in nodes) or ("bytecode", code.co_code.hex(), _plain(code))
+    captured = tuple(_describe(_cell(cell), seen) for cell in function.__closure__ or ())
+    defaults = _describe((function.__defaults__, function.__kwdefaults__), seen)
+    reached = []
+    for name in sorted(_names(code)):
+        if name not in function.__globals__:
+            continue
+        value = function.__globals__[name]
+        if isinstance(value, types.ModuleType) and seen.owns(value.__name__):
+            inside = {n: getattr(value, n) for n in sorted(_names(code)) if hasattr(value, n)}
+            reached.append((name, _describe(inside, seen)))
+        else:
+            reached.append((name, _describe(value, seen)))
+    return ("function", body, captured, defaults, tuple(reached))
+
+
+def _cell(cell: types.CellType) -> Any:
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return None  # still empty: a function that refers to itself
+
+
+def _names(code: types.CodeType) -> set[str]:
+    """Global and attribute names used by the code and by what is nested in it."""
+    names = set(code.co_names)
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            names |= _names(constant)
+    return names
+
+
+def _plain(code: types.CodeType) -> tuple[Any, ...]:
+    return tuple(_plain(c) if isinstance(c, types.CodeType) else repr(c) for c in code.co_consts)
+
+
+@functools.lru_cache(maxsize=256)
+def _module_tree(module: str) -> ast.Module | None:
+    try:
+        return ast.parse(inspect.getsource(sys.modules[module]))
+    except (OSError, TypeError, KeyError, SyntaxError):
+        return None  # no source: defined in a session or a frozen application
+
+
+def _nodes_of(function: types.FunctionType) -> list[ast.AST]:
+    """The definitions that start on the function's first line; several lambdas there count together."""
+    tree = _module_tree(function.__module__)
+    if tree is None:
+        return []
+    line, name = function.__code__.co_firstlineno, function.__code__.co_name
+    found: list[ast.AST] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Lambda) and name == "<lambda>" and node.lineno == line:
+            found.append(node)
+        elif isinstance(node, ast.FunctionDef) and node.name == name:
+            first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+            if first == line:
+                found.append(node)
+    return found
+
+
+SKIPPED_FIELDS = {"type_comment", "type_params", "kind", "ctx", "returns", "annotation"}
+
+
+def _canonical(node: Any) -> Any:
+    """The tree without positions, docstrings and annotations; the same on every version of Python."""
+    if isinstance(node, list):
+        return tuple(_canonical(item) for item in node)
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    if isinstance(node, ast.AnnAssign) and node.value is not None:
+        return ("Assign", _canonical(node.target), _canonical(node.value))
+    parts: list[Any] = [type(node).__name__]
+    for name, value in ast.iter_fields(node):
+        if name in SKIPPED_FIELDS or value is None or value == []:
+            continue
+        if name == "body" and isinstance(value, list) and _is_docstring(value[0]):
+            value = value[1:]
+        parts.append((name, _canonical(value)))
+    return tuple(parts)
+
+
+def _is_docstring(statement: ast.AST) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )

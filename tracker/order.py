@@ -1,0 +1,60 @@
+"""Scalars read off a ladder of error against run time: order, time at equal error, error at equal time.
+
+All logarithmic: between two neighbouring points of a ladder error and time are taken as powers of the step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from statistics import median
+
+FEWEST_POINTS = 3
+
+
+def observed_order(time_steps: Sequence[float], errors: Sequence[float]) -> float | None:
+    """Median slope of log error against log time step over all pairs; None below three usable points.
+
+    One point spoiled by rounding or by a lucky zero crossing does not move it (Theil and Sen's estimate).
+    """
+    points = [
+        (math.log(h), math.log(abs(e)))
+        for h, e in zip(time_steps, errors, strict=True)
+        if h > 0.0 and math.isfinite(e) and e != 0.0
+    ]
+    if len(points) < FEWEST_POINTS:
+        return None
+    slopes = [(y2 - y1) / (x2 - x1) for (x1, y1), (x2, y2) in combinations(points, 2) if x1 != x2]
+    return median(slopes) if slopes else None
+
+
+def in_range(time_step: float, order_range: tuple[float, float] | None) -> bool:
+    """Whether a time step lies in the asymptotic range, its ends included up to rounding."""
+    if order_range is None:
+        return True
+    low, high = sorted(order_range)
+    return low * (1.0 - 1e-9) <= time_step <= high * (1.0 + 1e-9)
+
+
+def time_at_error(seconds: Sequence[float], errors: Sequence[float], target: float) -> float:
+    """Seconds the ladder needs for |error| <= target; infinity if no point reaches it."""
+    return _cheapest(seconds, [abs(error) for error in errors], target)
+
+
+def error_in_time(seconds: Sequence[float], errors: Sequence[float], target: float) -> float:
+    """Smallest |error| the ladder gives within `target` seconds; infinity if every point takes longer."""
+    return _cheapest([abs(error) for error in errors], seconds, target)
+
+
+def _cheapest(cost: Sequence[float], quality: Sequence[float], target: float) -> float:
+    """Least cost at which quality falls to the target, between neighbours by powers."""
+    points = [
+        (c, q) for c, q in zip(cost, quality, strict=True) if math.isfinite(c) and math.isfinite(q) and c >= 0
+    ]
+    found = [c for c, q in points if q <= target]
+    for (c1, q1), (c2, q2) in pairwise(points):
+        if (q1 - target) * (q2 - target) < 0.0 and min(c1, c2, q1, q2, target) > 0.0:
+            share = math.log(target / q1) / math.log(q2 / q1)
+            found.append(c1 * (c2 / c1) ** share)
+    return min(found, default=math.inf)
