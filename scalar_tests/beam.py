@@ -84,7 +84,9 @@ def scene(
     return Scene(bodies=(*boxes, *piles), constraints=tuple(locks), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def heights(simulate: Simulate, count: int, time_step: float, method: Method = PLAIN, **options: object) -> np.ndarray:
+def heights(
+    simulate: Simulate, count: int, time_step: float, method: Method = PLAIN, **options: object
+) -> np.ndarray:
     """Height deviation [m] of each box: the one of largest magnitude over the last WINDOW of STEPS steps."""
     first = STEPS - WINDOW + 1
     built = scene(count, time_step=time_step, **options)  # type: ignore[arg-type]
@@ -97,7 +99,9 @@ def heights(simulate: Simulate, count: int, time_step: float, method: Method = P
     return np.where(np.abs(highest) > np.abs(lowest), highest, lowest)
 
 
-def deviation(simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, **options: object) -> float:
+def deviation(
+    simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, **options: object
+) -> float:
     """Deepest height deviation over the beam's length [%], signed: negative hangs."""
     each = heights(simulate, count, time_step, **options)
     return 100.0 * float(each[np.argmax(np.abs(each))]) / (count * SIZE[0])

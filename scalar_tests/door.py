@@ -28,7 +28,9 @@ def hinge_points(count: int) -> np.ndarray:
     return np.column_stack([np.full(count, -0.5 * SIZE[0]), np.zeros(count), heights])
 
 
-def scene(count: int = 2, mass: float = MASS, damping: float = PRINTED_DAMPING, compliance: float = COMPLIANCE) -> Scene:
+def scene(
+    count: int = 2, mass: float = MASS, damping: float = PRINTED_DAMPING, compliance: float = COMPLIANCE
+) -> Scene:
     """The door at rest, hung on `count` hinges with vertical axes."""
     door = RigidBody(name="door", mass=mass, shape=Box(SIZE), position=(0.0, 0.0, 0.0))
     hinges = tuple(
@@ -45,7 +47,9 @@ def scene(count: int = 2, mass: float = MASS, damping: float = PRINTED_DAMPING, 
     return Scene(bodies=(door,), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY))
 
 
-def forces(simulate: Simulate, steps: int, count: int = 2, time_step: float = TIME_STEP, **options: float) -> np.ndarray:
+def forces(
+    simulate: Simulate, steps: int, count: int = 2, time_step: float = TIME_STEP, **options: float
+) -> np.ndarray:
     """(steps, count, 6) force [N] and torque [N m] of each hinge on the door, for steps 1 … steps."""
     observe = {
         f"hinge {i + 1}": Trace(quantity=ConstraintForce(f"hinge {i + 1}"), first=1) for i in range(count)
@@ -60,7 +64,9 @@ def least_norm_forces(count: int, mass: float = MASS) -> np.ndarray:
     for point in hinge_points(count):
         push = np.eye(3)
         turn = np.cross(np.broadcast_to(point, (3, 3)), push).T  # torque about the centre of each unit force
-        columns.append(np.block([[push, np.zeros((3, 2))], [turn, np.eye(3)[:, :2]]]))  # axis free: no torque z
+        columns.append(
+            np.block([[push, np.zeros((3, 2))], [turn, np.eye(3)[:, :2]]])
+        )  # axis free: no torque z
     balance = np.hstack(columns)  # (6, 5 count)
     weight = np.array([0.0, 0.0, mass * GRAVITY, 0.0, 0.0, 0.0])
     rows = (np.linalg.pinv(balance, rcond=1e-12) @ weight).reshape(count, 5)

@@ -27,7 +27,9 @@ def _draw(simulate: Simulate) -> Drawing:
         )
         for mass in MASSES
     ]
-    curves.append(Curve(name="min(tan θ, µ)", x=SLOPES, y=tuple(min(s, FRICTION) for s in SLOPES), style="reference"))
+    curves.append(
+        Curve(name="min(tan θ, µ)", x=SLOPES, y=tuple(min(s, FRICTION) for s in SLOPES), style="reference")
+    )
     return Drawing(
         curves=tuple(curves),
         x_label="tan θ",
@@ -73,6 +75,8 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(0.3), time_step=TIME_STEP),
     figures=(
-        Figure(name="force-ratio-against-slope", title="Force ratio against slope", draw=_draw, thesis="Fig 3.17"),
+        Figure(
+            name="force-ratio-against-slope", title="Force ratio against slope", draw=_draw, thesis="Fig 3.17"
+        ),
     ),
 )

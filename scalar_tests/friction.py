@@ -58,7 +58,7 @@ def _measure_anisotropy(method: Method) -> object:
 
 def _draw_polar(slope: float) -> object:
     def draw(simulate: Simulate) -> Drawing:
-        angles = tuple(math.degrees(alpha) for alpha in DIRECTIONS) + (360.0,)
+        angles = (*tuple(math.degrees(alpha) for alpha in DIRECTIONS), 360.0)
         curves = []
         for name, method in MODELS.items():
             values = ratios(simulate, slope, method)

@@ -72,7 +72,9 @@ def force_direction_error(result: Result, direction: float) -> float:
     return math.degrees(abs(math.remainder(angle, 2.0 * math.pi)))
 
 
-def slips(simulate: Simulate, slope: float, friction: float, seconds: float = 4.0, method: Method = CONE) -> bool:
+def slips(
+    simulate: Simulate, slope: float, friction: float, seconds: float = 4.0, method: Method = CONE
+) -> bool:
     """Whether the box exceeds SLIP_SPEED within `seconds` of standing on the slope."""
     steps = round(seconds / TIME_STEP)
     velocity = slide(simulate, slope, steps=steps, friction=friction, method=method)["velocity"]

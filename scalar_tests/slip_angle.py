@@ -26,7 +26,10 @@ def _draw_angle(simulate: Simulate) -> Drawing:
         curves=(
             Curve(name="simulation", x=COEFFICIENTS, y=found, style="points"),
             Curve(
-                name="θ = atan µ", x=COEFFICIENTS, y=tuple(math.atan(mu) for mu in COEFFICIENTS), style="reference"
+                name="θ = atan µ",
+                x=COEFFICIENTS,
+                y=tuple(math.atan(mu) for mu in COEFFICIENTS),
+                style="reference",
             ),
         ),
         x_label="friction coefficient µ",
