@@ -42,7 +42,7 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     moving_forces_ = !scene.fields.empty() || !springs_.empty();
     v_.resize(x_.size());
     kick_ = steady_kick_;
-    trial_.resize(x_.size());
+    before_.resize(x_.size());
     seen_v_.resize(x_.size());
     link_.resize(row_.size());
     seen_lambda_.resize(row_.size());
@@ -111,6 +111,7 @@ void ParticleSystem::reset(StageClock* clock) {
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
     if (scene_.method.half_step_velocities) half_kick_back();
+    before_ = v_;
     save();
 }
 
@@ -165,7 +166,6 @@ void ParticleSystem::velocity_stage() {
     }
     if (solver_ != ParticleSolver::none) {
         assemble_rows();
-        if (scene_.method.corrections > 0) bend_rows_back();
         mark<Timed>(Stage::assemble_rows);
         if (solver_ == ParticleSolver::iterative) {
             solve_iterative();
@@ -284,11 +284,11 @@ void ParticleSystem::solve_path() noexcept {
 
 /// Projected Gauss–Seidel on the Schur form, warm started with the last step's impulses.
 void ParticleSystem::solve_iterative() noexcept {
-    std::fill(trial_.begin(), trial_.end(), Vec3{});  // M⁻¹ Gᵀ λ
+    std::fill(before_.begin(), before_.end(), Vec3{});  // M⁻¹ Gᵀ λ
     for (std::size_t k = 0; k < row_.size(); ++k) {
         const Vec3 impulse = link_[k].lambda * link_[k].u;
-        trial_[row_[k].a] -= w_[row_[k].a] * impulse;
-        trial_[row_[k].b] += w_[row_[k].b] * impulse;
+        before_[row_[k].a] -= w_[row_[k].a] * impulse;
+        before_[row_[k].b] += w_[row_[k].b] * impulse;
     }
     for (int sweep = 0; sweep < scene_.method.iterations; ++sweep) {
         double worst = 0.0;
@@ -296,56 +296,45 @@ void ParticleSystem::solve_iterative() noexcept {
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
-            const double residual = link.rhs - dot(link.u, trial_[row.b] - trial_[row.a]) - row.softness * link.lambda;
+            const double residual = link.rhs - dot(link.u, before_[row.b] - before_[row.a]) - row.softness * link.lambda;
             worst = std::max(worst, std::fabs(residual));
             const double change = residual / row.diagonal;
             link.lambda += change;
-            trial_[row.a] -= (w_[row.a] * change) * link.u;
-            trial_[row.b] += (w_[row.b] * change) * link.u;
+            before_[row.a] -= (w_[row.a] * change) * link.u;
+            before_[row.b] += (w_[row.b] * change) * link.u;
         }
         residual_ = worst;
         if (worst <= scene_.method.residual_tolerance) break;
     }
 }
 
-namespace {
-
-/// |d + s| − |d| − u·s without cancellation: (s² − (u·s)²) / (|d + s| + |d| + u·s), never negative.
-double curvature(Vec3 u, double length, Vec3 s) noexcept {
-    const double along = dot(u, s), across = std::max(0.0, dot(s, s) - along * along), moved = length + along;
-    return across == 0.0 ? 0.0 : across / (std::sqrt(moved * moved + across) + moved);
-}
-
-}  // namespace
-
-/// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊]. c₋, from where the row
-/// came, is known before the first solve; c₊ is where that solve, then the corrected one, would take it. Each is
-/// capped at a fraction of the rest length.
-void ParticleSystem::bend_rows_back() noexcept {
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        Link& link = link_[k];
-        const double cap = scene_.method.correction_cap * row.rest;
-        const double back = std::min(cap, curvature(link.u, link.length, -h_ * (v_[row.b] - v_[row.a])));
-        link.rhs -= row.violation_gain * 0.25 * back;
-        first_rhs_[k] = link.rhs;
-    }
-}
-
+/// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊], c₋ from where the
+/// row came, c₊ from where the uncorrected step would take it, both without cancellation:
+/// |d + s| − |d| − u·s = (s² − (u·s)²) / (|d + s| + |d| + u·s). Each c is capped at a fraction of the length.
 void ParticleSystem::correct_curvature() {
+    const auto curvature = [](const Link& link, Vec3 s) {
+        const double along = dot(link.u, s), across = std::max(0.0, dot(s, s) - along * along);
+        const double moved = link.length + along;
+        const double length = std::sqrt(moved * moved + across);
+        return across == 0.0 ? 0.0 : across / (length + moved);
+    };
+    for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
     for (int round = 0; round < scene_.method.corrections; ++round) {
-        for (std::size_t node = 0; node < v_.size(); ++node) trial_[node] = v_[node] + kick_[node];
+        before_ = v_;
+        for (std::size_t node = 0; node < v_.size(); ++node) before_[node] += kick_[node];
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Vec3 impulse = link_[k].lambda * link_[k].u;
-            trial_[row_[k].a] -= w_[row_[k].a] * impulse;
-            trial_[row_[k].b] += w_[row_[k].b] * impulse;
+            before_[row_[k].a] -= w_[row_[k].a] * impulse;
+            before_[row_[k].b] += w_[row_[k].b] * impulse;
         }
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
             const double cap = scene_.method.correction_cap * row.rest;
-            const double ahead = std::min(cap, curvature(link.u, link.length, h_ * (trial_[row.b] - trial_[row.a])));
-            link.rhs = first_rhs_[k] - row.violation_gain * (0.25 + row.relaxation) * ahead;
+            const double back = std::min(cap, curvature(link, -h_ * (v_[row.b] - v_[row.a])));
+            const double ahead = std::min(cap, curvature(link, h_ * (before_[row.b] - before_[row.a])));
+            link.rhs = first_rhs_[k] -
+                       (4.0 / h_) * row.upsilon * (0.25 * (ahead + back) + row.relaxation * ahead);
         }
         if (solver_ == ParticleSolver::iterative) solve_iterative();
         else back_substitute();
@@ -361,8 +350,7 @@ void ParticleSystem::apply_impulses() noexcept {
     }
 }
 
-/// v −= (h/2) a with the constrained acceleration. The row's right side gets −(2/h) c₋, c₋ the curvature on the
-/// way back; with v constant that is −h Ġ v, found first, and with curved constraints it is iterated.
+/// v −= (h/2) a with the constrained acceleration: the row's right side gets −h Ġ v = −h v_across²/|d|.
 void ParticleSystem::half_kick_back() {
     kick_ = steady_kick_;
     if (!scene_.fields.empty()) apply_central_gravity();
@@ -370,26 +358,22 @@ void ParticleSystem::half_kick_back() {
     const std::vector<Vec3> start = v_;
     if (solver_ != ParticleSolver::none) {
         assemble_rows();
-        if (solver_ != ParticleSolver::iterative) factor();
-        for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
-        for (int round = 0; round <= 3 * scene_.method.corrections; ++round) {
-            for (std::size_t k = 0; k < row_.size(); ++k) {
-                const Row& row = row_[k];
-                const double back =
-                    curvature(link_[k].u, link_[k].length, -h_ * (v_[row.b] - v_[row.a]));
-                link_[k].rhs = first_rhs_[k] - (2.0 / h_) * back;
-            }
-            if (solver_ == ParticleSolver::iterative) solve_iterative();
-            else back_substitute();
-            v_ = start;
-            apply_impulses();
-            for (std::size_t node = 0; node < v_.size(); ++node)
-                v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
+        for (std::size_t k = 0; k < row_.size(); ++k) {
+            const Vec3 s = v_[row_[k].b] - v_[row_[k].a];
+            const double along = dot(link_[k].u, s);
+            link_[k].rhs -= h_ * (dot(s, s) - along * along) / link_[k].length;
         }
-    } else {
-        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] -= 0.5 * kick_[node];
+        if (solver_ == ParticleSolver::iterative) solve_iterative();
+        else {
+            factor();
+            back_substitute();
+        }
+        apply_impulses();
     }
+    for (std::size_t node = 0; node < v_.size(); ++node)
+        v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
     for (Link& link : link_) link.lambda = 0.0;
+    std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     sweeps_ = 0;
 }
 

@@ -86,7 +86,6 @@ private:
     void factor_path() noexcept;
     void solve_path() noexcept;
     void solve_iterative() noexcept;
-    void bend_rows_back() noexcept;
     void correct_curvature();
     void apply_impulses() noexcept;
 
@@ -98,7 +97,7 @@ private:
     std::int64_t block_ = 1024;
 
     // nodes
-    std::vector<Vec3> x_, v_, kick_, steady_kick_, seen_v_, trial_;
+    std::vector<Vec3> x_, v_, kick_, steady_kick_, seen_v_, before_;
     std::vector<double> w_;  // inverse mass, 1/kg
     std::vector<int> node_of_body_, body_of_node_;
     // rows, in path order if they form paths
@@ -112,8 +111,8 @@ private:
     std::int64_t sweeps_ = 0;
 
     struct Snapshot {
-        std::vector<Vec3> x, v;
-        std::vector<double> lambda;
+        std::vector<Vec3> x, v, before;
+        std::vector<double> lambda, seen_lambda;
         bool velocity_ready = false;
         std::int64_t sweeps = 0;
         double residual = 0.0;
