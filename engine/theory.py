@@ -125,4 +125,4 @@ def kepler_radius(angle: float, eccentricity: float) -> float:
 
 def kepler_period(mean_motion: float, eccentricity: float) -> float:
     """Period [s] of an orbit of parameter 1 with strength k² [1/s²]: (2 π/k) (1 − xi²)^(−3/2)."""
-    return 2.0 * math.pi / mean_motion * (1.0 - eccentricity**2) ** -1.5
+    return 2.0 * math.pi / mean_motion / math.sqrt(1.0 - eccentricity**2) ** 3
