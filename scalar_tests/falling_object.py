@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.bodies import Particle
-from engine.method import PLAIN, Method
-from engine.observe import Final, Observable, Position, Trace, Velocity
-from engine.result import Result
-from engine.scene import Scene
+from engine import (
+    PLAIN,
+    Final,
+    Method,
+    Particle,
+    Position,
+    Result,
+    Scene,
+    Trace,
+    Velocity,
+)
+from engine.observe import Observable
 from scalar_tests.case import (
     Configuration,
     Drawing,
@@ -66,7 +73,7 @@ def half_step_errors(simulate: Simulate) -> dict[str, float]:
 
 def position_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Depth minus ½ g t² at 20 s [m]."""
-    return fall(simulate, time_step, method)[0] - fallen(DURATION)
+    return fall(simulate, time_step, method)[0] - float(fallen(DURATION))
 
 
 def run(simulate: Simulate, time_step: float, method: Method) -> Result:
