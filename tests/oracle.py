@@ -92,16 +92,13 @@ class Oracle:
         return out
 
     def acceleration(self) -> Array:
-        """Constrained acceleration (n, 3): M a − Gᵀ µ = f and d²g/dt² = 0."""
+        """Acceleration (n, 3) of a start from rest: M a − Gᵀ µ = f and G a + Sig µ = 0, softness included."""
+        if np.any(self.v) or np.any(np.abs(self.violation(self.x)) > 1e-15):
+            raise ValueError("the oracle's half-step start is for scenes at rest with closed rows")
         g, f = self.jacobian(self.x), self.external(self.x, self.v)
-        bend = np.zeros(len(self.ends))
-        for row, (first, second) in enumerate(self.ends):
-            apart = self.place(second, self.x) - self.place(first, self.x)
-            speed = self.place(second, self.x + self.v) - self.place(first, self.x + self.v) - apart
-            r = float(np.linalg.norm(apart))
-            bend[row] = (speed @ speed - (speed @ apart / r) ** 2) / r
-        schur = (g / self.m) @ g.T
-        mu = np.linalg.solve(schur, -bend - g @ (f / self.m)) if len(self.ends) else np.zeros(0)
+        softness = 4.0 * self.eps / (self.h * (self.h + 4.0 * self.tau))
+        schur = (g / self.m) @ g.T + np.diag(softness)
+        mu = np.linalg.solve(schur, -g @ (f / self.m)) if len(self.ends) else np.zeros(0)
         return ((f + g.T @ mu) / self.m).reshape(-1, 3)
 
     def velocity_after(self) -> tuple[Array, Array]:
@@ -118,14 +115,15 @@ class Oracle:
         matrix[n:, n:] = np.diag(4.0 * self.eps * ups / h**2)
         top = self.m * v + h * self.external(x, self.v)
         bottom = -(4.0 / h) * ups * g + ups * (jac @ v)
-        solved = np.linalg.solve(matrix, np.concatenate([top, bottom]))
-        for _ in range(self.method.corrections if k else 0):
-            cap = self.method.correction_cap * self.length
-            ahead = solved[:n].reshape(-1, 3)
+        corrections = self.method.corrections if k else 0
+        cap = self.method.correction_cap * self.length
+        if corrections:  # the curvature of g on the way here is known before the first solve
             behind = self.violation(x - h * self.v) - g + h * (jac @ v)
-            before = self.violation(x + h * ahead) - g - h * (jac @ solved[:n])
-            minus, plus = np.clip(behind, -cap, cap), np.clip(before, -cap, cap)
-            curved = bottom - (4.0 / h) * ups * ((plus + minus) / 4.0 + theta * plus)
+            bottom = bottom - (4.0 / h) * ups * np.minimum(behind, cap) / 4.0
+        solved = np.linalg.solve(matrix, np.concatenate([top, bottom]))
+        for _ in range(corrections):
+            ahead = self.violation(x + h * solved[:n].reshape(-1, 3)) - g - h * (jac @ solved[:n])
+            curved = bottom - (4.0 / h) * ups * (0.25 + theta) * np.minimum(ahead, cap)
             solved = np.linalg.solve(matrix, np.concatenate([top, curved]))
         return solved[:n].reshape(-1, 3), solved[n:]
 
@@ -140,7 +138,9 @@ class Oracle:
         """Position, velocity read at the sample's time, and row forces, for samples 0 … steps."""
         for sample in range(steps + 1):
             shown = self.v
-            if self.method.half_step_velocities:
+            if self.method.half_step_velocities and sample == 0:
+                shown = np.array([body.velocity for body in self.scene.bodies])
+            elif self.method.half_step_velocities:
                 shown = 0.5 * (self.v + self.velocity_after()[0])
             yield self.x.copy(), shown.copy(), self.force.copy()
             if sample < steps:
