@@ -41,6 +41,7 @@ class Result:
     state_hash: str
     stages: tuple[str, ...]
     stage_seconds: Mapping[str, float] = field(default_factory=dict)
+    residual: float = 0.0  # largest row residual [m/s] the iterative solver stopped at in the last step
 
     def __getitem__(self, name: str) -> Any:
         if self.status != "completed":

@@ -1,0 +1,27 @@
+"""The native module. Kept by hand; tests/test_engine_stub.py holds it to the compiled module."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+def build_facts() -> dict[str, str]: ...
+
+class ParticleProgram:
+    def __init__(
+        self,
+        bodies: npt.NDArray[np.float64],
+        row_ends: npt.NDArray[np.int64],
+        rows: npt.NDArray[np.float64],
+        spring_ends: npt.NDArray[np.int64],
+        springs: npt.NDArray[np.float64],
+        fields: npt.NDArray[np.float64],
+        gravity: tuple[float, float, float],
+        method: dict[str, Any],
+        quantities: Sequence[tuple[str, int, tuple[float, float, float]]],
+        observations: Sequence[tuple[int, str, int, int, bool, int]],
+    ) -> None: ...
+    def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
+    @property
+    def solver(self) -> str: ...

@@ -1,0 +1,54 @@
+"""Scene and time step → Program: check once, choose the pipeline, let it choose its stages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from engine.bodies import Particle
+from engine.errors import MethodError, SceneError
+from engine.method import PLAIN, Method
+from engine.observe import Observable
+from engine.particle_program import compile_particles
+from engine.program import Program, StageChoice
+from engine.rigid_program import compile_rigid
+from engine.scene import Scene
+
+NOTHING: Mapping[str, Observable] = MappingProxyType({})
+
+
+def compile(
+    scene: Scene,
+    *,
+    time_step: float,
+    method: Method = PLAIN,
+    observe: Mapping[str, Observable] = NOTHING,
+) -> Program:
+    """Compile a scene for a time step [s]: only the stages it needs, nothing else in the loop.
+
+    Raises MethodError for a time step that is not positive and finite, an option that makes no sense for the
+    scene or an observable of something unknown.
+    """
+    if not isinstance(scene, Scene):
+        raise SceneError(f"compile needs a Scene, not {scene!r}")
+    if not isinstance(method, Method):
+        raise MethodError(f"method must be a Method, not {method!r}")
+    if isinstance(time_step, bool) or not isinstance(time_step, int | float):
+        raise MethodError(f"time_step must be a number of seconds, not {time_step!r}")
+    if not (math.isfinite(time_step) and time_step > 0.0):
+        raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
+    if all(isinstance(body, Particle) for body in scene.bodies):
+        return compile_particles(scene, float(time_step), method, observe)
+    return compile_rigid(scene, float(time_step), method, observe)
+
+
+def explain(
+    scene: Scene,
+    *,
+    time_step: float,
+    method: Method = PLAIN,
+    observe: Mapping[str, Observable] = NOTHING,
+) -> tuple[StageChoice, ...]:
+    """Every stage of the step, kept or left out for this scene, with the reason; nothing is run."""
+    return compile(scene, time_step=time_step, method=method, observe=observe).explain()

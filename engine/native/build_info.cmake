@@ -1,0 +1,49 @@
+# Run at every build: writes build_facts.inc, and touches it only when something changed.
+# Without git (a source archive) the facts stay empty: unknown is said, never guessed.
+function(ask variable)
+  execute_process(COMMAND ${GIT} -C ${SOURCE} ${ARGN} OUTPUT_VARIABLE answer RESULT_VARIABLE failed
+                  OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  if(failed)
+    set(answer "")
+  endif()
+  string(REPLACE "\\" "\\\\" answer "${answer}")
+  string(REPLACE "\"" "\\\"" answer "${answer}")
+  set(${variable} "${answer}" PARENT_SCOPE)
+endfunction()
+
+set(inside "")
+if(GIT)
+  # The archive may lie inside somebody else's repository: the answer counts only if this file is tracked.
+  ask(inside ls-files --error-unmatch CMakeLists.txt)
+endif()
+foreach(fact hash time parents describe shallow changes)
+  set(${fact} "")
+endforeach()
+set(dirty "")
+if(inside)
+  ask(hash rev-parse HEAD)
+  ask(time show -s --format=%cI HEAD)
+  ask(parents show -s --format=%P HEAD)
+  ask(describe describe --tags --long --match "[0-9]*" --match "v[0-9]*")
+  ask(shallow rev-parse --is-shallow-repository)
+  execute_process(COMMAND ${GIT} -C ${SOURCE} status --porcelain --untracked-files=no OUTPUT_VARIABLE changes
+                  RESULT_VARIABLE failed ERROR_QUIET)
+  if(NOT failed)
+    set(dirty "false")
+    if(changes)
+      set(dirty "true")
+    endif()
+  endif()
+endif()
+string(REPLACE "\"" "\\\"" FLAGS "${FLAGS}")
+file(WRITE ${OUTPUT}.new "#define SPOOK_GIT_HASH \"${hash}\"
+#define SPOOK_DIRTY \"${dirty}\"
+#define SPOOK_COMMIT_TIME \"${time}\"
+#define SPOOK_PARENTS \"${parents}\"
+#define SPOOK_DESCRIBE \"${describe}\"
+#define SPOOK_SHALLOW \"${shallow}\"
+#define SPOOK_COMPILER \"${COMPILER}\"
+#define SPOOK_FLAGS \"${FLAGS}\"
+#define SPOOK_VERSION \"${VERSION}\"
+")
+execute_process(COMMAND ${CMAKE_COMMAND} -E copy_if_different ${OUTPUT}.new ${OUTPUT})

@@ -1,0 +1,494 @@
+#include "particle_system.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "path_order.hpp"
+
+namespace spook {
+
+ParticleSystem::ParticleSystem(const ParticleScene& scene)
+    : scene_(scene), h_(scene.method.time_step / scene.method.substeps) {
+    const std::vector<Path> paths = find_paths(scene);
+    if (!scene.rows.empty()) {
+        solver_ = paths.empty() || scene.method.force_block ? ParticleSolver::block : ParticleSolver::path;
+        if (scene.method.iterative) solver_ = ParticleSolver::iterative;
+    }
+    node_of_body_.assign(scene.bodies.size(), -1);
+    slot_of_row_.assign(scene.rows.size(), 0);
+    if (solver_ == ParticleSolver::path) lay_out_paths(paths);
+    else lay_out_plain();
+    for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
+        if (node_of_body_[body] >= 0) continue;
+        node_of_body_[body] = static_cast<int>(x_.size());
+        anchor(scene.bodies[body].position);
+    }
+    for (const SpringForce& spring : scene.springs) {
+        int node[2];
+        for (int side = 0; side < 2; ++side) {
+            const End& end = spring.ends[side];
+            node[side] = end.body >= 0 ? node_of_body_[end.body] : anchor(end.point);
+        }
+        springs_.push_back({node[0], node[1], spring});
+    }
+    body_of_node_.assign(x_.size(), -1);
+    for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
+        const int node = node_of_body_[body];
+        body_of_node_[node] = static_cast<int>(body);
+        w_[node] = 1.0 / scene.bodies[body].mass;
+        steady_kick_[node] = h_ * (scene.gravity + w_[node] * scene.bodies[body].load);
+    }
+    for (Row& row : row_) row.diagonal = w_[row.a] + w_[row.b] + row.softness;
+    moving_forces_ = !scene.fields.empty() || !springs_.empty();
+    v_.resize(x_.size());
+    kick_ = steady_kick_;
+    before_.resize(x_.size());
+    seen_v_.resize(x_.size());
+    link_.resize(row_.size());
+    seen_lambda_.resize(row_.size());
+    scratch_.resize(row_.size());
+    solution_.resize(row_.size());
+    first_rhs_.resize(row_.size());
+    if (solver_ == ParticleSolver::block) dense_.resize(static_cast<int>(row_.size()));
+    block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps), 1, 4096);
+}
+
+int ParticleSystem::anchor(Vec3 point) {
+    x_.push_back(point);
+    w_.push_back(0.0);
+    steady_kick_.push_back({});
+    return static_cast<int>(x_.size()) - 1;
+}
+
+void ParticleSystem::lay_out_paths(const std::vector<Path>& paths) {
+    for (const Path& path : paths) {
+        path_first_.push_back(static_cast<int>(row_.size()));
+        for (int node : path.nodes) {
+            const int end = -1 - node;
+            if (node >= 0) node_of_body_[node] = anchor(scene_.bodies[node].position);
+            else anchor(scene_.rows[end / 2].ends[end % 2].point);
+        }
+        const int first = static_cast<int>(x_.size() - path.nodes.size());
+        for (std::size_t k = 0; k < path.rows.size(); ++k) {
+            const DistanceRow& row = scene_.rows[path.rows[k]];
+            const Regularisation r = regularise(row.compliance, row.damping, h_);
+            slot_of_row_[path.rows[k]] = static_cast<int>(row_.size());
+            const int a = first + static_cast<int>(k);
+            row_.push_back({a, a + 1, row.rest_length, 0.0, r.violation_gain, r.velocity_gain, r.upsilon,
+                            r.relaxation, r.softness});
+        }
+    }
+    path_first_.push_back(static_cast<int>(row_.size()));
+}
+
+void ParticleSystem::lay_out_plain() {
+    for (std::size_t body = 0; body < scene_.bodies.size(); ++body)
+        node_of_body_[body] = anchor(scene_.bodies[body].position);
+    for (std::size_t k = 0; k < scene_.rows.size(); ++k) {
+        const DistanceRow& row = scene_.rows[k];
+        const Regularisation r = regularise(row.compliance, row.damping, h_);
+        int node[2];
+        for (int side = 0; side < 2; ++side) {
+            const End& end = row.ends[side];
+            node[side] = end.body >= 0 ? node_of_body_[end.body] : anchor(end.point);
+        }
+        slot_of_row_[k] = static_cast<int>(k);
+        row_.push_back({node[0], node[1], row.rest_length, 0.0, r.violation_gain, r.velocity_gain, r.upsilon,
+                        r.relaxation, r.softness});
+    }
+}
+
+void ParticleSystem::reset(StageClock* clock) {
+    clock_ = clock;
+    velocity_ready_ = false;
+    sweeps_ = 0;
+    residual_ = 0.0;
+    for (int body = 0; body < bodies(); ++body) {
+        x_[node_of_body_[body]] = scene_.bodies[body].position;
+        v_[node_of_body_[body]] = scene_.bodies[body].velocity;
+    }
+    for (Link& link : link_) link = {};
+    std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
+    seen_v_ = v_;
+    if (scene_.method.half_step_velocities) half_kick_back();
+    before_ = v_;
+    save();
+}
+
+// --- the step -----------------------------------------------------------------------------------------
+
+void ParticleSystem::advance(std::int64_t steps) {
+    steps *= scene_.method.substeps;
+    if (clock_) advance_by<true>(steps);
+    else if (solver_ == ParticleSolver::none && !moving_forces_ && !scene_.method.half_step_velocities)
+        fly_freely(steps);
+    else advance_by<false>(steps);
+}
+
+template <bool Timed>
+void ParticleSystem::advance_by(std::int64_t steps) {
+    if constexpr (Timed) clock_->start();
+    for (; steps > 0; --steps) {
+        if (!velocity_ready_) velocity_stage<Timed>();
+        velocity_ready_ = false;
+        position_stage();
+        mark<Timed>(Stage::integrate_positions);
+    }
+}
+
+/// Constant acceleration and nothing else: the time loop innermost, state in registers.
+void ParticleSystem::fly_freely(std::int64_t steps) noexcept {
+    for (std::size_t node = 0; node < x_.size(); ++node) {
+        Vec3 x = x_[node], v = v_[node];
+        const Vec3 kick = steady_kick_[node];
+        for (std::int64_t step = 0; step < steps; ++step) {
+            v += kick;
+            x += h_ * v;
+        }
+        x_[node] = x;
+        v_[node] = v;
+    }
+}
+
+template <bool Timed>
+void ParticleSystem::velocity_stage() {
+    if (moving_forces_) {
+        kick_ = steady_kick_;
+        mark<Timed>(Stage::apply_gravity);
+        if (!scene_.fields.empty()) {
+            apply_central_gravity();
+            mark<Timed>(Stage::apply_central_gravity);
+        }
+        if (!springs_.empty()) {
+            apply_springs();
+            mark<Timed>(Stage::apply_springs);
+        }
+    }
+    if (solver_ != ParticleSolver::none) {
+        assemble_rows();
+        mark<Timed>(Stage::assemble_rows);
+        if (solver_ == ParticleSolver::iterative) {
+            solve_iterative();
+            mark<Timed>(Stage::solve_iterative);
+        } else {
+            factor();
+            back_substitute();
+            mark<Timed>(solver_ == ParticleSolver::path ? Stage::solve_path : Stage::solve_block);
+        }
+        if (scene_.method.corrections > 0) {
+            correct_curvature();
+            mark<Timed>(Stage::correct_curvature);
+        }
+        apply_impulses();
+    }
+    for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += kick_[node];
+    mark<Timed>(Stage::apply_gravity);
+}
+
+void ParticleSystem::position_stage() noexcept {
+    for (std::size_t node = 0; node < x_.size(); ++node) x_[node] += h_ * v_[node];
+}
+
+void ParticleSystem::apply_central_gravity() noexcept {
+    for (const CentralField& field : scene_.fields)
+        for (std::size_t node = 0; node < x_.size(); ++node) {
+            if (w_[node] == 0.0) continue;
+            const Vec3 d = x_[node] - field.centre;
+            const double r2 = dot(d, d), r = std::sqrt(r2);
+            kick_[node] -= (h_ * field.strength / (r2 * r)) * d;
+        }
+}
+
+void ParticleSystem::apply_springs() noexcept {
+    for (const SpringNodes& s : springs_) {
+        const Vec3 d = x_[s.b] - x_[s.a];
+        Vec3 pull = s.spring.stiffness * d;  // on a, towards b
+        if (s.spring.rest_length > 0.0 || s.spring.viscosity > 0.0) {
+            const double length = norm(d);
+            const Vec3 u = length > 0.0 ? (1.0 / length) * d : Vec3{};
+            const double rate = s.spring.viscosity * dot(u, v_[s.b] - v_[s.a]);
+            pull += (rate - s.spring.stiffness * s.spring.rest_length) * u;
+        }
+        kick_[s.a] += (h_ * w_[s.a]) * pull;
+        kick_[s.b] -= (h_ * w_[s.b]) * pull;
+    }
+}
+
+void ParticleSystem::assemble_rows() noexcept {
+    for (std::size_t k = 0; k < row_.size(); ++k) {
+        const Row& row = row_[k];
+        Link& link = link_[k];
+        const Vec3 d = x_[row.b] - x_[row.a];
+        const double length = norm(d);
+        const Vec3 u = (1.0 / length) * d;
+        link.u = u;
+        link.length = length;
+        link.g = length - row.rest;
+        link.rhs = -row.violation_gain * link.g - row.velocity_gain * dot(u, v_[row.b] - v_[row.a]) -
+                   dot(u, kick_[row.b] - kick_[row.a]);
+    }
+}
+
+void ParticleSystem::factor() {
+    if (solver_ == ParticleSolver::path) return factor_path();
+    dense_.clear();
+    const int n = static_cast<int>(row_.size());
+    for (int i = 0; i < n; ++i) {
+        dense_.at(i, i) = row_[i].diagonal;
+        for (int j = 0; j < i; ++j) {
+            double along = 0.0;
+            if (row_[i].a == row_[j].a) along += w_[row_[i].a];
+            if (row_[i].b == row_[j].b) along += w_[row_[i].b];
+            if (row_[i].a == row_[j].b) along -= w_[row_[i].a];
+            if (row_[i].b == row_[j].a) along -= w_[row_[i].b];
+            if (along != 0.0) dense_.at(i, j) = along * dot(link_[i].u, link_[j].u);
+        }
+    }
+    dense_.factor(scene_.method.floor);
+}
+
+void ParticleSystem::factor_path() noexcept {
+    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
+        const int first = path_first_[path], end = path_first_[path + 1];
+        double pivot_inverse = 1.0 / row_[first].diagonal;
+        link_[first].pivot_inverse = pivot_inverse;
+        link_[first].lower = 0.0;
+        for (int k = first + 1; k < end; ++k) {
+            const double off = -w_[row_[k].a] * dot(link_[k - 1].u, link_[k].u);
+            const double lower = off * pivot_inverse;
+            pivot_inverse = 1.0 / (row_[k].diagonal - lower * off);
+            link_[k].lower = lower;
+            link_[k].pivot_inverse = pivot_inverse;
+        }
+    }
+}
+
+void ParticleSystem::back_substitute() noexcept {
+    if (solver_ == ParticleSolver::path) return solve_path();
+    for (std::size_t k = 0; k < row_.size(); ++k) scratch_[k] = link_[k].rhs;
+    dense_.solve(scratch_.data(), solution_.data(), scene_.method.refinements);
+    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].lambda = solution_[k];
+}
+
+void ParticleSystem::solve_path() noexcept {
+    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
+        const int first = path_first_[path], end = path_first_[path + 1];
+        double y = link_[first].rhs;
+        link_[first].lambda = y;
+        for (int k = first + 1; k < end; ++k) link_[k].lambda = y = link_[k].rhs - link_[k].lower * y;
+        double lambda = link_[end - 1].lambda *= link_[end - 1].pivot_inverse;
+        for (int k = end - 2; k >= first; --k)
+            link_[k].lambda = lambda = link_[k].lambda * link_[k].pivot_inverse - link_[k + 1].lower * lambda;
+    }
+}
+
+/// Projected Gauss–Seidel on the Schur form, warm started with the last step's impulses.
+void ParticleSystem::solve_iterative() noexcept {
+    std::fill(before_.begin(), before_.end(), Vec3{});  // M⁻¹ Gᵀ λ
+    for (std::size_t k = 0; k < row_.size(); ++k) {
+        const Vec3 impulse = link_[k].lambda * link_[k].u;
+        before_[row_[k].a] -= w_[row_[k].a] * impulse;
+        before_[row_[k].b] += w_[row_[k].b] * impulse;
+    }
+    for (int sweep = 0; sweep < scene_.method.iterations; ++sweep) {
+        double worst = 0.0;
+        ++sweeps_;
+        for (std::size_t k = 0; k < row_.size(); ++k) {
+            const Row& row = row_[k];
+            Link& link = link_[k];
+            const double residual = link.rhs - dot(link.u, before_[row.b] - before_[row.a]) - row.softness * link.lambda;
+            worst = std::max(worst, std::fabs(residual));
+            const double change = residual / row.diagonal;
+            link.lambda += change;
+            before_[row.a] -= (w_[row.a] * change) * link.u;
+            before_[row.b] += (w_[row.b] * change) * link.u;
+        }
+        residual_ = worst;
+        if (worst <= scene_.method.residual_tolerance) break;
+    }
+}
+
+/// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊], c₋ from where the
+/// row came, c₊ from where the uncorrected step would take it, both without cancellation:
+/// |d + s| − |d| − u·s = (s² − (u·s)²) / (|d + s| + |d| + u·s). Each c is capped at a fraction of the length.
+void ParticleSystem::correct_curvature() {
+    const auto curvature = [](const Link& link, Vec3 s) {
+        const double along = dot(link.u, s), across = std::max(0.0, dot(s, s) - along * along);
+        const double moved = link.length + along;
+        const double length = std::sqrt(moved * moved + across);
+        return across == 0.0 ? 0.0 : across / (length + moved);
+    };
+    for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
+    for (int round = 0; round < scene_.method.corrections; ++round) {
+        before_ = v_;
+        for (std::size_t node = 0; node < v_.size(); ++node) before_[node] += kick_[node];
+        for (std::size_t k = 0; k < row_.size(); ++k) {
+            const Vec3 impulse = link_[k].lambda * link_[k].u;
+            before_[row_[k].a] -= w_[row_[k].a] * impulse;
+            before_[row_[k].b] += w_[row_[k].b] * impulse;
+        }
+        for (std::size_t k = 0; k < row_.size(); ++k) {
+            const Row& row = row_[k];
+            Link& link = link_[k];
+            const double cap = scene_.method.correction_cap * row.rest;
+            const double back = std::min(cap, curvature(link, -h_ * (v_[row.b] - v_[row.a])));
+            const double ahead = std::min(cap, curvature(link, h_ * (before_[row.b] - before_[row.a])));
+            link.rhs = first_rhs_[k] -
+                       (4.0 / h_) * row.upsilon * (0.25 * (ahead + back) + row.relaxation * ahead);
+        }
+        if (solver_ == ParticleSolver::iterative) solve_iterative();
+        else back_substitute();
+    }
+}
+
+void ParticleSystem::apply_impulses() noexcept {
+    for (std::size_t k = 0; k < row_.size(); ++k) {
+        const Row& row = row_[k];
+        const Vec3 impulse = link_[k].lambda * link_[k].u;
+        v_[row.a] -= w_[row.a] * impulse;
+        v_[row.b] += w_[row.b] * impulse;
+    }
+}
+
+/// v −= (h/2) a with the constrained acceleration: the row's right side gets −h Ġ v = −h v_across²/|d|.
+void ParticleSystem::half_kick_back() {
+    kick_ = steady_kick_;
+    if (!scene_.fields.empty()) apply_central_gravity();
+    if (!springs_.empty()) apply_springs();
+    const std::vector<Vec3> start = v_;
+    if (solver_ != ParticleSolver::none) {
+        assemble_rows();
+        for (std::size_t k = 0; k < row_.size(); ++k) {
+            const Vec3 s = v_[row_[k].b] - v_[row_[k].a];
+            const double along = dot(link_[k].u, s);
+            link_[k].rhs -= h_ * (dot(s, s) - along * along) / link_[k].length;
+        }
+        if (solver_ == ParticleSolver::iterative) solve_iterative();
+        else {
+            factor();
+            back_substitute();
+        }
+        apply_impulses();
+    }
+    for (std::size_t node = 0; node < v_.size(); ++node)
+        v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
+    for (Link& link : link_) link.lambda = 0.0;
+    std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
+    sweeps_ = 0;
+}
+
+// --- sampling, checking, going back ---------------------------------------------------------------------
+
+void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
+    if (clock_) clock_->start();
+    for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = link_[k].lambda;
+    seen_v_ = v_;
+    if (scene_.method.half_step_velocities) {
+        velocity_stage<false>();
+        velocity_ready_ = true;
+        for (std::size_t node = 0; node < v_.size(); ++node) seen_v_[node] = 0.5 * (seen_v_[node] + v_[node]);
+        if (sample == 0)
+            for (int body = 0; body < bodies(); ++body) seen_v_[node_of_body_[body]] = scene_.bodies[body].velocity;
+    }
+    recorder.sample(sample);
+    if (clock_) clock_->mark(Stage::observe);
+}
+
+Health ParticleSystem::health() const noexcept {
+    Health health;
+    for (int body = 0; body < bodies(); ++body) {
+        const Vec3 x = x_[node_of_body_[body]], v = v_[node_of_body_[body]];
+        if (!finite(x) || !finite(v)) return {Status::not_finite, body};
+        const double largest = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z), std::fabs(v.x),
+                                         std::fabs(v.y), std::fabs(v.z)});
+        if (largest > RUNAWAY && health.status == Status::completed) health = {Status::diverged, body};
+    }
+    return health;
+}
+
+void ParticleSystem::save() {
+    saved_.x = x_;
+    saved_.v = v_;
+    saved_.lambda.resize(link_.size());
+    for (std::size_t k = 0; k < link_.size(); ++k) saved_.lambda[k] = link_[k].lambda;
+    saved_.velocity_ready = velocity_ready_;
+    saved_.sweeps = sweeps_;
+    saved_.residual = residual_;
+}
+
+void ParticleSystem::restore() {
+    x_ = saved_.x;
+    v_ = saved_.v;
+    for (std::size_t k = 0; k < link_.size(); ++k) link_[k].lambda = saved_.lambda[k];
+    velocity_ready_ = saved_.velocity_ready;
+    sweeps_ = saved_.sweeps;
+    residual_ = saved_.residual;
+}
+
+void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
+    const std::int64_t inner = steps * scene_.method.substeps;
+    const auto rows = static_cast<std::int64_t>(row_.size());
+    const std::int64_t passes = 1 + scene_.method.corrections;
+    report.counters["steps"] = steps;
+    report.counters["substeps"] = inner;
+    report.counters["force_evaluations"] =
+        inner * static_cast<std::int64_t>(springs_.size() + scene_.fields.size() * scene_.bodies.size());
+    report.counters["rows_assembled"] = inner * rows;
+    report.counters["contacts"] = 0;
+    report.counters["sweeps"] = sweeps_;
+    report.counters["back_substitutions"] =
+        solver_ == ParticleSolver::path || solver_ == ParticleSolver::block ? inner * passes : 0;
+    std::int64_t blocks = 0;
+    if (solver_ == ParticleSolver::path) blocks = 2 * rows - static_cast<std::int64_t>(path_first_.size()) + 1;
+    if (solver_ == ParticleSolver::block) blocks = rows * (rows + 1) * (rows + 2) / 6;
+    report.counters["block_operations"] = inner * blocks;
+    report.residual = residual_;
+}
+
+std::vector<double> ParticleSystem::final_state() {
+    std::vector<double> state;
+    std::vector<Vec3> reported = v_;
+    if (scene_.method.half_step_velocities) {
+        if (velocity_ready_) reported = seen_v_;
+        else {
+            velocity_stage<false>();
+            for (std::size_t node = 0; node < v_.size(); ++node)
+                reported[node] = 0.5 * (reported[node] + v_[node]);
+        }
+    }
+    for (int body = 0; body < bodies(); ++body) {
+        const Vec3 x = position(body), v = reported[node_of_body_[body]];
+        state.insert(state.end(), {x.x, x.y, x.z, 1.0, 0.0, 0.0, 0.0, v.x, v.y, v.z, 0.0, 0.0, 0.0});
+    }
+    return state;
+}
+
+// --- what is read ---------------------------------------------------------------------------------------
+
+double ParticleSystem::violation(int row) const noexcept {
+    const Row& r = row_[slot_of_row_[row]];
+    return norm(x_[r.b] - x_[r.a]) - r.rest;
+}
+
+double ParticleSystem::kinetic_energy() const noexcept {
+    double energy = 0.0;
+    for (int body = 0; body < bodies(); ++body) energy += 0.5 * mass(body) * dot(velocity(body), velocity(body));
+    return energy;
+}
+
+double ParticleSystem::potential_energy() const noexcept {
+    double energy = 0.0;
+    for (int body = 0; body < bodies(); ++body) {
+        energy -= mass(body) * dot(scene_.gravity, position(body));
+        for (const CentralField& field : scene_.fields)
+            energy -= mass(body) * field.strength / norm(position(body) - field.centre);
+    }
+    for (const SpringNodes& s : springs_) {
+        const Vec3 d = x_[s.b] - x_[s.a];
+        const double stretch = s.spring.rest_length > 0.0 ? norm(d) - s.spring.rest_length : norm(d);
+        energy += 0.5 * s.spring.stiffness * stretch * stretch;
+    }
+    return energy;
+}
+
+}  // namespace spook

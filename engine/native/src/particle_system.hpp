@@ -1,0 +1,123 @@
+// The particle pipeline: state, forces, distance rows and their solve, one SPOOK step at a time.
+//
+// Nodes are the bodies and the world points rows and springs hang from (inverse mass 0, so nothing moves
+// them). If the rows form open paths the nodes stand in path order and row k of a path joins neighbours:
+// the Schur matrix G M⁻¹ Gᵀ + Sig is then tridiagonal and one pass up and down solves it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dense_ldlt.hpp"
+#include "particle_scene.hpp"
+#include "path_order.hpp"
+#include "recorder.hpp"
+#include "regularisation.hpp"
+#include "report.hpp"
+#include "run_loop.hpp"
+#include "stage_clock.hpp"
+
+namespace spook {
+
+class ParticleSystem {
+public:
+    explicit ParticleSystem(const ParticleScene& scene);
+
+    ParticleSolver solver() const noexcept { return solver_; }
+    const std::vector<int>& node_of_body() const noexcept { return node_of_body_; }
+
+    // --- what run_loop asks for ---
+    void advance(std::int64_t steps);
+    void observe(Recorder& recorder, std::int64_t sample);
+    Health health() const noexcept;
+    void save();
+    void restore();
+    std::int64_t block() const noexcept { return block_; }
+
+    /// Back to the start state; `clock` null means stages are not timed.
+    void reset(StageClock* clock);
+    void count(RunReport& report, std::int64_t steps) const;
+    std::vector<double> final_state();
+
+    // --- what the samplers read, at the current sample ---
+    Vec3 position(int body) const noexcept { return x_[node_of_body_[body]]; }
+    Vec3 velocity(int body) const noexcept { return seen_v_[node_of_body_[body]]; }
+    double mass(int body) const noexcept { return scene_.bodies[body].mass; }
+    int bodies() const noexcept { return static_cast<int>(scene_.bodies.size()); }
+    int rows() const noexcept { return static_cast<int>(scene_.rows.size()); }
+    double violation(int row) const noexcept;
+    double tension(int row) const noexcept { return -seen_lambda_[slot_of_row_[row]] / h_; }
+    double kinetic_energy() const noexcept;
+    double potential_energy() const noexcept;
+
+private:
+    struct Row {  // one distance: constants
+        int a, b;  // nodes
+        double rest, diagonal;
+        double violation_gain, velocity_gain, upsilon, relaxation, softness;
+    };
+    struct Link {  // what this step found out about it
+        Vec3 u;
+        double length, g, rhs, lambda, pivot_inverse, lower;
+    };
+    struct SpringNodes {
+        int a, b;
+        SpringForce spring;
+    };
+
+    void lay_out_paths(const std::vector<Path>& paths);
+    void lay_out_plain();
+    int anchor(Vec3 point);
+
+    template <bool Timed> void advance_by(std::int64_t steps);
+    template <bool Timed> void velocity_stage();
+    template <bool Timed> void mark(Stage stage) noexcept {
+        if constexpr (Timed) clock_->mark(stage);
+    }
+    void position_stage() noexcept;
+    void fly_freely(std::int64_t steps) noexcept;
+    void half_kick_back();
+
+    void apply_central_gravity() noexcept;
+    void apply_springs() noexcept;
+    void assemble_rows() noexcept;
+    void factor();
+    void back_substitute() noexcept;
+    void factor_path() noexcept;
+    void solve_path() noexcept;
+    void solve_iterative() noexcept;
+    void correct_curvature();
+    void apply_impulses() noexcept;
+
+    ParticleScene scene_;
+    double h_;  // s, of a substep
+    ParticleSolver solver_ = ParticleSolver::none;
+    bool moving_forces_ = false;  // forces that depend on the state
+    bool velocity_ready_ = false;  // the velocity stage of the coming step is already done
+    std::int64_t block_ = 1024;
+
+    // nodes
+    std::vector<Vec3> x_, v_, kick_, steady_kick_, seen_v_, before_;
+    std::vector<double> w_;  // inverse mass, 1/kg
+    std::vector<int> node_of_body_, body_of_node_;
+    // rows, in path order if they form paths
+    std::vector<Row> row_;
+    std::vector<Link> link_;
+    std::vector<double> seen_lambda_, scratch_, solution_, first_rhs_;
+    std::vector<int> slot_of_row_, path_first_;  // path p has rows path_first_[p] … path_first_[p+1] − 1
+    std::vector<SpringNodes> springs_;
+    DenseLdlt dense_;
+    double residual_ = 0.0;
+    std::int64_t sweeps_ = 0;
+
+    struct Snapshot {
+        std::vector<Vec3> x, v, before;
+        std::vector<double> lambda, seen_lambda;
+        bool velocity_ready = false;
+        std::int64_t sweeps = 0;
+        double residual = 0.0;
+    } saved_;
+    StageClock* clock_ = nullptr;
+};
+
+}  // namespace spook

@@ -1,0 +1,46 @@
+// What a run hands back, the same for every pipeline.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace spook {
+
+/// |x| [m] or |v| [m/s] beyond this is a runaway: the run ends as diverged.
+inline constexpr double RUNAWAY = 1e100;
+
+enum class Status { completed, diverged, not_finite, timed_out };
+
+constexpr const char* to_text(Status status) noexcept {
+    switch (status) {
+        case Status::completed: return "completed";
+        case Status::diverged: return "diverged";
+        case Status::not_finite: return "not_finite";
+        default: return "timed_out";
+    }
+}
+
+/// One observable: `samples` rows of `width` values (one row for a reduction).
+struct Recording {
+    int width = 0;
+    std::int64_t samples = 0;
+    std::vector<double> values;
+};
+
+struct RunReport {
+    Status status = Status::completed;
+    std::int64_t steps = 0;        // steps done; of a failed run, those before the failing step
+    std::int64_t failed_step = -1;  // counted from 1
+    int failed_body = -1;           // index in the scene
+    double seconds = 0.0;           // wall time of the native loop
+    double residual = 0.0;          // largest row residual an iterative solve stopped at, m/s
+    std::map<std::string, std::int64_t> counters;
+    std::map<std::string, double> stage_seconds;
+    std::vector<Recording> recordings;  // in the order the observables were given
+    std::vector<double> final_state;    // bodies × 13: position, orientation, velocity, angular velocity
+    std::string state_hash;
+};
+
+}  // namespace spook

@@ -1,0 +1,181 @@
+"""What a compiled scene is: the stages it kept, and a native program that runs them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from engine.errors import MethodError
+from engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
+from engine.result import Array, Result
+
+STAGES = (
+    "collision",
+    "apply_gravity",
+    "apply_central_gravity",
+    "apply_springs",
+    "apply_loads",
+    "impact",
+    "string_stiffness",
+    "assemble_rows",
+    "tangents",
+    "solve_path",
+    "solve_block",
+    "solve_iterative",
+    "pivot",
+    "friction",
+    "correct_curvature",
+    "half_step",
+    "integrate_positions",
+    "integrate_rotations",
+    "observe",
+)
+_REDUCTIONS: dict[type[Observable], str] = {
+    Trace: "trace",
+    Final: "final",
+    Maximum: "maximum",
+    Minimum: "minimum",
+    MaximumAbsolute: "maximum_absolute",
+    Mean: "mean",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class StageChoice:
+    """One stage of the step: whether this scene needs it, and why."""
+
+    stage: str
+    kept: bool
+    reason: str
+
+
+class NativeProgram(Protocol):
+    """What a pipeline's native object offers; see bindings_common.hpp for the report."""
+
+    def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
+
+
+def observation_tuples(observe: Mapping[str, Observable]) -> list[tuple[int, str, int, int, bool, int]]:
+    """(quantity, reduction, first, last or -1, from_start, every) in the order given.
+
+    Quantity k is the k-th of `distinct_quantities`: observables of equal quantities share one reading.
+    """
+    quantities = distinct_quantities(observe)
+    tuples = []
+    for name, what in observe.items():
+        if type(what) not in _REDUCTIONS:
+            raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
+        last = -1 if what.last is None else what.last
+        every = what.every if isinstance(what, Trace) else 1
+        tuples.append(
+            (
+                quantities.index(what.quantity),
+                _REDUCTIONS[type(what)],
+                what.first,
+                last,
+                what.from_start,
+                every,
+            )
+        )
+    return tuples
+
+
+def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
+    """The different quantities asked for, in order of first use."""
+    quantities: list[Any] = []
+    for name, what in observe.items():
+        if not isinstance(what, Observable):
+            raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
+        if what.quantity not in quantities:
+            quantities.append(what.quantity)
+    return quantities
+
+
+def observes_each_step(observe: Mapping[str, Observable]) -> bool:
+    """Whether some observable reads samples while the loop runs; a Final reads once, after it."""
+    return any(not isinstance(what, Final) for what in observe.values())
+
+
+class Program:
+    """A scene compiled for one time step and method. Running it again starts from the start again."""
+
+    def __init__(
+        self,
+        native: NativeProgram,
+        *,
+        time_step: float,
+        choices: Sequence[StageChoice],
+        bodies: Sequence[str],
+        observe: Mapping[str, Observable],
+        shapes: Sequence[tuple[int, ...]],
+    ) -> None:
+        """`shapes` are those of one sample of each observable, in order."""
+        self._native = native
+        self._choices = tuple(choices)
+        self._bodies = tuple(bodies)
+        self._observe = dict(observe)
+        self._shapes = tuple(shapes)
+        self.time_step = time_step  # s
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages of a step, in order: what this scene needs and nothing else."""
+        return tuple(choice.stage for choice in self._choices if choice.kept)
+
+    def explain(self) -> tuple[StageChoice, ...]:
+        """Every stage there is, kept or left out, with the reason in words."""
+        return self._choices
+
+    def run(self, steps: int, time_limit: float | None = None, time_stages: bool = False) -> Result:
+        """Run from the start for that many steps, natively and with the GIL released.
+
+        `time_limit` [s] of wall time ends the run as "timed_out" (looked at between blocks of steps);
+        `time_stages` measures seconds by stage, which slows the run down.
+        """
+        for name, what in self._observe.items():
+            if max(what.first, what.last or 0) > steps:
+                raise MethodError(f"observe {name!r}: its samples end beyond the last step, {steps}")
+        report = self._native.run(steps, time_limit or 0.0, time_stages)
+        observables: dict[str, Array] = {}
+        sample_times: dict[str, Array] = {}
+        for (name, what), shape, recording in zip(
+            self._observe.items(), self._shapes, report["recordings"], strict=True
+        ):
+            if isinstance(what, Trace):
+                observables[name] = recording.reshape((len(recording), *shape))
+                samples = what.first + what.every * np.arange(len(recording), dtype=np.float64)
+                sample_times[name] = samples * self.time_step
+            else:
+                observables[name] = recording.reshape(shape)
+        status, step, body = report["status"], report["failed_step"], report["failed_body"]
+        failed_body = self._bodies[body] if body >= 0 else None
+        return Result(
+            status=status,
+            failure=_failure(status, failed_body, step, time_limit),
+            failed_body=failed_body,
+            failed_step=step if step >= 0 else None,
+            time_step=self.time_step,
+            steps=report["steps"],
+            seconds=report["seconds"],
+            observables=observables,
+            sample_times=sample_times,
+            final_state=dict(zip(self._bodies, report["final_state"], strict=True)),
+            counters=report["counters"],
+            state_hash=report["state_hash"],
+            stages=self.stages,
+            stage_seconds=report["stage_seconds"],
+            residual=report["residual"],
+        )
+
+
+def _failure(status: str, body: str | None, step: int, time_limit: float | None) -> str:
+    if status == "diverged":
+        return f"body {body!r} ran away (beyond 1e100 m or m/s) in step {step}; try a smaller time step"
+    if status == "not_finite":
+        return f"body {body!r} has a value that is not finite after step {step}; try a smaller time step"
+    if status == "timed_out":
+        return f"the time limit of {time_limit:g} s was reached before step {step}"
+    return ""

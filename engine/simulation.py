@@ -1,0 +1,45 @@
+"""simulate(): compile a scene and run it once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from engine.compiler import NOTHING, compile
+from engine.errors import MethodError
+from engine.method import PLAIN, Method
+from engine.observe import Observable
+from engine.result import Result
+from engine.scene import Scene
+
+
+def simulate(
+    scene: Scene,
+    *,
+    time_step: float,
+    duration: float | None = None,
+    steps: int | None = None,
+    method: Method = PLAIN,
+    observe: Mapping[str, Observable] = NOTHING,
+    time_limit: float | None = None,
+    time_stages: bool = False,
+) -> Result:
+    """Run a scene for `duration` [s] or a number of `steps`, exactly one of them, wholly in native code.
+
+    A duration that is no whole number of time steps [s] is rounded to the nearest. `time_limit` is wall time
+    [s]. Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
+    """
+    program = compile(scene, time_step=time_step, method=method, observe=observe)
+    if (duration is None) == (steps is None):
+        raise MethodError("give either a duration or a number of steps")
+    if duration is not None:
+        if not (math.isfinite(duration) and duration >= 0.0):
+            raise MethodError(f"duration must be finite and not negative, not {duration!r}")
+        steps = round(duration / time_step)
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 0:
+        raise MethodError(f"steps must be a whole number, zero or above, not {steps!r}")
+    if steps >= 2**53:
+        raise MethodError(f"{steps} steps are more than any machine can do; use a larger time step")
+    if time_limit is not None and not time_limit > 0.0:
+        raise MethodError(f"time_limit must be positive, not {time_limit!r}")
+    return program.run(steps, time_limit, time_stages)

@@ -1,0 +1,40 @@
+"""What the tracker says when it cannot go on: one sentence, and the exit code a script can act on.
+
+TrackerError            exit code 2
+├── DatabaseError       the database cannot be opened, read or written
+├── DocumentError       a run document is not valid
+├── UnknownName         (LookupError) no such version, run or series, or more than one
+└── NotComparable       exit code 3: both exist, but comparing them would say nothing
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class TrackerError(Exception):
+    """Base of all; `str(error)` is the sentence for the user."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class DatabaseError(TrackerError):
+    """The database cannot be opened, read or written."""
+
+
+class DocumentError(TrackerError, ValueError):
+    """A run document is not valid; the message names the place in it."""
+
+
+class UnknownName(TrackerError, LookupError):
+    """No version, run or series of that name, or several; `near` holds names that were meant, perhaps."""
+
+    def __init__(self, sentence: str, near: tuple[str, ...] = ()) -> None:
+        super().__init__(sentence)
+        self.near = near
+
+
+class NotComparable(TrackerError):
+    """Both sides exist, but comparing them would say nothing."""
+
+    exit_code: ClassVar[int] = 3

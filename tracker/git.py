@@ -1,0 +1,65 @@
+"""What the git repository at hand knows: names of commits and their order. Nothing, if there is none."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterable
+from pathlib import Path
+
+HASH = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
+
+
+def _git(repository: Path, *arguments: str, lines: Iterable[str] = ()) -> str | None:
+    """Output of git, by argument list and never through a shell; None if it fails or is not there."""
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(repository), *arguments],
+            input="\n".join(lines),
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=20,
+            check=False,
+        )
+    except (OSError, ValueError, subprocess.TimeoutExpired):  # ValueError: NUL in a name
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
+def commit(repository: Path, name: str) -> str | None:
+    """The full hash that a tag (before a branch, before anything else git understands) stands for."""
+    for reference in (f"refs/tags/{name}", name):
+        found = _git(
+            repository, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{reference}^{{commit}}"
+        )
+        if found and HASH.fullmatch(found.strip()):
+            return found.strip()
+    return None
+
+
+def tags(repository: Path) -> dict[str, str]:
+    """Tag name to the full hash of its commit."""
+    listed = _git(
+        repository, "for-each-ref", "--format=%(objectname) %(*objectname) %(refname:strip=2)", "refs/tags"
+    )
+    found = {}
+    for line in (listed or "").splitlines():
+        direct, peeled, name = line.split(" ", 2)
+        found[name] = peeled or direct
+    return found
+
+
+def order(repository: Path, hashes: Iterable[str]) -> list[str]:
+    """Those of `hashes` that git knows, ancestors first."""
+    wanted = {text for text in hashes if HASH.fullmatch(text)}
+    listed = _git(
+        repository,
+        "rev-list",
+        "--topo-order",
+        "--reverse",
+        "--ignore-missing",
+        "--stdin",
+        lines=sorted(wanted),
+    )
+    return [text for text in (listed or "").splitlines() if text in wanted]
