@@ -66,7 +66,9 @@ class OneLineErrors(click.Group):
         try:
             code = super().main(args, *rest, **options)
         except click.ClickException as error:
-            command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "tracker"
+            command = (
+                error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "tracker"
+            )
             complain(f"{error.format_message()} (see: {command} --help)")
             code = UNUSABLE
         except (click.Abort, KeyboardInterrupt):

@@ -166,7 +166,9 @@ WIDE_COLUMNS = (
 
 def _styles(narrow: bool) -> dict[int, Style]:
     def paint(_row: int, text: str) -> str:
-        return click.style(text, fg={"✓": "green", "✗": "red"}.get(text[:1]), dim=text.startswith("·") or None)
+        return click.style(
+            text, fg={"✓": "green", "✗": "red"}.get(text[:1]), dim=text.startswith("·") or None
+        )
 
     def warn(_row: int, text: str) -> str:
         return click.style(text, fg="red") if text.startswith("LEFT") else text
