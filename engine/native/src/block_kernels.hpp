@@ -1,0 +1,47 @@
+// The loops over the columns of a block factor, compiled for each instruction set with bitwise equal results.
+#pragma once
+
+#include <cstdint>
+
+namespace spook::kernel {
+
+/// One column of the factor. In memory from `at` on: the pivot block, unit upper U (n × n); 1/D (n); then for
+/// each coupled row block its n × n_r block Z = D⁻¹ U⁻ᵀ A.
+struct Column {
+    std::int64_t at, first_row, first_target;
+    std::int32_t offset;  // of its unknowns
+    std::int32_t row_count;
+    std::uint8_t size, is_constraint;
+};
+
+struct Factor {
+    const Column* columns;
+    std::int64_t column_count;
+    const std::uint8_t* row_size;
+    const std::int32_t* row_offset;
+    const std::int64_t* targets;  // per column, for each pair of its rows r ≤ s: where the update goes
+    double* values;
+    double* scale;    // per unknown: sum of magnitudes a pivot came from
+    double* scratch;  // the widest column before division by D
+};
+
+/// What a sweep over the columns needs, for one instruction set.
+struct Kernels {
+    /// Factors in place; counts replaced pivots; −1 when a pivot is not finite (or vanishes with floor 0).
+    std::int64_t (*factor)(const Factor&, int uniform_size, double floor);
+    void (*solve)(const Factor&, int uniform_size, double* x);
+    /// y −= B x₂ and z −= Bᵀ x₁ for a row-major rows × columns block B.
+    void (*subtract_product)(int rows, int columns, const double* b, const double* x2, double* y);
+    void (*subtract_coupling)(int rows, int columns, const double* b, const double* x1, const double* x2, double* y,
+                              double* z);
+};
+
+const Kernels& portable_kernels() noexcept;
+const Kernels& avx2_kernels() noexcept;  // the portable ones where the compiler cannot build them
+
+/// The fastest ones this machine runs.
+const Kernels& kernels() noexcept;
+/// For tests: from now on the portable ones everywhere, or the fastest again. Not for use between threads.
+void use_portable_kernels(bool portable) noexcept;
+
+}  // namespace spook::kernel

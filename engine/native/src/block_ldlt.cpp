@@ -1,0 +1,226 @@
+#include "block_ldlt.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace spook {
+
+void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
+                        std::span<const std::uint8_t> is_constraint) {
+    const int count = static_cast<int>(sizes.size());
+    if (is_constraint.size() != sizes.size())
+        throw std::invalid_argument("block LDLT: every block needs a size and a sign");
+    for (int size : sizes)
+        if (size < 1 || size > 6) throw std::invalid_argument("block LDLT: blocks have 1 to 6 unknowns");
+    for (const BlockEdge& edge : edges)
+        if (edge.first < 0 || edge.first >= edge.second || edge.second >= count)
+            throw std::invalid_argument("block LDLT: an edge joins two different blocks, the smaller first");
+
+    size_.assign(sizes.begin(), sizes.end());
+    edges_.assign(edges.begin(), edges.end());
+    is_constraint_.assign(is_constraint.begin(), is_constraint.end());
+    offset_.resize(count);
+    diagonal_at_.resize(count);
+    coupling_at_.resize(edges.size());
+    unknowns_ = 0;
+    uniform_size_ = count ? size_[0] : 0;
+    std::int64_t at = 0;
+    for (int i = 0; i < count; ++i) {
+        offset_[i] = unknowns_;
+        unknowns_ += size_[i];
+        diagonal_at_[i] = at;
+        at += size_[i] * size_[i];
+        if (size_[i] != uniform_size_) uniform_size_ = 0;
+    }
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+        coupling_at_[e] = at;
+        at += size_[edges[e].first] * size_[edges[e].second];
+    }
+    values_.assign(at, 0.0);
+
+    const Ordering ordering = order_blocks(size_, edges_, is_constraint_);
+    order_ = ordering.order;
+    place_columns(ordering);
+    scale_.assign(unknowns_, 0.0);
+    residual_.assign(unknowns_, 0.0);
+    counters_ = {};
+}
+
+void BlockLdlt::place_columns(const Ordering& ordering) {
+    const int count = block_count();
+    std::vector<int> position(count);
+    for (int k = 0; k < count; ++k) position[order_[k]] = k;
+
+    columns_.resize(count);
+    pivot_at_.resize(count);
+    row_size_.resize(ordering.column_rows.size());
+    row_offset_.resize(ordering.column_rows.size());
+    std::vector<std::int64_t> block_at(ordering.column_rows.size());
+    std::int64_t at = 0, target_count = 0, widest = 0;
+    operations_per_factor_ = 0;
+    for (int k = 0; k < count; ++k) {
+        const int block = order_[k], n = size_[block];
+        const std::int64_t first = ordering.column_start[k], last = ordering.column_start[k + 1], d = last - first;
+        columns_[k] = {at, first, target_count, offset_[block], static_cast<std::int32_t>(d),
+                       static_cast<std::uint8_t>(n), is_constraint_[block]};
+        pivot_at_[block] = at;
+        at += n * n + n;
+        const std::int64_t start = at;
+        for (std::int64_t r = first; r < last; ++r) {
+            const int row = ordering.column_rows[r];
+            row_size_[r] = static_cast<std::uint8_t>(size_[row]);
+            row_offset_[r] = offset_[row];
+            block_at[r] = at;
+            at += n * size_[row];
+        }
+        widest = std::max(widest, at - start);
+        target_count += d * (d + 1) / 2;
+        operations_per_factor_ += 1 + d + d * (d + 1) / 2;
+    }
+    factor_.assign(at, 0.0);
+    scratch_.assign(widest, 0.0);
+
+    targets_.resize(target_count);
+    std::int64_t next = 0;
+    for (int k = 0; k < count; ++k) {
+        const std::int64_t last = ordering.column_start[k + 1];
+        for (std::int64_t r = ordering.column_start[k]; r < last; ++r) {
+            const int row = ordering.column_rows[r], p = position[row];
+            targets_[next++] = pivot_at_[row];
+            // Both lists are in order of elimination, and the later one contains the rest of this one.
+            std::int64_t q = ordering.column_start[p];
+            for (std::int64_t s = r + 1; s < last; ++s) {
+                while (ordering.column_rows[q] != ordering.column_rows[s]) ++q;
+                targets_[next++] = block_at[q];
+            }
+        }
+    }
+
+    loads_.resize(edges_.size());
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+        const auto [i, j] = edges_[e];
+        const bool transposed = position[i] > position[j];
+        const int early = transposed ? j : i, late = transposed ? i : j;
+        const auto first = ordering.column_rows.begin() + ordering.column_start[position[early]];
+        const auto last = ordering.column_rows.begin() + ordering.column_start[position[early] + 1];
+        const auto found = std::lower_bound(first, last, late,
+                                            [&](int a, int b) { return position[a] < position[b]; });
+        loads_[e] = {coupling_at_[e], block_at[found - ordering.column_rows.begin()],
+                     static_cast<std::uint8_t>(size_[i]), static_cast<std::uint8_t>(size_[j]), transposed};
+    }
+    std::vector<std::int64_t> seen(loads_.size());
+    for (std::size_t e = 0; e < loads_.size(); ++e) seen[e] = loads_[e].to;
+    std::sort(seen.begin(), seen.end());
+    if (std::adjacent_find(seen.begin(), seen.end()) != seen.end())
+        throw std::invalid_argument("block LDLT: two edges join the same pair of blocks");
+
+    // A constraint eliminated before all its bodies has no Schur complement to measure its pivot by.
+    raw_blocks_.clear();
+    raw_edges_.clear();
+    raw_start_.assign(1, 0);
+    std::vector<std::uint8_t> early_body(count, 0);
+    for (const auto& [i, j] : edges_) {
+        const int constraint = is_constraint_[i] ? i : j, body = is_constraint_[i] ? j : i;
+        if (position[body] < position[constraint]) early_body[constraint] = 1;
+    }
+    std::vector<std::vector<int>> raw(count);
+    for (std::size_t e = 0; e < edges_.size(); ++e)
+        for (int block : {edges_[e].first, edges_[e].second})
+            if (is_constraint_[block] && !early_body[block]) raw[block].push_back(static_cast<int>(e));
+    for (int i = 0; i < count; ++i) {
+        if (raw[i].empty()) continue;
+        raw_blocks_.push_back(i);
+        raw_edges_.insert(raw_edges_.end(), raw[i].begin(), raw[i].end());
+        raw_start_.push_back(static_cast<int>(raw_edges_.size()));
+    }
+}
+
+void BlockLdlt::load() {
+    // Blocks of fill start at zero; all others are overwritten.
+    if (fill() > 0) std::fill(factor_.begin(), factor_.end(), 0.0);
+    for (int i = 0; i < block_count(); ++i) {
+        const int n = size_[i];
+        const double* from = values_.data() + diagonal_at_[i];
+        double* to = factor_.data() + pivot_at_[i];
+        std::copy_n(from, n * n, to);
+        for (int k = 0; k < n; ++k) scale_[offset_[i] + k] = std::abs(from[k * n + k]);
+    }
+    for (const Load& item : loads_) {
+        const double* from = values_.data() + item.from;
+        double* to = factor_.data() + item.to;
+        if (!item.transposed) {
+            std::copy_n(from, item.rows * item.columns, to);
+        } else {
+            for (int a = 0; a < item.rows; ++a)
+                for (int b = 0; b < item.columns; ++b) to[b * item.rows + a] = from[a * item.columns + b];
+        }
+    }
+}
+
+void BlockLdlt::raw_scales() {
+    for (std::size_t k = 0; k < raw_blocks_.size(); ++k) {
+        const int block = raw_blocks_[k], n = size_[block];
+        double* scale = scale_.data() + offset_[block];
+        for (int at = raw_start_[k]; at < raw_start_[k + 1]; ++at) {
+            const auto [i, j] = edges_[raw_edges_[at]];
+            const double* b = coupling(raw_edges_[at]);
+            const int other = i == block ? j : i, m = size_[other];
+            const double* d = diagonal(other);
+            for (int a = 0; a < n; ++a)
+                for (int c = 0; c < m; ++c) {
+                    const double entry = i == block ? b[a * m + c] : b[c * n + a], mass = std::abs(d[c * m + c]);
+                    if (mass > 0.0) scale[a] += entry * entry / mass;
+                }
+        }
+    }
+}
+
+bool BlockLdlt::factor(double floor) {
+    load();
+    if (!raw_blocks_.empty()) raw_scales();
+    const kernel::Factor view = {columns_.data(),    static_cast<std::int64_t>(columns_.size()),
+                                 row_size_.data(),   row_offset_.data(),
+                                 targets_.data(),    factor_.data(),
+                                 scale_.data(),      scratch_.data()};
+    const std::int64_t replaced = kernel::kernels().factor(view, uniform_size_, floor);
+    ++counters_.factorisations;
+    counters_.block_operations += static_cast<std::uint64_t>(operations_per_factor_);
+    if (replaced < 0) return false;
+    counters_.floored_pivots += static_cast<std::uint64_t>(replaced);
+    return true;
+}
+
+void BlockLdlt::solve(double* x) const {
+    const kernel::Factor view = {columns_.data(),    static_cast<std::int64_t>(columns_.size()),
+                                 row_size_.data(),   row_offset_.data(),
+                                 targets_.data(),    const_cast<double*>(factor_.data()),
+                                 nullptr,            nullptr};
+    kernel::kernels().solve(view, uniform_size_, x);
+}
+
+void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
+    const kernel::Kernels& fast = kernel::kernels();
+    if (r != rhs) std::copy_n(rhs, unknowns_, r);
+    for (int i = 0; i < block_count(); ++i)
+        fast.subtract_product(size_[i], size_[i], diagonal(i), x + offset_[i], r + offset_[i]);
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+        const auto [i, j] = edges_[e];
+        fast.subtract_coupling(size_[i], size_[j], coupling(static_cast<int>(e)), x + offset_[i], x + offset_[j],
+                               r + offset_[i], r + offset_[j]);
+    }
+}
+
+void BlockLdlt::solve_refined(const double* rhs, double* x, int refinements) {
+    std::copy_n(rhs, unknowns_, x);
+    solve(x);
+    ++counters_.solves;
+    for (int round = 0; round < refinements; ++round) {
+        residual(rhs, x, residual_.data());
+        solve(residual_.data());
+        ++counters_.solves;
+        for (int i = 0; i < unknowns_; ++i) x[i] += residual_[i];
+    }
+}
+
+}  // namespace spook

@@ -1,0 +1,90 @@
+// Sparse symmetric saddle systems in blocks of 1 to 6 unknowns: A = Uᵀ D U, and solutions refined against A.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "block_kernels.hpp"
+#include "ordering.hpp"
+
+namespace spook {
+
+/// Factors [[M, Gᵀ], [G, −Sig]]: blocks of bodies have positive pivots, blocks of constraints negative ones.
+///
+/// analyse() once per topology, then fill diagonal() and coupling(), factor() and solve() each step; nothing is
+/// allocated after analyse(). Vectors are in the caller's block order, at offset(i). Results depend on the input
+/// only, not on the instruction set.
+class BlockLdlt {
+public:
+    struct Counters {  // exact, equal on every machine
+        std::uint64_t factorisations = 0, block_operations = 0, floored_pivots = 0, solves = 0;
+    };
+
+    /// sizes[i] in 1 … 6; edges are the non-zero blocks off the diagonal, first < second, each pair once;
+    /// is_constraint[i] says the sign of the pivots. Sets all values to zero. Throws std::invalid_argument.
+    void analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
+                 std::span<const std::uint8_t> is_constraint);
+
+    /// Row-major square block; the caller fills all of it, symmetric. A constraint's holds −Sig.
+    double* diagonal(int block) noexcept { return values_.data() + diagonal_at_[block]; }
+    const double* diagonal(int block) const noexcept { return values_.data() + diagonal_at_[block]; }
+    /// Row-major block of the edge: rows of its first block, columns of its second.
+    double* coupling(int edge) noexcept { return values_.data() + coupling_at_[edge]; }
+    const double* coupling(int edge) const noexcept { return values_.data() + coupling_at_[edge]; }
+
+    /// Factors the current values. A pivot below floor × (the sum of magnitudes it came from) is replaced by
+    /// √floor × that sum, in the factor only: a redundant row then takes no share that the others can carry, and
+    /// refinement removes the rest. False when a value was not finite, or a pivot vanished with floor 0.
+    bool factor(double floor);
+
+    /// x ← F⁻¹ x with the factor F as it is.
+    void solve(double* x) const;
+
+    /// x ← A⁻¹ rhs from zero, with so many residual corrections against the true A. rhs and x do not overlap.
+    void solve_refined(const double* rhs, double* x, int refinements);
+
+    /// r ← rhs − A x.
+    void residual(const double* rhs, const double* x, double* r) const;
+
+    int block_count() const noexcept { return static_cast<int>(size_.size()); }
+    int size(int block) const noexcept { return size_[block]; }
+    int offset(int block) const noexcept { return offset_[block]; }
+    int unknowns() const noexcept { return unknowns_; }
+    std::span<const BlockEdge> edges() const noexcept { return edges_; }
+    std::span<const int> order() const noexcept { return order_; }
+    /// Blocks of the factor off the diagonal that are not in the matrix.
+    std::int64_t fill() const noexcept { return static_cast<std::int64_t>(row_size_.size() - edges_.size()); }
+    Counters counters() const noexcept { return counters_; }
+
+private:
+    struct Load {  // where an edge's block goes in the factor
+        std::int64_t from, to;
+        std::uint8_t rows, columns, transposed;
+    };
+
+    void place_columns(const Ordering& ordering);
+    void load();
+    void raw_scales();
+
+    std::vector<int> size_, offset_, order_;
+    std::vector<BlockEdge> edges_;
+    std::vector<std::uint8_t> is_constraint_;
+    int unknowns_ = 0, uniform_size_ = 0;
+    std::int64_t operations_per_factor_ = 0;
+
+    std::vector<std::int64_t> diagonal_at_, coupling_at_;
+    std::vector<double> values_;
+
+    std::vector<kernel::Column> columns_;
+    std::vector<std::uint8_t> row_size_;
+    std::vector<std::int32_t> row_offset_;
+    std::vector<std::int64_t> targets_;
+    std::vector<std::int64_t> pivot_at_;  // of each block, in factor_
+    std::vector<Load> loads_;
+    std::vector<int> raw_start_, raw_blocks_, raw_edges_;
+    std::vector<double> factor_, scale_, scratch_, residual_;
+    Counters counters_;
+};
+
+}  // namespace spook

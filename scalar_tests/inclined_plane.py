@@ -1,0 +1,93 @@
+"""The box on an inclined plane shared by the friction tests: the plane stays level, gravity is tilted."""
+
+from __future__ import annotations
+
+import math
+
+from engine import Box, ContactForce, Final, Material, Method, Plane, RigidBody, Scene, Trace, Velocity
+from engine.result import Result
+from scalar_tests.case import Simulate
+
+EDGE = 1.0  # m
+MASS = 1.0  # kg
+GRAVITY = 10.0  # m/s²
+FRICTION = 0.5
+TIME_STEP = 1.0 / 60.0  # s
+SLIP_SPEED = 1e-3  # m/s, the thesis' limit for "in motion"
+CONE = Method()
+BOX = Method(friction="box")
+SCALED_BOX = Method(friction="scaled_box")
+MODELS = {"cone": CONE, "box": BOX, "scaled box": SCALED_BOX}
+
+
+def scene(slope: float, direction: float = 0.0, friction: float = FRICTION, mass: float = MASS) -> Scene:
+    """A box at rest on a level plane under gravity tilted by atan(slope) towards `direction` [rad]."""
+    tilt = math.atan(slope)
+    rough = Material(friction=friction)
+    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    box = RigidBody(
+        name="box", mass=mass, shape=Box((EDGE, EDGE, EDGE)), position=(0.0, 0.0, 0.5 * EDGE), material=rough
+    )
+    pull = (
+        -GRAVITY * math.sin(tilt) * math.cos(direction),
+        -GRAVITY * math.sin(tilt) * math.sin(direction),
+        -GRAVITY * math.cos(tilt),
+    )
+    return Scene(bodies=(plane, box), gravity=pull)
+
+
+def slide(
+    simulate: Simulate,
+    slope: float,
+    direction: float = 0.0,
+    *,
+    steps: int = 60,
+    method: Method = CONE,
+    friction: float = FRICTION,
+    mass: float = MASS,
+) -> Result:
+    """Run the box; observes the contact `force` [N] on the box and the final `velocity` [m/s]."""
+    return simulate(
+        scene(slope, direction, friction, mass),
+        time_step=TIME_STEP,
+        steps=steps,
+        method=method,
+        observe={
+            "force": Trace(quantity=ContactForce("box"), first=steps // 2),
+            "velocity": Final(quantity=Velocity("box")),
+        },
+    )
+
+
+def force_ratio(result: Result) -> float:
+    """|Ft|/|Fn| at the last step."""
+    x, y, z = result["force"][-1]
+    return math.hypot(x, y) / abs(float(z))
+
+
+def force_direction_error(result: Result, direction: float) -> float:
+    """Angle [degrees] between the friction force and the upward slope direction, at the last step."""
+    x, y, _ = result["force"][-1]
+    angle = math.atan2(y, x) - direction
+    return math.degrees(abs(math.remainder(angle, 2.0 * math.pi)))
+
+
+def slips(
+    simulate: Simulate, slope: float, friction: float, seconds: float = 4.0, method: Method = CONE
+) -> bool:
+    """Whether the box exceeds SLIP_SPEED within `seconds` of standing on the slope."""
+    steps = round(seconds / TIME_STEP)
+    velocity = slide(simulate, slope, steps=steps, friction=friction, method=method)["velocity"]
+    return math.hypot(velocity[0], velocity[1]) > SLIP_SPEED
+
+
+def slip_slope(simulate: Simulate, friction: float, resolution: float = 1e-4) -> float:
+    """The tangent of the slope at which the box starts to slide, by bisection to `resolution`."""
+    low, high = 0.0, 2.0 * friction + 0.1
+    while high - low > resolution:
+        middle = 0.5 * (low + high)
+        if slips(simulate, middle, friction):
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)
