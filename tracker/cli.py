@@ -225,13 +225,32 @@ def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())
         say("\n".join(finding_lines(findings)))
+    _retain(database)
+    with history_of(database) as history:
         _publish(history, out)
     return any(finding.red for finding in findings)
 
 
+def _retain(database: str) -> None:
+    """Drop figures and maps that the retention rule no longer keeps, once they have been compared."""
+    from sqlalchemy.orm import Session
+
+    from tracker.database import open_database
+    from tracker.retention import drop_old_figures
+    from tracker.series import History
+
+    opened = open_database(database)
+    try:
+        with Session(opened) as session:
+            drop_old_figures(session, History(session))
+    finally:
+        opened.dispose()
+
+
 def _publish(history: Any, out: Path) -> None:
-    from tracker.console import say
     from tracker.publish import publish as build
+
+    from tracker.console import say
 
     report = build(history, out)
     say(f"published {out}/index.html" + (f": {report}" if isinstance(report, str) else ""))

@@ -17,53 +17,34 @@ from tracker.cli_options import database_option, example
 @database_option
 def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
     """Write runs (all, or those named) as JSON documents."""
-    import msgspec
-
     from tracker.cli_history import history_of
+    from tracker.transfer import encoded, export_runs
 
     with history_of(database) as history:
-        runs = [history.resolve(name) for name in versions] or list(history.runs())
-        for run in runs:
-            text = msgspec.json.format(msgspec.json.encode(history.document(run.id)), indent=1)
-            if out is None:
-                click.echo(text)
-            else:
-                out.mkdir(parents=True, exist_ok=True)
-                (out / f"{_file_name(run.id)}.json").write_bytes(text + b"\n")
-    if out is not None:
-        click.echo(f"{len(runs)} runs in {out}")
-
-
-def _file_name(run_id: str) -> str:
-    """The id where it is harmless as a file name, else a hash of it."""
-    import hashlib
-    import re
-
-    safe = re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9-]{0,80}", run_id)
-    return run_id if safe else hashlib.sha256(run_id.encode("utf-8", "replace")).hexdigest()[:32]
+        if out is not None:
+            click.echo(f"{len(export_runs(history, out, versions))} runs in {out}")
+            return
+        for run in [history.resolve(name) for name in versions] or history.runs():
+            click.echo(encoded(history.document(run.id)), nl=False)
 
 
 @click.command("import", epilog=example("tracker import runs/*.json"))
-@click.argument(
-    "files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path, dir_okay=False)
-)
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @database_option
 def import_files(files: tuple[Path, ...], database: str) -> None:
     """Record runs from JSON documents; what is there already is left as it is."""
     from sqlalchemy.orm import Session
 
-    from tracker.border import decoded
     from tracker.database import open_database
-    from tracker.record import record
+    from tracker.transfer import import_files as read_in
 
-    documents = [decoded(file.read_bytes(), str(file)) for file in files]  # all valid, or nothing is written
     opened = open_database(database)
     try:
         with Session(opened) as session:
-            new = sum(record(session, document) for document in documents)
+            done = read_in(session, files)
     finally:
         opened.dispose()
-    click.echo(f"{new} runs recorded, {len(documents) - new} were there already")
+    click.echo(f"{len(done.stored)} runs recorded, {len(done.present)} were there already")
 
 
 @click.command(epilog=example("tracker schema > run.schema.json"))
@@ -92,3 +73,57 @@ def upgrade(database: str) -> None:
 
     open_database(database).dispose()
     click.echo(f"the schema is at revision {head()}, the newest")
+
+
+@db.command(epilog=example("tracker db check"))
+@database_option
+def check(database: str) -> None:
+    """Read everything and say what is wrong; exit code 1 if anything is."""
+    from tracker.cli_options import RED
+    from tracker.database import open_database
+    from tracker.database_check import check as faults_of
+
+    opened = open_database(database, readonly=True)
+    try:
+        faults = faults_of(opened)
+    finally:
+        opened.dispose()
+    for fault in faults:
+        click.echo(f"✗ {fault}")
+    click.echo(f"{len(faults)} faults" if faults else "✓ nothing is wrong")
+    if faults:
+        click.get_current_context().exit(RED)
+
+
+@db.command(epilog=example("tracker db copy sqlite:///tracker.db postgresql://host/tracker"))
+@click.argument("source", metavar="FROM")
+@click.argument("target", metavar="TO")
+def copy(source: str, target: str) -> None:
+    """Copy a whole history into an empty database, of the other kind as well, without loss."""
+    from tracker.database_copy import copy_database
+
+    digests = copy_database(source, target)
+    click.echo(
+        f"copied {sum(digest.rows for digest in digests.values())} rows in {len(digests)} tables, all equal"
+    )
+
+
+@db.command(epilog=example("tracker db stats"))
+@database_option
+def stats(database: str) -> None:
+    """Say how much is stored."""
+    from tracker.database import open_database
+    from tracker.statistics import statistics
+
+    opened = open_database(database, readonly=True)
+    try:
+        found = statistics(opened)
+    finally:
+        opened.dispose()
+    click.echo(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
+    for engine, runs in found.engines.items():
+        click.echo(f"  {runs} runs of {engine}")
+    if found.first and found.last:
+        click.echo(f"  from {found.first:%Y-%m-%d %H:%M} to {found.last:%Y-%m-%d %H:%M} UTC")
+    for table, rows in found.rows.items():
+        click.echo(f"  {rows:>9} {table}")

@@ -70,7 +70,7 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
     if shown:
         rows = [
             (
-                MARK.get(change.word, "·") + " " + (change.name or change.word.replace("_", " ")),
+                _what(change),
                 change.series,
                 value(change.before),
                 value(change.after, change.unit),
@@ -92,6 +92,12 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
     lines += [f"note: {clean(note)}" for note in document.notes]
     lines.append(_verdict(document))
     return "\n".join(lines)
+
+
+def _what(change: Change) -> str:
+    """Mark and word; of a regression its name."""
+    word = change.name if change.red and change.name else change.word.replace("_", " ")
+    return f"{MARK.get(change.word, '·')} {word}"
 
 
 def _paint(_row: int, text: str) -> str:
@@ -144,7 +150,7 @@ def compare_markdown(document: CompareDocument) -> str:
         lines += ["| | series | before | after | limit | how |", "|---|---|---:|---:|---|---|"]
     for change in shown[:MOST_ROWS]:
         cells = (
-            f"{MARK.get(change.word, '·')} {change.name or change.word.replace('_', ' ')}",
+            _what(change),
             change.series,
             value(change.before),
             value(change.after, change.unit),
