@@ -11,7 +11,8 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     : scene_(scene), h_(scene.method.time_step / scene.method.substeps) {
     const std::vector<Path> paths = find_paths(scene);
     if (!scene.rows.empty()) {
-        solver_ = paths.empty() || scene.method.force_block ? ParticleSolver::block : ParticleSolver::path;
+        solver_ = paths.empty() || scene.method.force_block || scene.method.string_stiffness
+                      ? ParticleSolver::block : ParticleSolver::path;
         if (scene.method.iterative) solver_ = ParticleSolver::iterative;
     }
     node_of_body_.assign(scene.bodies.size(), -1);
@@ -46,10 +47,8 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     seen_v_.resize(x_.size());
     link_.resize(row_.size());
     seen_lambda_.resize(row_.size());
-    scratch_.resize(row_.size());
-    solution_.resize(row_.size());
     first_rhs_.resize(row_.size());
-    if (solver_ == ParticleSolver::block) dense_.resize(static_cast<int>(row_.size()));
+    if (solver_ == ParticleSolver::block) analyse_blocks();
     block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps), 1, 4096);
 }
 
@@ -103,6 +102,7 @@ void ParticleSystem::reset(StageClock* clock) {
     velocity_ready_ = false;
     sweeps_ = 0;
     residual_ = 0.0;
+    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
     for (int body = 0; body < bodies(); ++body) {
         x_[node_of_body_[body]] = scene_.bodies[body].position;
         v_[node_of_body_[body]] = scene_.bodies[body].velocity;
@@ -179,7 +179,7 @@ void ParticleSystem::velocity_stage() {
             correct_curvature();
             mark<Timed>(Stage::correct_curvature);
         }
-        apply_impulses();
+        add_impulses(v_);
     }
     for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += kick_[node];
     mark<Timed>(Stage::apply_gravity);
@@ -231,20 +231,7 @@ void ParticleSystem::assemble_rows() noexcept {
 
 void ParticleSystem::factor() {
     if (solver_ == ParticleSolver::path) return factor_path();
-    dense_.clear();
-    const int n = static_cast<int>(row_.size());
-    for (int i = 0; i < n; ++i) {
-        dense_.at(i, i) = row_[i].diagonal;
-        for (int j = 0; j < i; ++j) {
-            double along = 0.0;
-            if (row_[i].a == row_[j].a) along += w_[row_[i].a];
-            if (row_[i].b == row_[j].b) along += w_[row_[i].b];
-            if (row_[i].a == row_[j].b) along -= w_[row_[i].a];
-            if (row_[i].b == row_[j].a) along -= w_[row_[i].b];
-            if (along != 0.0) dense_.at(i, j) = along * dot(link_[i].u, link_[j].u);
-        }
-    }
-    dense_.factor(scene_.method.floor);
+    factor_blocks();
 }
 
 void ParticleSystem::factor_path() noexcept {
@@ -263,11 +250,9 @@ void ParticleSystem::factor_path() noexcept {
     }
 }
 
-void ParticleSystem::back_substitute() noexcept {
+void ParticleSystem::back_substitute() {
     if (solver_ == ParticleSolver::path) return solve_path();
-    for (std::size_t k = 0; k < row_.size(); ++k) scratch_[k] = link_[k].rhs;
-    dense_.solve(scratch_.data(), solution_.data(), scene_.method.refinements);
-    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].lambda = solution_[k];
+    solve_blocks();
 }
 
 void ParticleSystem::solve_path() noexcept {
@@ -335,11 +320,7 @@ void ParticleSystem::bend_rows_back() noexcept {
 void ParticleSystem::correct_curvature() {
     for (int round = 0; round < scene_.method.corrections; ++round) {
         for (std::size_t node = 0; node < v_.size(); ++node) trial_[node] = v_[node] + kick_[node];
-        for (std::size_t k = 0; k < row_.size(); ++k) {
-            const Vec3 impulse = link_[k].lambda * link_[k].u;
-            trial_[row_[k].a] -= w_[row_[k].a] * impulse;
-            trial_[row_[k].b] += w_[row_[k].b] * impulse;
-        }
+        add_impulses(trial_);
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
@@ -352,12 +333,17 @@ void ParticleSystem::correct_curvature() {
     }
 }
 
-void ParticleSystem::apply_impulses() noexcept {
+void ParticleSystem::add_impulses(std::vector<Vec3>& v) const noexcept {
+    if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) {
+        for (std::size_t node = 0; node < v.size(); ++node)
+            if (block_of_node_[node] >= 0) v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
+        return;
+    }
     for (std::size_t k = 0; k < row_.size(); ++k) {
         const Row& row = row_[k];
         const Vec3 impulse = link_[k].lambda * link_[k].u;
-        v_[row.a] -= w_[row.a] * impulse;
-        v_[row.b] += w_[row.b] * impulse;
+        v[row.a] -= w_[row.a] * impulse;
+        v[row.b] += w_[row.b] * impulse;
     }
 }
 
@@ -382,7 +368,7 @@ void ParticleSystem::half_kick_back() {
             if (solver_ == ParticleSolver::iterative) solve_iterative();
             else back_substitute();
             v_ = start;
-            apply_impulses();
+            add_impulses(v_);
             for (std::size_t node = 0; node < v_.size(); ++node)
                 v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
         }
@@ -391,6 +377,7 @@ void ParticleSystem::half_kick_back() {
     }
     for (Link& link : link_) link.lambda = 0.0;
     sweeps_ = 0;
+    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
 }
 
 // --- sampling, checking, going back ---------------------------------------------------------------------
@@ -456,8 +443,10 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
         solver_ == ParticleSolver::path || solver_ == ParticleSolver::block ? inner * passes : 0;
     std::int64_t blocks = 0;
     if (solver_ == ParticleSolver::path) blocks = 2 * rows - static_cast<std::int64_t>(path_first_.size()) + 1;
-    if (solver_ == ParticleSolver::block) blocks = rows * (rows + 1) * (rows + 2) / 6;
     report.counters["block_operations"] = inner * blocks;
+    if (solver_ == ParticleSolver::block)
+        report.counters["block_operations"] =
+            static_cast<std::int64_t>(ldlt_.counters().block_operations) - operations_at_start_;
     report.residual = residual_;
 }
 

@@ -1,0 +1,268 @@
+#include "pivot_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spook {
+
+namespace {
+
+constexpr int patience = 5;          // rounds without fewer offenders before Murty's rule
+constexpr double tolerance = 1e-11;  // of a velocity, relative to the system's scale
+
+bool bilateral(const RowBlock& block, int i) noexcept { return block.lower[i] == -unbounded && block.upper[i] == unbounded; }
+bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == RowState::free; }
+
+}  // namespace
+
+Mat6 cholesky(const Mat6& m) noexcept {
+    Mat6 l{};
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j <= i; ++j) {
+            double sum = m[6 * i + j];
+            for (int k = 0; k < j; ++k) sum -= l[6 * i + k] * l[6 * j + k];
+            l[6 * i + j] = i == j ? std::sqrt(sum) : sum / l[6 * j + j];
+        }
+    return l;
+}
+
+void cholesky_solve(const Mat6& l, Vec6& x) noexcept {
+    for (int i = 0; i < 6; ++i) {
+        for (int k = 0; k < i; ++k) x[i] -= l[6 * i + k] * x[k];
+        x[i] /= l[6 * i + i];
+    }
+    for (int i = 5; i >= 0; --i) {
+        for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
+        x[i] /= l[6 * i + i];
+    }
+}
+
+bool PivotSolver::analyse(const MixedSystem& system) {
+    const int bodies = static_cast<int>(system.mass.size());
+    std::vector<Pattern> pattern(system.rows.size());
+    for (std::size_t k = 0; k < pattern.size(); ++k)
+        pattern[k] = {system.rows[k].first, system.rows[k].second, system.rows[k].size};
+    if (bodies == bodies_ && pattern == pattern_) return false;
+
+    std::vector<int> sizes(bodies, 6);
+    std::vector<std::uint8_t> is_constraint(bodies, 0);
+    std::vector<BlockEdge> edges;
+    first_edge_.assign(pattern.size(), -1);
+    second_edge_.assign(pattern.size(), -1);
+    row_start_.assign(1, 0);
+    for (std::size_t k = 0; k < pattern.size(); ++k) {
+        const int block = bodies + static_cast<int>(k);
+        sizes.push_back(pattern[k].size);
+        is_constraint.push_back(1);
+        row_start_.push_back(row_start_.back() + pattern[k].size);
+        if (pattern[k].first >= 0) first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
+        if (pattern[k].second >= 0) second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
+    }
+    matrix_.analyse(sizes, edges, is_constraint);
+    ++analyses_;
+    last_ = {};
+    bodies_ = bodies;
+    pattern_ = std::move(pattern);
+    factored_free_.clear();
+    right_.assign(matrix_.unknowns(), 0.0);
+    solution_.assign(matrix_.unknowns(), 0.0);
+    residual_.assign(matrix_.unknowns(), 0.0);
+    own_.assign(row_start_.back(), 0.0);
+    offends_.assign(row_start_.back(), 0);
+    return true;
+}
+
+void PivotSolver::measure(const MixedSystem& system) {
+    mass_factor_.resize(system.mass.size());
+    free_velocity_.resize(system.mass.size());
+    for (std::size_t b = 0; b < system.mass.size(); ++b) {
+        mass_factor_[b] = cholesky(system.mass[b]);
+        free_velocity_[b] = system.momentum[b];
+        cholesky_solve(mass_factor_[b], free_velocity_[b]);
+    }
+    speed_ = 0.0;
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        for (int i = 0; i < block.size; ++i) {
+            double own = 0.0;
+            for (const auto& [body, jacobian] : {std::pair{block.first, &block.first_jacobian[i]}, std::pair{block.second, &block.second_jacobian[i]}}) {
+                if (body < 0) continue;
+                Vec6 x = *jacobian;
+                cholesky_solve(mass_factor_[body], x);
+                own += dot(*jacobian, x);
+            }
+            own_[row_start_[k] + i] = own;
+            speed_ = std::max(speed_, std::abs(block.right[i]) + std::abs(row_velocity(block, i, free_velocity_)));
+        }
+    }
+}
+
+bool PivotSolver::factor(const MixedSystem& system) {
+    for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
+    factored_free_.resize(row_start_.back());
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        const int n = block.size;
+        double* diagonal = matrix_.diagonal(bodies_ + static_cast<int>(k));
+        std::fill_n(diagonal, n * n, 0.0);
+        for (int i = 0; i < n; ++i) {
+            const bool free = is_free(block, i);
+            const double relieved = bilateral(block, i) ? 0.0 : relief * own_[row_start_[k] + i];
+            diagonal[i * n + i] = free ? -(block.softness[i] + relieved) : -1.0;
+            factored_free_[row_start_[k] + i] = free;
+        }
+        for (const auto& [edge, jacobian] : {std::pair{first_edge_[k], &block.first_jacobian}, std::pair{second_edge_[k], &block.second_jacobian}}) {
+            if (edge < 0) continue;
+            double* coupling = matrix_.coupling(edge);
+            for (int a = 0; a < 6; ++a)
+                for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? (*jacobian)[i][a] : 0.0;
+        }
+    }
+    return matrix_.factor(floor);
+}
+
+/// residual_ ← right side − true matrix × (velocity, multipliers); the largest entry relative to its scale.
+double PivotSolver::residual(const MixedSystem& system) {
+    double largest = 0.0, force = 0.0;
+    for (int b = 0; b < bodies_; ++b)
+        for (int a = 0; a < 6; ++a) {
+            double sum = system.momentum[b][a];
+            for (int c = 0; c < 6; ++c) sum -= system.mass[b][6 * a + c] * system.velocity[b][c];
+            residual_[6 * b + a] = sum;
+            force = std::max(force, std::abs(system.momentum[b][a]));
+        }
+    double slip = 0.0;
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        double* r = residual_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
+        for (int i = 0; i < block.size; ++i) {
+            const double z = block.multiplier[i];
+            for (int a = 0; a < 6; ++a) {
+                if (block.first >= 0) residual_[6 * block.first + a] += block.first_jacobian[i][a] * z;
+                if (block.second >= 0) residual_[6 * block.second + a] += block.second_jacobian[i][a] * z;
+            }
+            r[i] = is_free(block, i) ? -row_residual(block, i, system.velocity) : 0.0;
+            slip = std::max(slip, std::abs(r[i]));
+        }
+    }
+    for (int i = 0; i < 6 * bodies_; ++i) largest = std::max(largest, std::abs(residual_[i]));
+    return std::max(force > 0.0 ? largest / force : largest, speed_ > 0.0 ? slip / speed_ : slip);
+}
+
+void PivotSolver::solve_free(MixedSystem& system, bool refine) {
+    // Start from zero velocities and free multipliers, the bound ones in place: the first residual is the right side.
+    for (Vec6& v : system.velocity) v.fill(0.0);
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i)
+            block.multiplier[i] = is_free(block, i) ? 0.0 : block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
+    double before = residual(system);
+    for (int round = 0; round <= (refine ? max_refinements : 0); ++round) {
+        std::copy(residual_.begin(), residual_.end(), solution_.begin());
+        matrix_.solve(solution_.data());
+        for (int b = 0; b < bodies_; ++b)
+            for (int a = 0; a < 6; ++a) system.velocity[b][a] += solution_[6 * b + a];
+        for (std::size_t k = 0; k < system.rows.size(); ++k) {
+            RowBlock& block = system.rows[k];
+            const double* y = solution_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
+            for (int i = 0; i < block.size; ++i)
+                if (is_free(block, i)) block.multiplier[i] -= y[i];  // the unknown is −z
+        }
+        if (!refine) return;
+        const double after = residual(system);
+        if (round > 0 && (after <= 1e-16 || !(after < 0.25 * before))) return;
+        before = after;
+    }
+}
+
+int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
+    const double slip = tolerance * speed_;
+    int count = 0, last = -1;
+    std::fill(offends_.begin(), offends_.end(), 0);
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        for (int i = 0; i < block.size; ++i) {
+            if (bilateral(block, i) || block.lower[i] == block.upper[i]) continue;
+            const int row = row_start_[k] + i;
+            bool offends;
+            if (is_free(block, i)) {
+                const double slack = slip / (own_[row] + block.softness[i]);
+                offends = block.multiplier[i] < block.lower[i] - slack || block.multiplier[i] > block.upper[i] + slack;
+            } else {
+                const double w = row_residual(block, i, system.velocity);
+                offends = block.state[i] == RowState::at_lower ? w < -slip : w > slip;
+            }
+            if (!offends) continue;
+            ++count;
+            last = row;
+            if (mark_all) offends_[row] = 1;
+        }
+    }
+    if (!mark_all && last >= 0) offends_[last] = 1;
+    return count;
+}
+
+PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
+    PivotReport report;
+    report.converged = false;
+    system.velocity.resize(system.mass.size());
+    if (analyse(system)) same_matrix = false;
+    measure(system);
+
+    int bounded = 0;
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) {
+            if (bilateral(block, i)) block.state[i] = RowState::free;
+            else if (block.lower[i] == block.upper[i]) block.state[i] = RowState::at_lower;
+            else if (block.state[i] == RowState::at_lower && block.lower[i] == -unbounded) block.state[i] = RowState::free;
+            else if (block.state[i] == RowState::at_upper && block.upper[i] == unbounded) block.state[i] = RowState::free;
+            bounded += !bilateral(block, i) && block.lower[i] != block.upper[i];
+        }
+
+    // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
+    const int refined_rounds = 50 + 4 * bounded, last_round = refined_rounds + 50 + 8 * bounded;
+    int best = 1 << 30, left = patience;
+    for (int round = 0; round < last_round; ++round) {
+        bool stale = !same_matrix || factored_free_.empty();
+        for (std::size_t k = 0; k < system.rows.size() && !stale; ++k)
+            for (int i = 0; i < system.rows[k].size; ++i)
+                stale = stale || is_free(system.rows[k], i) != static_cast<bool>(factored_free_[row_start_[k] + i]);
+        if (stale && !factor(system)) {
+            report.finite = false;
+            factored_free_.clear();
+            break;
+        }
+        same_matrix = true;
+        const bool refine = round < refined_rounds;
+        solve_free(system, refine);
+        ++report.rounds;
+
+        int count = offenders(system, true);
+        if (count == 0 && !refine) solve_free(system, true);
+        if (count == 0) {
+            report.converged = true;
+            break;
+        }
+        if (count < best && refine) best = count, left = patience;
+        else if (left > 0) --left;
+        const bool all = left > 0 && refine;
+        if (!all) offenders(system, false);
+        for (std::size_t k = 0; k < system.rows.size(); ++k) {
+            RowBlock& block = system.rows[k];
+            for (int i = 0; i < block.size; ++i) {
+                if (!offends_[row_start_[k] + i]) continue;
+                ++report.flips;
+                if (!is_free(block, i)) block.state[i] = RowState::free;
+                else block.state[i] = block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
+            }
+        }
+    }
+    const BlockLdlt::Counters now = matrix_.counters();
+    counters_.factorisations += now.factorisations - last_.factorisations;
+    counters_.block_operations += now.block_operations - last_.block_operations;
+    counters_.floored_pivots += now.floored_pivots - last_.floored_pivots;
+    counters_.solves += now.solves - last_.solves;
+    last_ = now;
+    return report;
+}
+
+}  // namespace spook

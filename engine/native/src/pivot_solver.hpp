@@ -1,0 +1,74 @@
+// Direct solver of a mixed system: which rows sit at a bound, found by pivoting; the rest by block LDLᵀ.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "block_ldlt.hpp"
+#include "pivot_system.hpp"
+
+namespace spook {
+
+struct PivotReport {
+    int rounds = 0;         // linear systems solved
+    int flips = 0;          // rows that changed state
+    bool converged = true;  // no row is on the wrong side of its complementarity
+    bool finite = true;     // the factorisation met only finite values
+};
+
+/// Solves MixedSystem by block pivoting: free every row that wants to leave its bound, bind every row that broke
+/// one, all at once; after five rounds without fewer offenders only the one of the largest index (Murty 1974),
+/// which ends for P-matrices. Rows start from RowBlock::state; bilateral rows never leave the free set.
+///
+/// Singular systems (four rigid corners, Sig = 0): the factored matrix carries a compliance of `relief` times each
+/// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the solution is refined against the true equations until the residual
+/// stops shrinking. That gives the solution of least norm among equals, weighted by (G M⁻¹ Gᵀ)ᵢᵢ, and changes no
+/// equation. A factor 1e-6 is small enough to converge in a few refinements and large enough that the rounding
+/// of gaps, divided by it, stays out of the loads.
+class PivotSolver {
+public:
+    double floor = 1e-12;   // of BlockLdlt::factor
+    double relief = 1e-6;   // of bounded rows, in the factor only
+    int max_refinements = 8;
+
+    /// Fills velocity, multipliers and states. With `same_matrix` the caller promises that mass, Jacobians and
+    /// softness are those of the call before: a factor of the same free set is then used again.
+    PivotReport solve(MixedSystem& system, bool same_matrix = false);
+
+    BlockLdlt::Counters counters() const noexcept { return counters_; }
+    std::uint64_t analyses() const noexcept { return analyses_; }
+
+private:
+    bool analyse(const MixedSystem& system);
+    void measure(const MixedSystem& system);
+    bool factor(const MixedSystem& system);
+    void solve_free(MixedSystem& system, bool refine);
+    double residual(const MixedSystem& system);
+    int offenders(const MixedSystem& system, bool mark_all);
+
+    struct Pattern {
+        int first, second, size;
+        bool operator==(const Pattern&) const = default;
+    };
+    BlockLdlt matrix_;
+    BlockLdlt::Counters counters_{}, last_{};
+    std::uint64_t analyses_ = 0;
+    int bodies_ = -1;
+    std::vector<Pattern> pattern_;
+    std::vector<int> first_edge_, second_edge_;  // per row block, −1 if there is none
+    std::vector<std::uint8_t> factored_free_;    // per row
+    std::vector<int> row_start_;                 // per row block, index of its first row
+    std::vector<double> own_;                    // per row, (G M⁻¹ Gᵀ)ᵢᵢ
+    double speed_ = 0.0;                         // the scale of velocities in this system, m/s
+    std::vector<double> right_, solution_, residual_;
+    std::vector<std::uint8_t> offends_;
+    std::vector<Mat6> mass_factor_;
+    std::vector<Vec6> free_velocity_;  // M⁻¹ p
+};
+
+/// Cholesky factor L (lower, row-major) of a symmetric positive definite 6×6, and x ← M⁻¹ x with it.
+Mat6 cholesky(const Mat6& m) noexcept;
+void cholesky_solve(const Mat6& factor, Vec6& x) noexcept;
+
+}  // namespace spook

@@ -1,0 +1,62 @@
+// One step's equations with bounds: what joints and contacts are written into and what every solver reads.
+//
+//     M v − Σ Gᵀ z = p,    w = G v + Sig z − r,    lower <= z <= upper,
+//     w = 0 where lower < z < upper,  w >= 0 where z = lower,  w <= 0 where z = upper.
+//
+// z are impulses [N s] (a rotation's row: N m s). A bilateral row has infinite bounds; a contact's normal, and a
+// limit, have 0 and infinity; a motor has ∓ time step times its largest force; friction has ∓ mu nu.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace spook {
+
+using Vec6 = std::array<double, 6>;   // linear part, then angular, world axes
+using Mat6 = std::array<double, 36>;  // row-major
+
+inline constexpr double unbounded = std::numeric_limits<double>::infinity();
+
+/// Where a row stands in the complementarity problem; kept from step to step as a warm start.
+enum class RowState : signed char { at_lower = -1, free = 0, at_upper = 1 };
+
+/// Up to six rows between two moving bodies (or one: `second` or `first` is −1).
+struct RowBlock {
+    int first = -1, second = -1;  // indices into MixedSystem::mass; −1 does not move
+    int size = 1;
+    std::array<Vec6, 6> first_jacobian{}, second_jacobian{};  // one Vec6 per row
+    Vec6 softness{};                                          // Sig, or gamma/h of a velocity row
+    Vec6 right{};                                             // r: of a holonomic row −(4/h) Ups g + Ups G v
+    Vec6 lower{-unbounded, -unbounded, -unbounded, -unbounded, -unbounded, -unbounded};
+    Vec6 upper{unbounded, unbounded, unbounded, unbounded, unbounded, unbounded};
+    Vec6 multiplier{};  // z: the start of an iteration, then the result
+    std::array<RowState, 6> state{};
+};
+
+/// Indices of bodies are those of moving bodies only; bodies that do not move appear in the rows' right sides.
+struct MixedSystem {
+    std::vector<Mat6> mass;      // symmetric, positive definite
+    std::vector<Vec6> momentum;  // p = M v + h f
+    std::vector<RowBlock> rows;
+    std::vector<Vec6> velocity;  // the result v₊
+};
+
+inline double dot(const Vec6& a, const Vec6& b) noexcept {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
+}
+
+/// (G v)ᵢ of one row.
+inline double row_velocity(const RowBlock& block, int i, const std::vector<Vec6>& velocity) noexcept {
+    double sum = 0.0;
+    if (block.first >= 0) sum += dot(block.first_jacobian[i], velocity[block.first]);
+    if (block.second >= 0) sum += dot(block.second_jacobian[i], velocity[block.second]);
+    return sum;
+}
+
+/// wᵢ = (G v)ᵢ + Sigᵢ zᵢ − rᵢ.
+inline double row_residual(const RowBlock& block, int i, const std::vector<Vec6>& velocity) noexcept {
+    return row_velocity(block, i, velocity) + block.softness[i] * block.multiplier[i] - block.right[i];
+}
+
+}  // namespace spook

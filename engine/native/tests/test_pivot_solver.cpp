@@ -1,0 +1,218 @@
+// The pivoting solver against enumeration of every set of bound rows, and on problems with known answers.
+#include <algorithm>
+#include <random>
+
+#include "expect.hpp"
+#include "pivot_solver.hpp"
+
+using namespace spook;
+
+namespace {
+
+Mat6 diagonal(double mass, double inertia) {
+    Mat6 m{};
+    for (int i = 0; i < 6; ++i) m[7 * i] = i < 3 ? mass : inertia;
+    return m;
+}
+
+/// Dense symmetric positive solve by Gauss elimination, independent of the engine's factorisations.
+std::vector<double> dense_solve(std::vector<std::vector<double>> a, std::vector<double> b) {
+    const int n = static_cast<int>(b.size());
+    for (int k = 0; k < n; ++k) {
+        int pivot = k;
+        for (int i = k; i < n; ++i)
+            if (std::abs(a[i][k]) > std::abs(a[pivot][k])) pivot = i;
+        std::swap(a[k], a[pivot]);
+        std::swap(b[k], b[pivot]);
+        for (int i = k + 1; i < n; ++i) {
+            const double f = a[i][k] / a[k][k];
+            for (int j = k; j < n; ++j) a[i][j] -= f * a[k][j];
+            b[i] -= f * b[k];
+        }
+    }
+    for (int k = n - 1; k >= 0; --k) {
+        for (int j = k + 1; j < n; ++j) b[k] -= a[k][j] * b[j];
+        b[k] /= a[k][k];
+    }
+    return b;
+}
+
+struct Flat {  // every row of a system, for enumeration: S z + q = w
+    std::vector<std::vector<double>> s;
+    std::vector<double> q, lower, upper;
+};
+
+Flat flatten(const MixedSystem& system) {
+    struct Row {
+        const RowBlock* block;
+        int i;
+    };
+    std::vector<Row> rows;
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) rows.push_back({&block, i});
+    auto jacobian = [&](const Row& row, int body) {
+        Vec6 j{};
+        if (row.block->first == body) j = row.block->first_jacobian[row.i];
+        if (row.block->second == body) j = row.block->second_jacobian[row.i];
+        return j;
+    };
+    Flat flat;
+    const std::size_t n = rows.size();
+    flat.s.assign(n, std::vector<double>(n, 0.0));
+    for (std::size_t r = 0; r < n; ++r) {
+        flat.q.push_back(-rows[r].block->right[rows[r].i]);
+        flat.lower.push_back(rows[r].block->lower[rows[r].i]);
+        flat.upper.push_back(rows[r].block->upper[rows[r].i]);
+        for (int b = 0; b < static_cast<int>(system.mass.size()); ++b)
+            for (int a = 0; a < 6; ++a) flat.q[r] += jacobian(rows[r], b)[a] * system.momentum[b][a] / system.mass[b][7 * a];
+        for (std::size_t c = 0; c < n; ++c) {
+            for (int b = 0; b < static_cast<int>(system.mass.size()); ++b)
+                for (int a = 0; a < 6; ++a)
+                    flat.s[r][c] += jacobian(rows[r], b)[a] * jacobian(rows[c], b)[a] / system.mass[b][7 * a];
+            if (r == c) flat.s[r][c] += rows[r].block->softness[rows[r].i];
+        }
+    }
+    return flat;
+}
+
+/// The multipliers by trying every assignment of rows to lower, free and upper; empty if none fits.
+std::vector<double> enumerate(const Flat& flat) {
+    const int n = static_cast<int>(flat.q.size());
+    int cases = 1;
+    for (int i = 0; i < n; ++i) cases *= 3;
+    for (int code = 0; code < cases; ++code) {
+        std::vector<int> state(n), free;
+        std::vector<double> z(n, 0.0);
+        bool possible = true;
+        for (int i = 0, rest = code; i < n; ++i, rest /= 3) {
+            state[i] = rest % 3;
+            if (state[i] == 0) free.push_back(i);
+            else z[i] = state[i] == 1 ? flat.lower[i] : flat.upper[i];
+            possible = possible && std::isfinite(z[i]);
+        }
+        if (!possible) continue;
+        std::vector<std::vector<double>> a(free.size(), std::vector<double>(free.size()));
+        std::vector<double> b(free.size());
+        for (std::size_t r = 0; r < free.size(); ++r) {
+            b[r] = -flat.q[free[r]];
+            for (int c = 0; c < n; ++c) b[r] -= flat.s[free[r]][c] * z[c];
+            for (std::size_t c = 0; c < free.size(); ++c) a[r][c] = flat.s[free[r]][free[c]];
+        }
+        const std::vector<double> x = dense_solve(a, b);
+        for (std::size_t r = 0; r < free.size(); ++r) z[free[r]] = x[r];
+        bool good = true;
+        for (int i = 0; i < n && good; ++i) {
+            double w = flat.q[i];
+            for (int c = 0; c < n; ++c) w += flat.s[i][c] * z[c];
+            good = state[i] == 0   ? z[i] >= flat.lower[i] - 1e-12 && z[i] <= flat.upper[i] + 1e-12
+                   : state[i] == 1 ? w >= -1e-12
+                                   : w <= 1e-12;
+        }
+        if (good) return z;
+    }
+    return {};
+}
+
+void random_systems_match_enumeration() {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (int trial = 0; trial < 400; ++trial) {
+        MixedSystem system;
+        for (int b = 0; b < 3; ++b) {
+            system.mass.push_back(diagonal(std::exp(2 * unit(random)), std::exp(2 * unit(random))));
+            Vec6 p;
+            for (double& x : p) x = unit(random);
+            system.momentum.push_back(p);
+        }
+        for (int k = 0; k < 4; ++k) {
+            RowBlock block;
+            block.size = 1 + k % 2;
+            block.first = k % 3;
+            block.second = k == 3 ? -1 : (k + 1) % 3;
+            for (int i = 0; i < block.size; ++i) {
+                for (int a = 0; a < 6; ++a) {
+                    block.first_jacobian[i][a] = unit(random);
+                    block.second_jacobian[i][a] = unit(random);
+                }
+                block.softness[i] = 1e-3;
+                block.right[i] = unit(random);
+                if (k > 0) block.lower[i] = k == 3 ? -0.1 : 0.0;
+                if (k == 3) block.upper[i] = 0.1;
+                block.state[i] = trial % 2 ? RowState::free : RowState::at_lower;
+            }
+            system.rows.push_back(block);
+        }
+        PivotSolver solver;
+        const PivotReport report = solver.solve(system);
+        EXPECT(report.converged && report.finite);
+        const std::vector<double> reference = enumerate(flatten(system));
+        EXPECT(reference.size() == 6);
+        std::size_t r = 0;
+        for (const RowBlock& block : system.rows)
+            for (int i = 0; i < block.size; ++i, ++r)
+                if (r < reference.size()) EXPECT_NEAR(block.multiplier[i], reference[r], 1e-10);
+    }
+}
+
+/// A box on four rigid corners: singular, and the least norm is wanted.
+MixedSystem four_corners(double load_offset) {
+    MixedSystem system;
+    system.mass.push_back(diagonal(2.0, 0.3));
+    system.momentum.push_back({0, 0, -1.0, 0, load_offset, 0});  // the weight of one step, off centre along x
+    for (int corner = 0; corner < 4; ++corner) {
+        const double x = corner & 1 ? 0.5 : -0.5, y = corner & 2 ? 0.5 : -0.5;
+        RowBlock block;
+        block.first = 0;
+        block.first_jacobian[0] = {0, 0, 1, y, -x, 0};
+        block.lower[0] = 0.0;
+        system.rows.push_back(block);
+    }
+    return system;
+}
+
+void four_rigid_corners_share_the_load() {
+    MixedSystem system = four_corners(0.0);
+    PivotSolver solver;
+    EXPECT(solver.solve(system).converged);
+    for (const RowBlock& block : system.rows) EXPECT_NEAR(block.multiplier[0], 0.25, 1e-10);
+    for (double v : system.velocity[0]) EXPECT_NEAR(v, 0.0, 1e-16);
+
+    system = four_corners(0.1);  // moment balance: the right pair carries .6, the left pair .4
+    EXPECT(solver.solve(system).converged);
+    for (int k = 0; k < 4; ++k) EXPECT_NEAR(system.rows[k].multiplier[0], k & 1 ? 0.3 : 0.2, 1e-9);
+
+    system = four_corners(0.7);  // tips: the left corners let go, the velocity is no longer zero
+    EXPECT(solver.solve(system).converged);
+    EXPECT(system.rows[0].multiplier[0] == 0.0 && system.rows[2].multiplier[0] == 0.0);
+    EXPECT(system.velocity[0][4] > 0.1);
+    EXPECT_NEAR(row_velocity(system.rows[1], 0, system.velocity), 0.0, 1e-16);
+}
+
+void a_kept_factor_gives_the_same_answer() {
+    MixedSystem system = four_corners(0.1);
+    PivotSolver solver;
+    solver.solve(system);
+    const std::uint64_t before = solver.counters().factorisations;
+    system.momentum[0][2] = -2.0;
+    solver.solve(system, true);
+    EXPECT(solver.counters().factorisations == before);
+    EXPECT_NEAR(system.rows[1].multiplier[0] + system.rows[0].multiplier[0], 1.0, 1e-9);
+}
+
+void nothing_silent_about_nan() {
+    MixedSystem system = four_corners(0.0);
+    system.rows[1].first_jacobian[0][2] = NAN;
+    PivotSolver solver;
+    const PivotReport report = solver.solve(system);
+    EXPECT(!report.finite || !report.converged || std::isnan(system.velocity[0][2]));
+}
+
+}  // namespace
+
+int main() {
+    random_systems_match_enumeration();
+    four_rigid_corners_share_the_load();
+    a_kept_factor_gives_the_same_answer();
+    nothing_silent_about_nan();
+    return report();
+}
