@@ -88,7 +88,7 @@ def _revisions() -> list[str]:
 
 def upgrade(engine: Engine, target: str = "head", *, keep_copy: bool = True) -> None:
     """Bring the schema to `target` in one transaction. An older SQLite file is copied beside itself first."""
-    from tracker.schema import migrate  # Alembic is imported only when there is something to do
+    from tracker.revisions import migrate  # Alembic is imported only when there is something to do
 
     with engine.connect() as connection:
         sqlite = engine.dialect.name == "sqlite"
@@ -132,10 +132,13 @@ def _engine(url: URL, readonly: bool) -> Engine:
     if not _is_file(url):
         engine = create_engine(url)
     else:
+        address = _address(url, readonly)
+
+        def connect() -> sqlite3.Connection:
+            return sqlite3.connect(address, uri=True, timeout=LOCK_TIMEOUT, check_same_thread=False)
+
         # NullPool: a connection closed is a file closed, so that the write-ahead log is folded in at the end
-        engine = create_engine(
-            _file_url(url, readonly), poolclass=NullPool, connect_args={"timeout": LOCK_TIMEOUT}
-        )
+        engine = create_engine(url, poolclass=NullPool, creator=connect)
     begin = "BEGIN" if readonly else "BEGIN IMMEDIATE"
 
     @event.listens_for(engine, "connect")
@@ -168,15 +171,14 @@ def _is_file(url: URL) -> bool:
     return url.get_backend_name() == "sqlite" and url.database not in (None, "", ":memory:")
 
 
-def _file_url(url: URL, readonly: bool) -> URL:
-    if not readonly:
-        return url
+def _address(url: URL, readonly: bool) -> str:
+    """The file as SQLite's own URI, which alone can say that nothing may be written."""
     path = Path(str(url.database)).resolve()
     log = path.with_name(path.name + "-wal")
-    options = "mode=ro"
-    if not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
-        options += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
-    return url.set(database=f"file:{quote(str(path))}?{options}&uri=true")
+    mode = "ro" if readonly else "rwc"
+    if readonly and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
+        mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
+    return f"file:{quote(str(path))}?mode={mode}"
 
 
 def _check_file(url: URL, readonly: bool) -> None:
