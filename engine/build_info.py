@@ -22,14 +22,22 @@ class BuildInfo:
 
 
 def _version(facts: dict[str, str]) -> str:
-    """From `git describe`: the tag, then commits since it and the hash, as PEP 440 wants it."""
+    """What the package build was told; else from git, as PEP 440 wants it; never a guess.
+
+    A shallow clone cannot count its commits, and an archive may not know its commit: both say so.
+    """
+    if facts["version"]:
+        return facts["version"]
+    short = "g" + facts["git_hash"][:9]
     if not facts["git_hash"]:
-        return facts["version"] or "0+unknown"
-    if facts["shallow"] == "true" and not facts["describe"]:
         return "0+unknown"
-    short, changed = "g" + facts["git_hash"][:9], ".dirty" if facts["dirty"] == "true" else ""
+    if not facts["shallow"]:
+        return f"0+archive.{short}"
+    if facts["shallow"] == "true":
+        return f"0+shallow.{short}"
+    changed = ".dirty" if facts["dirty"] == "true" else ""
     if not facts["describe"]:
-        return f"0+{short}{changed}"
+        return f"0.1.dev{facts['count']}+{short}{changed}"
     tag, distance, _ = facts["describe"].rsplit("-", 2)
     if distance == "0" and not changed:
         return tag.removeprefix("v")

@@ -56,6 +56,8 @@ def compile_particles(
     scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable]
 ) -> Program:
     """The Program of a scene that has only particles, distances and forces."""
+    if method.string_stiffness and method.solver == "iterative":
+        raise MethodError("method: string_stiffness needs the direct solver")
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     rows = {row.name: index for index, row in enumerate(scene.constraints)}
     requests, shapes = [], {}
@@ -190,6 +192,8 @@ def _choose(
     not_path = "a body has more than two rows or a loop closes" if rows else no_rows
     if "solve_block" in method.force_stages and rows:
         not_path = "solve_block was forced"
+    elif method.string_stiffness and rows:
+        not_path = "string stiffness couples the bodies of a row"
     if solver == "iterative":
         not_path = "the method asks for the iterative solver"
     half = method.half_step_velocities or method.composition != "none"
@@ -227,9 +231,7 @@ def _choose(
         choose(
             "solve_block",
             solver == "block",
-            "rows branch or close loops: sparse LDLᵀ, ordered once"
-            if "solve_block" not in method.force_stages
-            else "forced by the method",
+            f"{not_path}: sparse LDLᵀ in blocks, ordered once",
             no_rows
             if not rows
             else "rows form open paths"

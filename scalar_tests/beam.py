@@ -10,13 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from engine import (
-    PLAIN,
     Box,
     Capsule,
     Lock,
     Material,
     Maximum,
-    Method,
     Minimum,
     Position,
     RigidBody,
@@ -85,25 +83,30 @@ def scene(
 
 
 def heights(
-    simulate: Simulate, count: int, time_step: float, method: Method = PLAIN, **options: object
+    simulate: Simulate,
+    count: int = COUNT,
+    time_step: float = TIME_STEP,
+    *,
+    compliance: float = 0.0,
+    support: str = "centre",
 ) -> np.ndarray:
     """Height deviation [m] of each box: the one of largest magnitude over the last WINDOW of STEPS steps."""
     first = STEPS - WINDOW + 1
-    built = scene(count, time_step=time_step, **options)  # type: ignore[arg-type]
+    built = scene(count, time_step=time_step, compliance=compliance, support=support)
     observe = {
         "highest": Maximum(quantity=Position(), first=first, from_start=True),
         "lowest": Minimum(quantity=Position(), first=first, from_start=True),
     }
-    result = simulate(built, time_step=time_step, steps=STEPS, method=method, observe=observe)
+    result = simulate(built, time_step=time_step, steps=STEPS, observe=observe)
     highest, lowest = result["highest"][:count, 2], result["lowest"][:count, 2]
-    return np.where(np.abs(highest) > np.abs(lowest), highest, lowest)
+    return np.asarray(np.where(np.abs(highest) > np.abs(lowest), highest, lowest))
 
 
 def deviation(
-    simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, **options: object
+    simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, *, support: str = "centre"
 ) -> float:
     """Deepest height deviation over the beam's length [%], signed: negative hangs."""
-    each = heights(simulate, count, time_step, **options)
+    each = heights(simulate, count, time_step, support=support)
     return 100.0 * float(each[np.argmax(np.abs(each))]) / (count * SIZE[0])
 
 
@@ -144,7 +147,7 @@ def _measure_long(simulate: Simulate) -> dict[str, float]:
 
 
 def _measure_sag(simulate: Simulate) -> dict[str, float]:
-    each = heights(simulate, COUNT, TIME_STEP, compliance=SAG_COMPLIANCE)
+    each = heights(simulate, compliance=SAG_COMPLIANCE)
     return {"sag": float(-each.min()), "sag_error": float(-each.min()) / sag_of_compliant_beam() - 1.0}
 
 
@@ -190,8 +193,8 @@ def _draw_against_time(simulate: Simulate) -> Drawing:
 
 
 def _draw_along_the_beam(simulate: Simulate) -> Drawing:
-    rigid = heights(simulate, COUNT, TIME_STEP)
-    soft = heights(simulate, COUNT, TIME_STEP, compliance=2.2e-15)
+    rigid = heights(simulate)
+    soft = heights(simulate, compliance=2.2e-15)
     boxes = tuple(float(i + 1) for i in range(COUNT))
     return Drawing(
         curves=(

@@ -67,7 +67,7 @@ def scene(
 
 def deflection(x: np.ndarray, load: float = LOAD) -> np.ndarray:
     """Euler-Bernoulli deflection [m] at x [m], downwards: eq 3.20 of the thesis."""
-    return load * x**2 * (3.0 * LENGTH - x) / (6.0 * STIFFNESS)
+    return np.asarray(load * x**2 * (3.0 * LENGTH - x) / (6.0 * STIFFNESS))
 
 
 @functools.cache
@@ -89,7 +89,7 @@ def settled_nodes(simulate: Simulate, count: int, load: float, seconds: float = 
     """(count,) downward deflection [m] of the box centres at rest, without self-weight."""
     observe = {"nodes": Final(quantity=Position())}
     result = simulate(scene(count, load), time_step=TIME_STEP, duration=seconds, observe=observe)
-    return -result["nodes"][:, 2]
+    return np.asarray(-result["nodes"][:, 2])
 
 
 def tip_deflection(simulate: Simulate, count: int, *, self_weight: bool = False) -> float:
@@ -108,7 +108,7 @@ def tip_deflection(simulate: Simulate, count: int, *, self_weight: bool = False)
         return math.nan
     w, x, y, z = result["turn"]
     half = 0.5 * LENGTH / count
-    return -(float(result["last"][2]) + half * 2.0 * (x * z - w * y))
+    return -float(result["last"][2] + half * 2.0 * (x * z - w * y))
 
 
 def _measure_nodes(simulate: Simulate) -> dict[str, float]:

@@ -76,7 +76,7 @@ def least_norm_forces(count: int, mass: float = MASS) -> np.ndarray:
 def weight_error(held: np.ndarray, mass: float = MASS) -> np.ndarray:
     """ΔFz [%] of the weight per step, eq 3.4 of the thesis."""
     weight = mass * GRAVITY
-    return 100.0 * (held[:, :, 2].sum(axis=1) - weight) / weight
+    return np.asarray(100.0 * (held[:, :, 2].sum(axis=1) - weight) / weight)
 
 
 def _largest(values: np.ndarray) -> float:

@@ -62,7 +62,7 @@ def slide(
 def force_ratio(result: Result) -> float:
     """|Ft|/|Fn| at the last step."""
     x, y, z = result["force"][-1]
-    return math.hypot(x, y) / abs(z)
+    return math.hypot(x, y) / abs(float(z))
 
 
 def force_direction_error(result: Result, direction: float) -> float:

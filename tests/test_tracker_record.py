@@ -4,27 +4,16 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator
 
 import msgspec
 import pytest
-from sqlalchemy.orm import Session
 
 from tests.run_documents import KEY, definition, figure, run, run_of, sample, stability_map
 from tracker import document
-from tracker.database import open_database
 from tracker.document import from_number
 from tracker.errors import DatabaseError, DocumentError
 from tracker.record import record
 from tracker.series import History
-
-
-@pytest.fixture
-def session(tmp_path) -> Iterator[Session]:
-    engine = open_database(f"sqlite:///{tmp_path}/tracker.db")
-    with Session(engine) as session:
-        yield session
-    engine.dispose()
 
 
 def bits(value: float) -> bytes:

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
 
 import pytest
-from sqlalchemy.orm import Session
 
 from tests.run_documents import KEY, definition, engine, run, run_of, sample
 from tracker.ancestry import commit_order
-from tracker.database import open_database
 from tracker.errors import UnknownName
 from tracker.record import record
 from tracker.series import History
 
 A, B, C, D = ("1a" * 20, "2b" * 20, "3c" * 20, "4d" * 20)
-
-
-@pytest.fixture
-def session(tmp_path) -> Iterator[Session]:
-    database = open_database(f"sqlite:///{tmp_path}/tracker.db")
-    with Session(database) as session:
-        yield session
-    database.dispose()
 
 
 @pytest.fixture

@@ -32,7 +32,7 @@ def database_url(given: str | None = None) -> URL:
         return URL.create("sqlite", database=chosen)
     try:
         url = make_url(chosen)
-    except exc.ArgumentError:
+    except (exc.ArgumentError, ValueError):
         raise DatabaseError(
             "the database URL cannot be read; write sqlite:///FILE or postgresql://..."
         ) from None
@@ -88,7 +88,7 @@ def _revisions() -> list[str]:
 
 def upgrade(engine: Engine, target: str = "head", *, keep_copy: bool = True) -> None:
     """Bring the schema to `target` in one transaction. An older SQLite file is copied beside itself first."""
-    from tracker.schema import migrate  # Alembic is imported only when there is something to do
+    from tracker.revisions import migrate  # Alembic is imported only when there is something to do
 
     with engine.connect() as connection:
         sqlite = engine.dialect.name == "sqlite"
@@ -132,10 +132,13 @@ def _engine(url: URL, readonly: bool) -> Engine:
     if not _is_file(url):
         engine = create_engine(url)
     else:
+        address = _address(url, readonly)
+
+        def connect() -> sqlite3.Connection:
+            return sqlite3.connect(address, uri=True, timeout=LOCK_TIMEOUT, check_same_thread=False)
+
         # NullPool: a connection closed is a file closed, so that the write-ahead log is folded in at the end
-        engine = create_engine(
-            _file_url(url, readonly), poolclass=NullPool, connect_args={"timeout": LOCK_TIMEOUT}
-        )
+        engine = create_engine(url, poolclass=NullPool, creator=connect)
     begin = "BEGIN" if readonly else "BEGIN IMMEDIATE"
 
     @event.listens_for(engine, "connect")
@@ -144,8 +147,7 @@ def _engine(url: URL, readonly: bool) -> Engine:
             None  # the driver begins nothing by itself: schema changes roll back, too
         )
         pragmas = ["foreign_keys = ON", "trusted_schema = OFF", "cell_size_check = ON"]
-        if not readonly:
-            pragmas += ["journal_mode = WAL", "synchronous = FULL"]
+        pragmas += ["query_only = ON"] if readonly else ["journal_mode = WAL", "synchronous = FULL"]
         for words in pragmas:
             connection.execute(f"PRAGMA {words}")
 
@@ -168,15 +170,17 @@ def _is_file(url: URL) -> bool:
     return url.get_backend_name() == "sqlite" and url.database not in (None, "", ":memory:")
 
 
-def _file_url(url: URL, readonly: bool) -> URL:
-    if not readonly:
-        return url
+def _address(url: URL, readonly: bool) -> str:
+    """The file as SQLite's own URI, which alone can say that nothing may be written."""
     path = Path(str(url.database)).resolve()
+    mode = "rwc"
+    if readonly:
+        # where writing is possible, the last reader must be able to tidy the log away
+        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
     log = path.with_name(path.name + "-wal")
-    options = "mode=ro"
-    if not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
-        options += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
-    return url.set(database=f"file:{quote(str(path))}?{options}&uri=true")
+    if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
+        mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
+    return f"file:{quote(str(path))}?mode={mode}"
 
 
 def _check_file(url: URL, readonly: bool) -> None:

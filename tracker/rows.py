@@ -12,7 +12,7 @@ import msgspec
 
 from tracker import document
 from tracker.document import Number
-from tracker.errors import DocumentError
+from tracker.errors import DatabaseError, DocumentError
 from tracker.models import identity
 
 Row = dict[str, Any]
@@ -34,7 +34,12 @@ def packed(part: Any) -> bytes:
 
 
 def unpacked(body: bytes, kind: type[Part]) -> Part:
-    return msgspec.json.decode(zlib.decompress(body), type=kind)
+    try:
+        return msgspec.json.decode(zlib.decompress(body), type=kind)
+    except (zlib.error, msgspec.DecodeError) as error:
+        raise DatabaseError(
+            f"a stored figure or map is damaged ({error}); restore the database from a copy"
+        ) from None
 
 
 def moment(text: str) -> datetime:

@@ -16,7 +16,7 @@ if(GIT)
   # The archive may lie inside somebody else's repository: the answer counts only if this file is tracked.
   ask(inside ls-files --error-unmatch CMakeLists.txt)
 endif()
-foreach(fact hash time parents describe shallow changes)
+foreach(fact hash time parents describe shallow count changes)
   set(${fact} "")
 endforeach()
 set(dirty "")
@@ -26,6 +26,7 @@ if(inside)
   ask(parents show -s --format=%P HEAD)
   ask(describe describe --tags --long --match "[0-9]*" --match "v[0-9]*")
   ask(shallow rev-parse --is-shallow-repository)
+  ask(count rev-list --count HEAD)
   execute_process(COMMAND ${GIT} -C ${SOURCE} status --porcelain --untracked-files=no OUTPUT_VARIABLE changes
                   RESULT_VARIABLE failed ERROR_QUIET)
   if(NOT failed)
@@ -35,6 +36,13 @@ if(inside)
     endif()
   endif()
 endif()
+if(NOT hash AND EXISTS ${SOURCE}/../../.source-archive)
+  # git archive writes the commit there; a mere copy keeps the placeholder.
+  file(READ ${SOURCE}/../../.source-archive archive)
+  if(archive MATCHES "node: ([0-9a-f]+)")
+    set(hash ${CMAKE_MATCH_1})
+  endif()
+endif()
 string(REPLACE "\"" "\\\"" FLAGS "${FLAGS}")
 file(WRITE ${OUTPUT}.new "#define SPOOK_GIT_HASH \"${hash}\"
 #define SPOOK_DIRTY \"${dirty}\"
@@ -42,6 +50,7 @@ file(WRITE ${OUTPUT}.new "#define SPOOK_GIT_HASH \"${hash}\"
 #define SPOOK_PARENTS \"${parents}\"
 #define SPOOK_DESCRIBE \"${describe}\"
 #define SPOOK_SHALLOW \"${shallow}\"
+#define SPOOK_COUNT \"${count}\"
 #define SPOOK_COMPILER \"${COMPILER}\"
 #define SPOOK_FLAGS \"${FLAGS}\"
 #define SPOOK_VERSION \"${VERSION}\"

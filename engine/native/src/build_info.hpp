@@ -6,7 +6,7 @@
 
 namespace spook {
 
-/// Name and text: git_hash, dirty, commit_time, parents, describe, shallow, compiler, flags, version. Empty: not known.
+/// Name and text: git_hash, dirty, commit_time, parents, describe, shallow, count, compiler, flags, version. Empty: not known.
 std::vector<std::pair<const char*, const char*>> build_facts();
 
 }  // namespace spook

@@ -11,7 +11,8 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     : scene_(scene), h_(scene.method.time_step / scene.method.substeps) {
     const std::vector<Path> paths = find_paths(scene);
     if (!scene.rows.empty()) {
-        solver_ = paths.empty() || scene.method.force_block ? ParticleSolver::block : ParticleSolver::path;
+        solver_ = paths.empty() || scene.method.force_block || scene.method.string_stiffness
+                      ? ParticleSolver::block : ParticleSolver::path;
         if (scene.method.iterative) solver_ = ParticleSolver::iterative;
     }
     node_of_body_.assign(scene.bodies.size(), -1);
@@ -42,14 +43,12 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     moving_forces_ = !scene.fields.empty() || !springs_.empty();
     v_.resize(x_.size());
     kick_ = steady_kick_;
-    before_.resize(x_.size());
+    trial_.resize(x_.size());
     seen_v_.resize(x_.size());
     link_.resize(row_.size());
     seen_lambda_.resize(row_.size());
-    scratch_.resize(row_.size());
-    solution_.resize(row_.size());
     first_rhs_.resize(row_.size());
-    if (solver_ == ParticleSolver::block) dense_.resize(static_cast<int>(row_.size()));
+    if (solver_ == ParticleSolver::block) analyse_blocks();
     block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps), 1, 4096);
 }
 
@@ -103,6 +102,7 @@ void ParticleSystem::reset(StageClock* clock) {
     velocity_ready_ = false;
     sweeps_ = 0;
     residual_ = 0.0;
+    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
     for (int body = 0; body < bodies(); ++body) {
         x_[node_of_body_[body]] = scene_.bodies[body].position;
         v_[node_of_body_[body]] = scene_.bodies[body].velocity;
@@ -111,7 +111,6 @@ void ParticleSystem::reset(StageClock* clock) {
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
     if (scene_.method.half_step_velocities) half_kick_back();
-    before_ = v_;
     save();
 }
 
@@ -166,6 +165,7 @@ void ParticleSystem::velocity_stage() {
     }
     if (solver_ != ParticleSolver::none) {
         assemble_rows();
+        if (scene_.method.corrections > 0) bend_rows_back();
         mark<Timed>(Stage::assemble_rows);
         if (solver_ == ParticleSolver::iterative) {
             solve_iterative();
@@ -179,7 +179,7 @@ void ParticleSystem::velocity_stage() {
             correct_curvature();
             mark<Timed>(Stage::correct_curvature);
         }
-        apply_impulses();
+        add_impulses(v_);
     }
     for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += kick_[node];
     mark<Timed>(Stage::apply_gravity);
@@ -231,20 +231,7 @@ void ParticleSystem::assemble_rows() noexcept {
 
 void ParticleSystem::factor() {
     if (solver_ == ParticleSolver::path) return factor_path();
-    dense_.clear();
-    const int n = static_cast<int>(row_.size());
-    for (int i = 0; i < n; ++i) {
-        dense_.at(i, i) = row_[i].diagonal;
-        for (int j = 0; j < i; ++j) {
-            double along = 0.0;
-            if (row_[i].a == row_[j].a) along += w_[row_[i].a];
-            if (row_[i].b == row_[j].b) along += w_[row_[i].b];
-            if (row_[i].a == row_[j].b) along -= w_[row_[i].a];
-            if (row_[i].b == row_[j].a) along -= w_[row_[i].b];
-            if (along != 0.0) dense_.at(i, j) = along * dot(link_[i].u, link_[j].u);
-        }
-    }
-    dense_.factor(scene_.method.floor);
+    factor_blocks();
 }
 
 void ParticleSystem::factor_path() noexcept {
@@ -263,11 +250,9 @@ void ParticleSystem::factor_path() noexcept {
     }
 }
 
-void ParticleSystem::back_substitute() noexcept {
+void ParticleSystem::back_substitute() {
     if (solver_ == ParticleSolver::path) return solve_path();
-    for (std::size_t k = 0; k < row_.size(); ++k) scratch_[k] = link_[k].rhs;
-    dense_.solve(scratch_.data(), solution_.data(), scene_.method.refinements);
-    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].lambda = solution_[k];
+    solve_blocks();
 }
 
 void ParticleSystem::solve_path() noexcept {
@@ -284,11 +269,11 @@ void ParticleSystem::solve_path() noexcept {
 
 /// Projected Gauss–Seidel on the Schur form, warm started with the last step's impulses.
 void ParticleSystem::solve_iterative() noexcept {
-    std::fill(before_.begin(), before_.end(), Vec3{});  // M⁻¹ Gᵀ λ
+    std::fill(trial_.begin(), trial_.end(), Vec3{});  // M⁻¹ Gᵀ λ
     for (std::size_t k = 0; k < row_.size(); ++k) {
         const Vec3 impulse = link_[k].lambda * link_[k].u;
-        before_[row_[k].a] -= w_[row_[k].a] * impulse;
-        before_[row_[k].b] += w_[row_[k].b] * impulse;
+        trial_[row_[k].a] -= w_[row_[k].a] * impulse;
+        trial_[row_[k].b] += w_[row_[k].b] * impulse;
     }
     for (int sweep = 0; sweep < scene_.method.iterations; ++sweep) {
         double worst = 0.0;
@@ -296,61 +281,74 @@ void ParticleSystem::solve_iterative() noexcept {
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
-            const double residual = link.rhs - dot(link.u, before_[row.b] - before_[row.a]) - row.softness * link.lambda;
+            const double residual = link.rhs - dot(link.u, trial_[row.b] - trial_[row.a]) - row.softness * link.lambda;
             worst = std::max(worst, std::fabs(residual));
             const double change = residual / row.diagonal;
             link.lambda += change;
-            before_[row.a] -= (w_[row.a] * change) * link.u;
-            before_[row.b] += (w_[row.b] * change) * link.u;
+            trial_[row.a] -= (w_[row.a] * change) * link.u;
+            trial_[row.b] += (w_[row.b] * change) * link.u;
         }
         residual_ = worst;
         if (worst <= scene_.method.residual_tolerance) break;
     }
 }
 
-/// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊], c₋ from where the
-/// row came, c₊ from where the uncorrected step would take it, both without cancellation:
-/// |d + s| − |d| − u·s = (s² − (u·s)²) / (|d + s| + |d| + u·s). Each c is capped at a fraction of the length.
+namespace {
+
+/// |d + s| − |d| − u·s without cancellation: (s² − (u·s)²) / (|d + s| + |d| + u·s), never negative.
+double curvature(Vec3 u, double length, Vec3 s) noexcept {
+    const double along = dot(u, s), across = std::max(0.0, dot(s, s) - along * along), moved = length + along;
+    return across == 0.0 ? 0.0 : across / (std::sqrt(moved * moved + across) + moved);
+}
+
+}  // namespace
+
+/// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊]. c₋, from where the row
+/// came, is known before the first solve; c₊ is where that solve, then the corrected one, would take it. Each is
+/// capped at a fraction of the rest length.
+void ParticleSystem::bend_rows_back() noexcept {
+    for (std::size_t k = 0; k < row_.size(); ++k) {
+        const Row& row = row_[k];
+        Link& link = link_[k];
+        const double cap = scene_.method.correction_cap * row.rest;
+        const double back = std::min(cap, curvature(link.u, link.length, -h_ * (v_[row.b] - v_[row.a])));
+        link.rhs -= row.violation_gain * 0.25 * back;
+        first_rhs_[k] = link.rhs;
+    }
+}
+
 void ParticleSystem::correct_curvature() {
-    const auto curvature = [](const Link& link, Vec3 s) {
-        const double along = dot(link.u, s), across = std::max(0.0, dot(s, s) - along * along);
-        const double moved = link.length + along;
-        const double length = std::sqrt(moved * moved + across);
-        return across == 0.0 ? 0.0 : across / (length + moved);
-    };
-    for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
     for (int round = 0; round < scene_.method.corrections; ++round) {
-        before_ = v_;
-        for (std::size_t node = 0; node < v_.size(); ++node) before_[node] += kick_[node];
-        for (std::size_t k = 0; k < row_.size(); ++k) {
-            const Vec3 impulse = link_[k].lambda * link_[k].u;
-            before_[row_[k].a] -= w_[row_[k].a] * impulse;
-            before_[row_[k].b] += w_[row_[k].b] * impulse;
-        }
+        for (std::size_t node = 0; node < v_.size(); ++node) trial_[node] = v_[node] + kick_[node];
+        add_impulses(trial_);
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
             const double cap = scene_.method.correction_cap * row.rest;
-            const double back = std::min(cap, curvature(link, -h_ * (v_[row.b] - v_[row.a])));
-            const double ahead = std::min(cap, curvature(link, h_ * (before_[row.b] - before_[row.a])));
-            link.rhs = first_rhs_[k] -
-                       (4.0 / h_) * row.upsilon * (0.25 * (ahead + back) + row.relaxation * ahead);
+            const double ahead = std::min(cap, curvature(link.u, link.length, h_ * (trial_[row.b] - trial_[row.a])));
+            link.rhs = first_rhs_[k] - row.violation_gain * (0.25 + row.relaxation) * ahead;
         }
         if (solver_ == ParticleSolver::iterative) solve_iterative();
         else back_substitute();
     }
 }
 
-void ParticleSystem::apply_impulses() noexcept {
+void ParticleSystem::add_impulses(std::vector<Vec3>& v) const noexcept {
+    if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) {
+        for (std::size_t node = 0; node < v.size(); ++node)
+            if (block_of_node_[node] >= 0) v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
+        return;
+    }
     for (std::size_t k = 0; k < row_.size(); ++k) {
         const Row& row = row_[k];
         const Vec3 impulse = link_[k].lambda * link_[k].u;
-        v_[row.a] -= w_[row.a] * impulse;
-        v_[row.b] += w_[row.b] * impulse;
+        v[row.a] -= w_[row.a] * impulse;
+        v[row.b] += w_[row.b] * impulse;
     }
 }
 
-/// v −= (h/2) a with the constrained acceleration: the row's right side gets −h Ġ v = −h v_across²/|d|.
+/// v −= (h/2) a with the constrained acceleration. The row's right side gets −(2/h) c₋, c₋ the curvature on the
+/// way back; with v constant that is −h Ġ v, found first, and with curved constraints it is iterated.
 void ParticleSystem::half_kick_back() {
     kick_ = steady_kick_;
     if (!scene_.fields.empty()) apply_central_gravity();
@@ -358,23 +356,28 @@ void ParticleSystem::half_kick_back() {
     const std::vector<Vec3> start = v_;
     if (solver_ != ParticleSolver::none) {
         assemble_rows();
-        for (std::size_t k = 0; k < row_.size(); ++k) {
-            const Vec3 s = v_[row_[k].b] - v_[row_[k].a];
-            const double along = dot(link_[k].u, s);
-            link_[k].rhs -= h_ * (dot(s, s) - along * along) / link_[k].length;
+        if (solver_ != ParticleSolver::iterative) factor();
+        for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
+        for (int round = 0; round <= 3 * scene_.method.corrections; ++round) {
+            for (std::size_t k = 0; k < row_.size(); ++k) {
+                const Row& row = row_[k];
+                const double back =
+                    curvature(link_[k].u, link_[k].length, -h_ * (v_[row.b] - v_[row.a]));
+                link_[k].rhs = first_rhs_[k] - (2.0 / h_) * back;
+            }
+            if (solver_ == ParticleSolver::iterative) solve_iterative();
+            else back_substitute();
+            v_ = start;
+            add_impulses(v_);
+            for (std::size_t node = 0; node < v_.size(); ++node)
+                v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
         }
-        if (solver_ == ParticleSolver::iterative) solve_iterative();
-        else {
-            factor();
-            back_substitute();
-        }
-        apply_impulses();
+    } else {
+        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] -= 0.5 * kick_[node];
     }
-    for (std::size_t node = 0; node < v_.size(); ++node)
-        v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
     for (Link& link : link_) link.lambda = 0.0;
-    std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     sweeps_ = 0;
+    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
 }
 
 // --- sampling, checking, going back ---------------------------------------------------------------------
@@ -440,8 +443,10 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
         solver_ == ParticleSolver::path || solver_ == ParticleSolver::block ? inner * passes : 0;
     std::int64_t blocks = 0;
     if (solver_ == ParticleSolver::path) blocks = 2 * rows - static_cast<std::int64_t>(path_first_.size()) + 1;
-    if (solver_ == ParticleSolver::block) blocks = rows * (rows + 1) * (rows + 2) / 6;
     report.counters["block_operations"] = inner * blocks;
+    if (solver_ == ParticleSolver::block)
+        report.counters["block_operations"] =
+            static_cast<std::int64_t>(ldlt_.counters().block_operations) - operations_at_start_;
     report.residual = residual_;
 }
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dense_ldlt.hpp"
+#include "block_ldlt.hpp"
 #include "particle_scene.hpp"
 #include "path_order.hpp"
 #include "recorder.hpp"
@@ -18,6 +18,8 @@
 #include "stage_clock.hpp"
 
 namespace spook {
+
+inline Vec3 vec_at(const double* p) noexcept { return {p[0], p[1], p[2]}; }
 
 class ParticleSystem {
 public:
@@ -82,12 +84,17 @@ private:
     void apply_springs() noexcept;
     void assemble_rows() noexcept;
     void factor();
-    void back_substitute() noexcept;
+    void back_substitute();
     void factor_path() noexcept;
+    void analyse_blocks();
+    void factor_blocks();
+    void stiffen_strings();
+    void solve_blocks();
     void solve_path() noexcept;
     void solve_iterative() noexcept;
+    void bend_rows_back() noexcept;
     void correct_curvature();
-    void apply_impulses() noexcept;
+    void add_impulses(std::vector<Vec3>& v) const noexcept;
 
     ParticleScene scene_;
     double h_;  // s, of a substep
@@ -97,22 +104,32 @@ private:
     std::int64_t block_ = 1024;
 
     // nodes
-    std::vector<Vec3> x_, v_, kick_, steady_kick_, seen_v_, before_;
+    std::vector<Vec3> x_, v_, kick_, steady_kick_, seen_v_, trial_;
     std::vector<double> w_;  // inverse mass, 1/kg
     std::vector<int> node_of_body_, body_of_node_;
     // rows, in path order if they form paths
     std::vector<Row> row_;
     std::vector<Link> link_;
-    std::vector<double> seen_lambda_, scratch_, solution_, first_rhs_;
+    std::vector<double> seen_lambda_, first_rhs_;
     std::vector<int> slot_of_row_, path_first_;  // path p has rows path_first_[p] … path_first_[p+1] − 1
     std::vector<SpringNodes> springs_;
-    DenseLdlt dense_;
+    // the saddle system [[M, Gᵀ], [G, −Sig]] of rows that branch, close loops or stiffen the bodies
+    struct RowBlocks {
+        int row, a, b;  // block of the row, edges to its bodies; −1 where a world point stands
+        int between;    // edge between its bodies, for string stiffness
+    };
+    BlockLdlt ldlt_;
+    std::vector<int> block_of_node_;
+    std::vector<RowBlocks> row_blocks_;
+    std::vector<double> saddle_rhs_, saddle_;
+    std::int64_t operations_at_start_ = 0;
+    bool solvable_ = true;  // false: the factor met a value that is not finite, so nothing it gives is used
     double residual_ = 0.0;
     std::int64_t sweeps_ = 0;
 
     struct Snapshot {
-        std::vector<Vec3> x, v, before;
-        std::vector<double> lambda, seen_lambda;
+        std::vector<Vec3> x, v;
+        std::vector<double> lambda;
         bool velocity_ready = false;
         std::int64_t sweeps = 0;
         double residual = 0.0;

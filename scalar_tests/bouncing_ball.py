@@ -1,0 +1,239 @@
+"""Does a ball bounce as high as its restitution allows, and come to rest in time?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from engine import Energy, Maximum, Plane, Position, RigidBody, Scene, Sphere, Trace, Velocity
+from engine.bodies import Material
+from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+
+RADIUS = 0.1  # m
+MASS = 1.0  # kg
+GRAVITY = 9.81  # m/s²
+HEIGHT = 1.0  # m, gap at the start
+RESTITUTION = 0.8
+TIME_STEP = 1e-3  # s
+BOUNCES = 5
+FALL = math.sqrt(2.0 * HEIGHT / GRAVITY)  # s, the first fall
+STOP = FALL * (1.0 + RESTITUTION) / (1.0 - RESTITUTION)  # s
+IMPACT_SPEED = math.sqrt(2.0 * GRAVITY * HEIGHT)  # m/s
+
+
+def scene(restitution: float = RESTITUTION) -> Scene:
+    """A ball above a plane, at rest."""
+    rubber = Material(restitution=restitution)
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rubber)
+    ball = RigidBody(
+        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS + HEIGHT), material=rubber
+    )
+    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def gaps(simulate: Simulate, time_step: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and gap [m] between ball and floor."""
+    result = simulate(
+        scene(), time_step=time_step, duration=duration, observe={"place": Trace(quantity=Position("ball"))}
+    )
+    return result.sample_times["place"], result["place"][:, 2] - RADIUS
+
+
+def bounce_heights(simulate: Simulate, time_step: float = TIME_STEP) -> np.ndarray:
+    """(BOUNCES,) peak gap [m] after each bounce."""
+    _, gap = gaps(simulate, time_step, 0.95 * STOP)
+    rising = np.diff(gap) > 0.0
+    peaks = np.nonzero(rising[:-1] & ~rising[1:])[0] + 1
+    heights = gap[peaks]
+    if len(heights) < BOUNCES:
+        return np.full(BOUNCES, np.nan)
+    return np.asarray(heights[:BOUNCES])
+
+
+def expected_heights() -> np.ndarray:
+    """(BOUNCES,) e^(2n) h₀ [m]."""
+    return np.asarray(HEIGHT * RESTITUTION ** (2.0 * np.arange(1, BOUNCES + 1)))
+
+
+def _measure_heights(simulate: Simulate) -> dict[str, float]:
+    return {"height_error": float(np.abs(bounce_heights(simulate) / expected_heights() - 1.0).max())}
+
+
+def _measure_stop(simulate: Simulate) -> dict[str, float]:
+    times, gap = gaps(simulate, TIME_STEP, 2.0 * STOP)
+    moving = np.nonzero(gap > 1e-4)[0]
+    stop = times[moving[-1] + 1] if moving[-1] + 1 < len(times) else math.inf
+    return {"stop_time_error": float(stop) / STOP - 1.0, "rest_gap": float(gap[-1])}
+
+
+def _measure_energy(simulate: Simulate) -> dict[str, float]:
+    result = simulate(
+        scene(),
+        time_step=TIME_STEP,
+        duration=2.0 * STOP,
+        observe={"energy": Maximum(quantity=Energy(), from_start=True)},
+    )
+    return {"energy_gain": float(result["energy"]) / (MASS * GRAVITY * HEIGHT)}
+
+
+def _measure_rebound(simulate: Simulate) -> dict[str, float]:
+    result = simulate(
+        scene(),
+        time_step=TIME_STEP,
+        duration=1.5 * FALL,
+        observe={"speed": Trace(quantity=Velocity("ball"))},
+    )
+    speed = result["speed"][:, 2]
+    hit = int(np.argmax(np.diff(speed) > 0.0))
+    rebound = speed[hit + 1] + GRAVITY * TIME_STEP  # the step that bounces also falls for one time step
+    return {"rebound_error": float(rebound / (-RESTITUTION * speed[hit])) - 1.0}
+
+
+def _draw_heights(simulate: Simulate) -> Drawing:
+    times, gap = gaps(simulate, TIME_STEP, 1.2 * STOP)
+    every = slice(None, None, 5)
+    return Drawing(
+        curves=(
+            Curve(
+                name="gap", x=tuple(map(float, times[every])), y=tuple(map(float, gap[every])), style="line"
+            ),
+            Curve(name="stop time t₀(1+e)/(1−e)", x=(STOP, STOP), y=(0.0, HEIGHT), style="reference"),
+        ),
+        x_label="time [s]",
+        y_label="gap between ball and floor [m]",
+    )
+
+
+def _draw_order(simulate: Simulate) -> Drawing:
+    steps = (4e-3, 2e-3, 1e-3, 5e-4)
+    errors = tuple(float(np.abs(bounce_heights(simulate, h) / expected_heights() - 1.0).max()) for h in steps)
+    return Drawing(
+        curves=(
+            Curve(name="largest error of five heights", x=steps, y=errors),
+            Curve(
+                name="first order",
+                x=steps,
+                y=tuple(errors[0] * h / steps[0] for h in steps),
+                style="reference",
+            ),
+        ),
+        x_label="time step [s]",
+        y_label="relative error of the height",
+        x_scale="log",
+        y_scale="log",
+        note="An impact is met up to one step off, so single points scatter about first order.",
+    )
+
+
+TEST = ScalarTest(
+    title="Bouncing ball",
+    question="Does a ball bounce as high as its restitution allows, and come to rest in time?",
+    why="Impacts are where engines gain or lose energy by accident, and where a ball may jitter for ever.",
+    model="A ball falls from rest on a plane with restitution 0.8 and bounces until it stops.",
+    parameters=(
+        ("ball", "radius 0.1 m, 1 kg"),
+        ("gap at the start", "1 m"),
+        ("restitution", "e = 0.8"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1e-3 s"),
+    ),
+    theory=(
+        "Impact: v₊ = −e v₋. Height after n bounces: e²ⁿ h₀.",
+        "The bounces end at t₀ (1 + e)/(1 − e), t₀ = √(2 h₀/g).",
+        "An impact is met up to one step early or late: the height is off by up to h v per bounce.",
+    ),
+    reference="Newton's impact law and free fall (closed form).",
+    conclusion="Green: impacts neither gain nor lose. Red: penetration turns into speed, or restitution depends on phase.",
+    source="thesis, section 5.4 (asked for)",
+    measurements=(
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="height_error",
+                    description="largest relative error of the first five heights",
+                    unit="1",
+                    role="gate",
+                    limit=BOUNCES * TIME_STEP * IMPACT_SPEED / HEIGHT * 2.0,
+                    limit_source="five impacts, each met up to one step off: 5 · 2 h v/h₀",
+                    reference=0.0,
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=_measure_heights,
+            note="Impact stage with restitution, resting stage after it.",
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="rebound_error",
+                    description="relative error of the speed after the first impact",
+                    unit="1",
+                    role="companion",
+                    limit=1e-12,
+                    limit_source="v₊ = −e v₋, exact in the impact stage",
+                    reference=0.0,
+                    tolerance=1e-14,
+                ),
+            ),
+            measure=_measure_rebound,
+            note="Impact stage alone.",
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="stop_time_error",
+                    description="relative error of the time at which the gap stays under 1e-4 m",
+                    unit="1",
+                    role="companion",
+                    limit=0.05,
+                    limit_source="the last bounces are shorter than a few steps",
+                    reference=0.0,
+                    tolerance=1e-9,
+                ),
+                Metric(
+                    name="rest_gap",
+                    description="gap at the end: the ball rests on the floor",
+                    unit="m",
+                    role="companion",
+                    limit=1e-6,
+                    limit_source="rigid contact",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=_measure_stop,
+            note="Twice the time the bounces should take.",
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="energy_gain",
+                    description="largest energy above the start, over m g h₀",
+                    unit="1",
+                    role="companion",
+                    better="smaller",
+                    limit=0.5 * TIME_STEP * IMPACT_SPEED / HEIGHT,
+                    limit_source="the symplectic step reads energy off by up to ½ m g h v",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=_measure_energy,
+            note="Twice the time the bounces should take.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    figures=(
+        Figure(name="heights", title="Bounces", draw=_draw_heights),
+        Figure(name="order", title="Error of the heights against the time step", draw=_draw_order),
+    ),
+)

@@ -1,0 +1,149 @@
+"""Does every contact of a stack carry exactly what lies above it?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine import Box, ContactForce, Energy, Maximum, Plane, Position, RigidBody, Scene, Trace
+from engine.bodies import Material
+from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+
+COUNT = 20
+EDGE = 1.0  # m
+MASS = 1.0  # kg
+GRAVITY = 9.81  # m/s²
+TIME_STEP = 1.0 / 60.0  # s
+STEPS = 600  # 10 s
+
+
+def scene(count: int = COUNT) -> Scene:
+    """`count` equal boxes on top of each other, at rest, on a plane."""
+    smooth = Material(friction=0.5)
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
+    boxes = (
+        RigidBody(
+            name=f"box {i + 1}",
+            mass=MASS,
+            shape=Box((EDGE, EDGE, EDGE)),
+            position=(0.0, 0.0, (i + 0.5) * EDGE),
+            material=smooth,
+        )
+        for i in range(count)
+    )
+    return Scene(bodies=(floor, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def loads(simulate: Simulate, count: int = COUNT) -> np.ndarray:
+    """(count,) upward force [N] on each box from what lies under it, after STEPS steps."""
+    below = ["floor", *(f"box {i}" for i in range(1, count))]
+    observe = {
+        f"box {i + 1}": Trace(quantity=ContactForce(f"box {i + 1}", below[i]), first=STEPS)
+        for i in range(count)
+    }
+    result = simulate(scene(count), time_step=TIME_STEP, steps=STEPS, observe=observe)
+    return np.array([result[name][-1, 2] for name in observe])
+
+
+def expected(count: int = COUNT) -> np.ndarray:
+    """(count,) weight [N] of each box and all above it."""
+    return MASS * GRAVITY * np.arange(count, 0, -1.0)
+
+
+def _measure_loads(simulate: Simulate) -> dict[str, float]:
+    return {"load_error": float(np.abs(loads(simulate) / expected() - 1.0).max())}
+
+
+def _measure_energy(simulate: Simulate) -> dict[str, float]:
+    observe = {
+        "energy": Maximum(quantity=Energy(), from_start=True),
+        "drift": Trace(quantity=Position(), first=STEPS, from_start=True),
+    }
+    result = simulate(scene(), time_step=TIME_STEP, steps=STEPS, observe=observe)
+    scale = MASS * GRAVITY * EDGE
+    return {
+        "energy_gain": float(result["energy"]) / scale,
+        "drift": float(np.abs(result["drift"]).max()),
+    }
+
+
+def _draw_loads(simulate: Simulate) -> Drawing:
+    contacts = tuple(float(i + 1) for i in range(COUNT))
+    return Drawing(
+        curves=(
+            Curve(name="simulation", x=contacts, y=tuple(map(float, loads(simulate))), style="points"),
+            Curve(name="(N − i + 1) m g", x=contacts, y=tuple(map(float, expected())), style="reference"),
+        ),
+        x_label="contact, from the floor up",
+        y_label="force [N]",
+    )
+
+
+TEST = ScalarTest(
+    title="Resting stack",
+    question="Does every contact of a stack of 20 boxes carry exactly what lies above it?",
+    why="Iterative solvers pass the weight down one contact per sweep; a tall stack shows what is still missing.",
+    model="20 equal boxes stand on each other on a plane, at rest, for ten seconds.",
+    parameters=(
+        ("boxes", "20, 1 × 1 × 1 m, 1 kg"),
+        ("gravity", "9.81 m/s²"),
+        ("friction coefficient", "0.5"),
+        ("time step", "1/60 s, 600 steps"),
+    ),
+    theory=("Contact i carries F_i = (N − i + 1) m g.", "Nothing moves, so no energy is gained."),
+    reference="Statics (closed form).",
+    conclusion="Green: contacts are solved, not approached. Red: the solver stops early or lets the stack breathe.",
+    source="ours; the thesis asks for larger contact scenes in section 5.4",
+    measurements=(
+        Measurement(
+            configuration="direct",
+            time_step=TIME_STEP,
+            parameters={"N": COUNT},
+            metrics=(
+                Metric(
+                    name="load_error",
+                    description="largest relative error of a contact's force after 10 s",
+                    unit="1",
+                    role="gate",
+                    limit=1e-9,
+                    limit_source="statics, to rounding",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=_measure_loads,
+            note="Direct solver.",
+        ),
+        Measurement(
+            configuration="direct",
+            time_step=TIME_STEP,
+            parameters={"N": COUNT},
+            metrics=(
+                Metric(
+                    name="energy_gain",
+                    description="largest energy above the start in 10 s, over m g times one edge",
+                    unit="1",
+                    role="companion",
+                    better="smaller",
+                    limit=1e-9,
+                    limit_source="a stack at rest gains nothing",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+                Metric(
+                    name="drift",
+                    description="largest displacement of any box in 10 s",
+                    unit="m",
+                    role="companion",
+                    limit=1e-9,
+                    limit_source="a stack at rest stays where it is",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=_measure_energy,
+            note="Direct solver.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    figures=(Figure(name="loads", title="Force of every contact", draw=_draw_loads),),
+)

@@ -1,0 +1,137 @@
+"""Does a sphere on a slope roll while friction can hold its contact, and slide beyond?"""
+
+from __future__ import annotations
+
+import math
+
+from engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Velocity
+from engine.bodies import Material
+from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+
+RADIUS = 0.5  # m
+MASS = 1.0  # kg
+GRAVITY = 10.0  # m/s²
+FRICTION = 0.2
+TIME_STEP = 1.0 / 60.0  # s
+STEPS = 120
+ROLLING, SLIDING = 0.4, 1.0  # tan θ; a solid sphere rolls up to 3.5 µ = 0.7
+
+
+def scene(slope: float) -> Scene:
+    """A sphere at rest on a level plane under gravity tilted by atan(slope) towards +x."""
+    tilt = math.atan(slope)
+    rough = Material(friction=FRICTION)
+    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    ball = RigidBody(
+        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=rough
+    )
+    return Scene(bodies=(plane, ball), gravity=(GRAVITY * math.sin(tilt), 0.0, -GRAVITY * math.cos(tilt)))
+
+
+def accelerations(slope: float) -> tuple[float, float]:
+    """Linear [m/s²] and angular [rad/s²] acceleration of a solid sphere on the slope (closed form)."""
+    tilt = math.atan(slope)
+    if slope <= 3.5 * FRICTION:
+        linear = 5.0 / 7.0 * GRAVITY * math.sin(tilt)
+        return linear, linear / RADIUS
+    normal = GRAVITY * math.cos(tilt)
+    return GRAVITY * math.sin(tilt) - FRICTION * normal, 2.5 * FRICTION * normal / RADIUS
+
+
+def speeds(simulate: Simulate, slope: float) -> tuple[float, float]:
+    """Speed [m/s] down the slope and spin [rad/s] after STEPS steps."""
+    observe = {
+        "velocity": Final(quantity=Velocity("ball")),
+        "spin": Final(quantity=AngularVelocity("ball")),
+    }
+    result = simulate(scene(slope), time_step=TIME_STEP, steps=STEPS, observe=observe)
+    return float(result["velocity"][0]), float(result["spin"][1])
+
+
+def _measure(simulate: Simulate) -> dict[str, float]:
+    seconds = STEPS * TIME_STEP
+    values = {}
+    for name, slope in (("rolling", ROLLING), ("sliding", SLIDING)):
+        linear, angular = accelerations(slope)
+        speed, spin = speeds(simulate, slope)
+        values[f"{name}_speed_error"] = speed / (linear * seconds) - 1.0
+        values[f"{name}_spin_error"] = spin / (angular * seconds) - 1.0
+    return values
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    slopes = tuple(0.1 * i for i in range(1, 13))
+    seconds = STEPS * TIME_STEP
+    found = [speeds(simulate, slope) for slope in slopes]
+    right = [accelerations(slope) for slope in slopes]
+    return Drawing(
+        curves=(
+            Curve(name="speed", x=slopes, y=tuple(speed for speed, _ in found), style="points"),
+            Curve(
+                name="radius × spin", x=slopes, y=tuple(RADIUS * spin for _, spin in found), style="points"
+            ),
+            Curve(
+                name="speed, closed form", x=slopes, y=tuple(a * seconds for a, _ in right), style="reference"
+            ),
+            Curve(
+                name="radius × spin, closed form",
+                x=slopes,
+                y=tuple(RADIUS * b * seconds for _, b in right),
+                style="reference",
+            ),
+        ),
+        x_label="tan θ",
+        y_label="speed after two seconds [m/s]",
+        note="The curves part at tan θ = 3.5 µ = 0.7, where rolling ends.",
+    )
+
+
+def _metric(name: str, description: str, role: str) -> Metric:
+    return Metric(
+        name=name,
+        description=description,
+        unit="1",
+        role=role,  # type: ignore[arg-type]
+        limit=1e-9,
+        limit_source="closed form; constant acceleration is exact in the velocities",
+        reference=0.0,
+        tolerance=1e-12,
+    )
+
+
+TEST = ScalarTest(
+    title="Rolling and sliding sphere",
+    question="Does a sphere on a slope roll while friction can hold its contact, and slide beyond?",
+    why="Rolling couples friction, rotation and translation: any error in one of them shows as a wrong acceleration.",
+    model="A solid sphere starts from rest on a plane under tilted gravity; speed and spin are read after 2 s.",
+    parameters=(
+        ("sphere", "radius 0.5 m, 1 kg, solid"),
+        ("friction coefficient", "µ = 0.2"),
+        ("gravity", "10 m/s²"),
+        ("slopes", "tan θ = 0.4 (rolls) and 1.0 (slides)"),
+        ("time step", "1/60 s, 120 steps"),
+    ),
+    theory=(
+        "Rolls iff tan θ ≤ 3.5 µ: a = (5/7) g sin θ, α = a/r.",
+        "Slides beyond: a = g (sin θ − µ cos θ), α = 2.5 µ g cos θ / r.",
+    ),
+    reference="Rigid-body mechanics (closed form).",
+    conclusion="Green: friction and rotation agree. Red: inertia, friction bound or lever is wrong.",
+    source="ours",
+    measurements=(
+        Measurement(
+            configuration="cone",
+            time_step=TIME_STEP,
+            metrics=(
+                _metric("rolling_speed_error", "relative error of the speed when rolling", "gate"),
+                _metric("rolling_spin_error", "relative error of the spin when rolling", "companion"),
+                _metric("sliding_speed_error", "relative error of the speed when sliding", "companion"),
+                _metric("sliding_spin_error", "relative error of the spin when sliding", "companion"),
+            ),
+            measure=_measure,
+            note="Cone friction, direct solver.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(ROLLING), time_step=TIME_STEP),
+    figures=(Figure(name="speed-against-slope", title="Speed and spin against slope", draw=_draw),),
+)

@@ -1,0 +1,202 @@
+"""Does a free body spinning about its middle axis flip as often as it should, and lose nothing?
+
+The intermediate-axis theorem (Dzhanibekov's wing nut): energy and angular momentum fix the period of the flips,
+so a scheme that loses either is found out by the clock.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from scipy.special import ellipk
+
+from engine import (
+    AngularMomentum,
+    AngularVelocity,
+    KineticEnergy,
+    MaximumAbsolute,
+    Orientation,
+    RigidBody,
+    Scene,
+    Trace,
+)
+from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+
+INERTIA = (0.9144, 1.098, 1.66)  # kg m²
+SPIN = (0.05, 1.0, 0.05)  # rad/s, body axes
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 200.0  # s
+
+
+def scene() -> Scene:
+    """One body, no force at all."""
+    body = RigidBody(name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=SPIN)
+    return Scene(bodies=(body,))
+
+
+@functools.cache
+def flip_time() -> float:
+    """Time [s] between two flips: half the period of Jacobi's sn (Landau and Lifshitz, Mechanics, § 37)."""
+    first, second, third = INERTIA
+    moments, spin = np.array(INERTIA), np.array(SPIN)
+    energy2 = float(np.sum(moments * spin**2))  # 2 E
+    momentum2 = float(np.sum((moments * spin) ** 2))  # L²
+    if momentum2 < energy2 * second:
+        first, third = third, first
+    rate2 = (third - second) * (momentum2 - energy2 * first) / (first * second * third)
+    modulus2 = (
+        (second - first) * (energy2 * third - momentum2) / ((third - second) * (momentum2 - energy2 * first))
+    )
+    return float(2.0 * ellipk(modulus2) / np.sqrt(rate2))
+
+
+def body_spin(simulate: Simulate, time_step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and (samples, 3) angular velocity [rad/s] in body axes."""
+    observe = {
+        "spin": Trace(quantity=AngularVelocity("body")),
+        "turn": Trace(quantity=Orientation("body")),
+    }
+    result = simulate(scene(), time_step=time_step, duration=DURATION, observe=observe)
+    w, axis = result["turn"][:, :1], -result["turn"][:, 1:]
+    spin = result["spin"]
+    twice = 2.0 * np.cross(axis, spin)
+    return result.sample_times["spin"], spin + w * twice + np.cross(axis, twice)
+
+
+def measured_flip_time(simulate: Simulate, time_step: float = TIME_STEP) -> float:
+    """Mean time [s] between zero crossings of the spin about the middle axis; NaN with fewer than two."""
+    times, spin = body_spin(simulate, time_step)
+    middle = spin[:, 1]
+    crossing = np.nonzero(np.sign(middle[:-1]) != np.sign(middle[1:]))[0]
+    if len(crossing) < 2:
+        return float("nan")
+    zero = times[crossing] - middle[crossing] * time_step / (middle[crossing + 1] - middle[crossing])
+    return float((zero[-1] - zero[0]) / (len(zero) - 1))
+
+
+def _measure_conserved(simulate: Simulate) -> dict[str, float]:
+    observe = {
+        "momentum": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
+        "energy": MaximumAbsolute(quantity=KineticEnergy(), from_start=True),
+    }
+    result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    moments, spin = np.array(INERTIA), np.array(SPIN)
+    momentum = float(np.linalg.norm(moments * spin))
+    energy = 0.5 * float(np.sum(moments * spin**2))
+    return {
+        "momentum_drift": float(result["momentum"].max()) / momentum,
+        "energy_deviation": float(result["energy"]) / energy,
+    }
+
+
+def _measure_period(simulate: Simulate) -> dict[str, float]:
+    return {"flip_time_error": measured_flip_time(simulate) / flip_time() - 1.0}
+
+
+def _draw_spin(simulate: Simulate) -> Drawing:
+    times, spin = body_spin(simulate, TIME_STEP)
+    every = slice(None, None, 10)
+    x = tuple(map(float, times[every]))
+    return Drawing(
+        curves=tuple(
+            Curve(name=f"axis {i + 1}", x=x, y=tuple(map(float, spin[every, i])), style="line")
+            for i in range(3)
+        ),
+        x_label="time [s]",
+        y_label="angular velocity in body axes [rad/s]",
+        note="The spin about the middle axis turns over again and again.",
+    )
+
+
+def _draw_order(simulate: Simulate) -> Drawing:
+    steps = (1 / 15, 1 / 30, 1 / 60, 1 / 120)
+    errors = tuple(abs(measured_flip_time(simulate, h) / flip_time() - 1.0) for h in steps)
+    second = tuple(errors[0] * (h / steps[0]) ** 2 for h in steps)
+    return Drawing(
+        curves=(
+            Curve(name="flip time", x=steps, y=errors),
+            Curve(name="second order", x=steps, y=second, style="reference"),
+        ),
+        x_label="time step [s]",
+        y_label="relative error of the flip time",
+        x_scale="log",
+        y_scale="log",
+    )
+
+
+TEST = ScalarTest(
+    title="Rotating box",
+    question="Does a free body spinning about its middle axis flip when it should, and lose nothing?",
+    why=(
+        "Explicit Euler gains 35 % of the energy in 100 s at h = 0.1 s, and the implicit forms used by well-known "
+        "engines lose 21 %: satellites, thrown boxes and wheels depend on this."
+    ),
+    model="A free rigid body with three different moments of inertia starts to spin almost about the middle one.",
+    parameters=(
+        ("moments of inertia", "0.9144, 1.098, 1.66 kg m²"),
+        ("spin", "(0.05, 1, 0.05) rad/s in body axes"),
+        ("time step", "1/60 s, 200 s"),
+    ),
+    theory=(
+        "I dω/dt + ω × I ω = 0 conserves E = ½ ω·I ω and L = R I ω.",
+        "Time between flips: 2 K(k)/p, p² = (I₃ − I₂)(L² − 2E I₁)/(I₁ I₂ I₃) (Landau and Lifshitz, § 37).",
+        "The variational step keeps L to rounding and E bounded; the period is right to second order.",
+    ),
+    reference="Jacobi's elliptic functions (closed form).",
+    conclusion="Green: rotation neither gains nor loses. Red: the gyroscopic term is missing or integrated wrongly.",
+    source="thesis, section 5.4 (asked for); C. Lacoursière, Ghosts and Machines, 2007",
+    measurements=(
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="flip_time_error",
+                    description="relative error of the mean time between flips in 200 s",
+                    unit="1",
+                    role="gate",
+                    limit=1e-4,
+                    limit_source="second order: (h ω)²/3 = 9e-5 at h = 1/60 s, ω = 1 rad/s",
+                    reference=0.0,
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=_measure_period,
+            note="Variational quaternion step.",
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="momentum_drift",
+                    description="largest change of a component of the angular momentum, over its magnitude",
+                    unit="1",
+                    role="companion",
+                    limit=1e-12,
+                    limit_source="the step keeps it to rounding",
+                    reference=0.0,
+                    tolerance=1e-13,
+                ),
+                Metric(
+                    name="energy_deviation",
+                    description="largest relative deviation of the kinetic energy",
+                    unit="1",
+                    role="companion",
+                    limit=1e-4,
+                    limit_source="bounded, of second order in h ω",
+                    reference=0.0,
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=_measure_conserved,
+            note="Variational quaternion step.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    figures=(
+        Figure(name="spin", title="Angular velocity in body axes", draw=_draw_spin),
+        Figure(name="order", title="Error of the flip time against the time step", draw=_draw_order),
+    ),
+)
