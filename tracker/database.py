@@ -32,7 +32,7 @@ def database_url(given: str | None = None) -> URL:
         return URL.create("sqlite", database=chosen)
     try:
         url = make_url(chosen)
-    except exc.ArgumentError:
+    except (exc.ArgumentError, ValueError):
         raise DatabaseError(
             "the database URL cannot be read; write sqlite:///FILE or postgresql://..."
         ) from None
@@ -147,8 +147,7 @@ def _engine(url: URL, readonly: bool) -> Engine:
             None  # the driver begins nothing by itself: schema changes roll back, too
         )
         pragmas = ["foreign_keys = ON", "trusted_schema = OFF", "cell_size_check = ON"]
-        if not readonly:
-            pragmas += ["journal_mode = WAL", "synchronous = FULL"]
+        pragmas += ["query_only = ON"] if readonly else ["journal_mode = WAL", "synchronous = FULL"]
         for words in pragmas:
             connection.execute(f"PRAGMA {words}")
 
@@ -174,9 +173,12 @@ def _is_file(url: URL) -> bool:
 def _address(url: URL, readonly: bool) -> str:
     """The file as SQLite's own URI, which alone can say that nothing may be written."""
     path = Path(str(url.database)).resolve()
+    mode = "rwc"
+    if readonly:
+        # where writing is possible, the last reader must be able to tidy the log away
+        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
     log = path.with_name(path.name + "-wal")
-    mode = "ro" if readonly else "rwc"
-    if readonly and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
+    if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
         mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
     return f"file:{quote(str(path))}?mode={mode}"
 

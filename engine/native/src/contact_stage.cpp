@@ -116,18 +116,16 @@ RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {
     return block;
 }
 
-FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points, PivotSolver& solver) {
-    FrictionReport report;
-    switch (options_.solver) {
-        case SolverKind::direct: report = solve_friction_direct(system, points, options_.friction, solver); break;
-        case SolverKind::iterative:
-            system.velocity.resize(system.mass.size());
-            report = solve_iterative(system, points, options_.friction, options_.iterations, options_.residual_tolerance);
-            break;
-        case SolverKind::hybrid:
-            report = solve_hybrid(system, points, options_.friction, solver, options_.iterations, options_.residual_tolerance);
-            break;
-    }
+FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& islands) {
+    const ContactOptions& o = options_;
+    const FrictionReport report = islands.run(
+        system, points, [&o](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
+            switch (o.solver) {
+                case SolverKind::iterative: return solve_iterative(island, own, o.friction, o.iterations, o.residual_tolerance);
+                case SolverKind::hybrid: return solve_hybrid(island, own, o.friction, solver, o.iterations, o.residual_tolerance);
+                default: return solve_friction_direct(island, own, o.friction, solver);
+            }
+        });
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;
     counters_.sweeps += report.sweeps;
@@ -311,7 +309,7 @@ double ContactStage::penetration() const noexcept {
 
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
     BlockLdlt::Counters sum = resting_solver_.counters();
-    for (const PivotSolver* solver : {&impact_solver_, &parting_solver_}) {
+    for (const IslandSolver* solver : {&impact_solver_, &parting_solver_}) {
         const BlockLdlt::Counters more = solver->counters();
         sum.factorisations += more.factorisations;
         sum.block_operations += more.block_operations;

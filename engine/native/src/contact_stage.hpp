@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "collision/detection.hpp"
+#include "contact_islands.hpp"
 #include "contact_material.hpp"
 #include "friction_direct.hpp"
 #include "friction_sweeps.hpp"
@@ -113,7 +114,7 @@ private:
     RowBlock row_block(std::size_t k, bool tangents) const;
     double relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
-    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, PivotSolver& solver);
+    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
     double explained_depth(std::size_t k) const noexcept;
 
@@ -121,7 +122,7 @@ private:
     std::vector<SurfaceMaterial> materials_;
     std::vector<int> unknown_;
     ContactOptions options_;
-    PivotSolver resting_solver_, impact_solver_, parting_solver_;
+    IslandSolver resting_solver_, impact_solver_, parting_solver_;
 
     std::vector<Contact> contacts_;
     std::vector<Point> points_;
