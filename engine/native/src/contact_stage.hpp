@@ -117,6 +117,7 @@ private:
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
     double explained_depth(std::size_t k) const noexcept;
+    bool is_closed(std::size_t k) const noexcept;
 
     Detection detection_;
     std::vector<SurfaceMaterial> materials_;
