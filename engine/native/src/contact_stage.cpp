@@ -62,6 +62,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     correction_.clear();
     impact_needed_ = false;
     detection_.detect(poses, margin_, contacts_);
+    drop_unreachable(velocity, free_velocity);
     if (contacts_.empty()) {
         touches_.clear();
         return false;
@@ -102,6 +103,20 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     touches_.assign(contacts_.size(), {});
     for (std::size_t k = 0; k < contacts_.size(); ++k) touches_[k].contact = contacts_[k];
     return true;
+}
+
+void ContactStage::drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity) {
+    const std::vector<double>& radius = detection_.radius();
+    auto speed = [&](int body, Vec3 n) {
+        const double spin = std::max(norm(angular(velocity[body])), norm(angular(free_velocity[body])));
+        return std::max(std::abs(dot(n, linear(velocity[body]))), std::abs(dot(n, linear(free_velocity[body])))) +
+               spin * radius[body];
+    };
+    std::erase_if(contacts_, [&](const Contact& contact) {
+        const double size = std::max(radius[contact.first], radius[contact.second]);
+        const Vec3 n = contact.point.normal;
+        return contact.point.gap > options_.time_step * (speed(contact.first, n) + speed(contact.second, n)) + closed * size;
+    });
 }
 
 RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {

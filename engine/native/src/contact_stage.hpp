@@ -111,6 +111,8 @@ private:
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0};
     };
+    /// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
+    void drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity);
     RowBlock row_block(std::size_t k, bool tangents) const;
     double relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
