@@ -248,12 +248,12 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
+    from tracker.cli_history import accepted_levels
+    from tracker.console import say
     from tracker.publish import publish as build
 
-    from tracker.console import say
-
-    report = build(history, out)
-    say(f"published {out}/index.html" + (f": {report}" if isinstance(report, str) else ""))
+    report = build(history, out, accepted_levels())
+    say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 
 def _json(document: Any) -> str:
