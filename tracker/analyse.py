@@ -8,11 +8,14 @@ exactly; run times by the robust statistics of tracker/noise.py.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal, Protocol
+
+import msgspec
 
 from tracker.accepted import Accepted, acceptance
 from tracker.document import EngineVersion, Machine, MapData, Sample, SeriesDefinition, from_number
@@ -133,7 +136,7 @@ def _judge_values(
             word: Literal["new", "not_comparable"] = "new" if level is None else "not_comparable"
             level, release, first_bad = night, night, None
             state: State = "green"
-            if not night.sample.passed and definition.role != "reported":
+            if _broken(definition, night):
                 state, first_bad = "detected", night
             yield Judged(
                 night=night, verdict=Verdict(word=word, sentence=why), state=state, first_bad=first_bad
@@ -146,7 +149,8 @@ def _judge_values(
             if drifted.word == "regressed":
                 verdict, against = _drift(drifted, release), release
         taken = acceptance(accepted, key, from_number(night.sample.value), night_of(night.run))
-        if verdict.red and taken is None:
+        bad = verdict.red or _broken(definition, night)
+        if bad and taken is None:
             first_bad = first_bad or night
             yield Judged(
                 night=night,
@@ -154,20 +158,25 @@ def _judge_values(
                 state="detected",
                 against=against,
                 first_bad=first_bad,
-                last_good=level,
+                last_good=None if _broken(definition, level) else level,
             )
             continue
-        state = "accepted" if verdict.red else "recovered" if first_bad is not None else "green"
+        state = "accepted" if bad else "recovered" if first_bad is not None else "green"
         yield Judged(
             night=night,
             verdict=verdict,
             state=state,
             against=against,
-            accepted=str(taken) if verdict.red else "",
+            accepted=str(taken) if bad else "",
         )
         level, first_bad = night, None
-        if verdict.red or is_release(night.run) or verdict.word in ("improved", "fixed"):
+        if bad or is_release(night.run) or verdict.word in ("improved", "fixed"):
             release = night
+
+
+def _broken(definition: SeriesDefinition, night: Night) -> bool:
+    """Outside a limit that decides, whatever the nights before were: red until it holds or is accepted."""
+    return not night.sample.passed and definition.role != "reported"
 
 
 def _drift(verdict: Verdict, release: Night) -> Verdict:
@@ -271,11 +280,56 @@ def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Find
     return findings
 
 
+def run_time_histories(
+    histories: Mapping[str, tuple[SeriesDefinition, Sequence[Night]]], run: Run
+) -> dict[str, tuple[SeriesDefinition, list[Night]]]:
+    """One series of run time for each ladder configuration: the geometric mean over the rungs timed in `run`.
+
+    Nights that did not time all of these rungs are left out: means over other rungs say nothing.
+    """
+    ladders: dict[str, list[tuple[SeriesDefinition, Sequence[Night]]]] = {}
+    for definition, history in histories.values():
+        if definition.kind == "ladder" and any(n.run.id == run.id and n.sample.timing for n in history):
+            key = f"{definition.test}/{definition.configuration}/{definition.metric}:run-time"
+            ladders.setdefault(key, []).append((definition, history))
+    return {key: _run_time(key, rungs) for key, rungs in ladders.items()}
+
+
+def _run_time(
+    key: str, rungs: Sequence[tuple[SeriesDefinition, Sequence[Night]]]
+) -> tuple[SeriesDefinition, list[Night]]:
+    by_run: dict[str, list[Night]] = {}
+    for _, history in rungs:
+        for night in history:
+            if night.sample.timing is not None:
+                by_run.setdefault(night.run.id, []).append(night)
+    definition = msgspec.structs.replace(
+        rungs[0][0],
+        key=key,
+        metric=f"{rungs[0][0].metric}:run-time",
+        unit="s",
+        kind="time",
+        better="smaller",
+        time_step=None,
+    )
+    order = [night.run.id for night in max((history for _, history in rungs), key=len)]
+    told = []
+    for run_id in order:
+        found = by_run.get(run_id, [])
+        if len(found) < len(rungs):
+            continue
+        logs = [math.log(min(n.sample.timing.seconds)) for n in found if n.sample.timing]
+        seconds = math.exp(sum(logs) / len(logs))
+        sample = Sample(series=key, value=seconds, outcome="value", passed=True, set_point_held=True)
+        told.append(Night(found[0].run, sample, found[0].test_version))
+    return definition, told
+
+
 def tonight(history: Any, run: Any, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """Findings of one recorded run against its history (tracker.series.History); red first."""
     stored = history.series(history.samples(run.id))
     histories = {key: (found.definition, nights(found.points)) for key, found in stored.items()}
-    findings = judge_run(histories, run, accepted)
+    findings = judge_run(histories | run_time_histories(histories, run), run, accepted)
     earlier = [other for other in history.runs(run.engine.name) if other.id != run.id]
     place = [other.id for other in history.runs(run.engine.name)].index(run.id)
     for other in reversed(earlier[:place]):

@@ -44,6 +44,8 @@ def change_points(
     places = [i for i, value in enumerate(values) if math.isfinite(value)][-NEWEST:]
     finite = np.array([values[i] for i in places])
     seed = int.from_bytes(hashlib.sha256(name.encode("utf-8", "replace")).digest()[:8], "big")
+    if not places:
+        return []
     found = sorted(_split(finite, 0, np.random.default_rng(seed), least_change))
     ends = [0, *(place for place, _ in found), len(finite)]
     levels = [float(np.median(finite[a:b])) for a, b in pairwise(ends)]

@@ -21,7 +21,7 @@ PROBES = 9  # errors, and times, at which two ladders are compared
 def run_times(before: Samples, after: Samples) -> list[Change]:
     """One change per ladder configuration: run times over its rungs, by statistics that do not cry wolf."""
     changes = []
-    for rungs in _ladders(before, after).values():
+    for rungs in [*_ladders(before, after).values(), *_single(before, after)]:
         definition = rungs[0][0]
         timed = [(old.timing, new.timing) for _, old, new in rungs]
         both: list[tuple[Timing, Timing]] = [(old, new) for old, new in timed if old and new]
@@ -54,7 +54,7 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
                 after_outcome="value",
                 limit=None,
                 decades=math.log10(found.ratio),
-                page=f"test/{definition.test}/",
+                page=f"tests/{definition.test}.html",
             )
         )
     return changes
@@ -74,6 +74,16 @@ def _ladders(before: Samples, after: Samples) -> dict[tuple[str, str, str], list
     for rungs in groups.values():
         rungs.sort(key=lambda rung: -(rung[0].time_step or 0.0))
     return groups
+
+
+def _single(before: Samples, after: Samples) -> Iterator[list[Rung]]:
+    """Series outside ladders that carry repeats of their own."""
+    for key, (definition, new) in after.items():
+        if definition.kind == "ladder" or new.timing is None or key not in before:
+            continue
+        earlier, old = before[key]
+        if earlier.test_version == definition.test_version:
+            yield [(definition, old, new)]
 
 
 def frontiers(before: Samples, after: Samples, same_machine: bool) -> Iterator[Frontier]:
