@@ -1,11 +1,19 @@
-"""A real browser for the tests of the website: headless Chromium, without a network."""
+"""A real browser for the tests of the website: headless Chromium, without a network.
+
+The picture in the README comes from here, after `make nightly`:
+
+    python -m tests.browser public/index.html docs/dashboard.png
+"""
 
 from __future__ import annotations
 
 import os
 import shutil
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 MISSING = "no Chromium with its driver here; .ci/install-system installs both"
@@ -48,3 +56,22 @@ def look(driver: Any, *, width: int = 1280, height: int = 900, dark: bool = Fals
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
+
+
+def photograph(page: Path, picture: Path, *, width: int = 1280, most: int = 1500) -> None:
+    """A picture of a page of the website, from its top down to `most` pixels."""
+    found = programs()
+    if found is None:
+        raise SystemExit(MISSING)
+    with browser(*found) as driver:
+        look(driver, width=width)
+        driver.get(page.resolve().as_uri())
+        tall = driver.execute_script("return document.documentElement.scrollHeight")
+        look(driver, width=width, height=min(most, tall))
+        time.sleep(1.0)  # charts are drawn as they come into view
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        driver.save_screenshot(str(picture))
+
+
+if __name__ == "__main__":
+    photograph(Path(sys.argv[1]), Path(sys.argv[2]))
