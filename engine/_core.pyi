@@ -25,3 +25,27 @@ class ParticleProgram:
     def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
     @property
     def solver(self) -> str: ...
+
+class RigidProgram:
+    def __init__(
+        self,
+        body_kinds: npt.NDArray[np.int64],
+        bodies: npt.NDArray[np.float64],
+        joint_kinds: npt.NDArray[np.int64],
+        joints: npt.NDArray[np.float64],
+        spring_ends: npt.NDArray[np.int64],
+        springs: npt.NDArray[np.float64],
+        fields: npt.NDArray[np.float64],
+        collider_kinds: npt.NDArray[np.int64],
+        colliders: npt.NDArray[np.float64],
+        no_contact: npt.NDArray[np.int64],
+        gravity: tuple[float, float, float],
+        method: dict[str, Any],
+        quantities: Sequence[tuple[str, int, tuple[float, float, float]]],
+        observations: Sequence[tuple[int, str, int, int, bool, int]],
+    ) -> None: ...
+    def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
+    @property
+    def solver(self) -> str: ...
+    @property
+    def contacts_possible(self) -> bool: ...

@@ -154,7 +154,7 @@ class Program:
         failed_body = self._bodies[body] if body >= 0 else None
         return Result(
             status=status,
-            failure=_failure(status, failed_body, step, time_limit),
+            failure=_failure(status, failed_body, step, time_limit, report["reason"]),
             failed_body=failed_body,
             failed_step=step if step >= 0 else None,
             time_step=self.time_step,
@@ -171,7 +171,9 @@ class Program:
         )
 
 
-def _failure(status: str, body: str | None, step: int, time_limit: float | None) -> str:
+def _failure(status: str, body: str | None, step: int, time_limit: float | None, reason: str) -> str:
+    if reason:
+        return f"body {body!r} {reason} in step {step}; try a smaller time step"
     if status == "diverged":
         return f"body {body!r} ran away (beyond 1e100 m or m/s) in step {step}; try a smaller time step"
     if status == "not_finite":

@@ -31,7 +31,7 @@ def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, floa
 
 def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[StageChoice, ...]:
     """Stages kept and left out of the test's example scene; empty where the engine cannot say."""
-    explained = ask(lambda: _explain(test, engine))
+    answer = ask(lambda: explained(test, engine))
     return tuple(
         StageChoice(
             stage=choice.stage,
@@ -39,11 +39,12 @@ def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[S
             reason=sentence(choice.reason),
             saved_seconds_per_step=saved.get(choice.stage),
         )
-        for choice in explained.value or ()
+        for choice in answer.value or ()
     )
 
 
-def _explain(test: ScalarTest, engine: Any) -> Any:
+def explained(test: ScalarTest, engine: Any) -> Any:
+    """The engine's choices for the test's example scene, stage by stage."""
     example = test.example()
     return engine.explain(
         example.scene, time_step=example.time_step, method=example.method, observe=example.observe

@@ -32,7 +32,7 @@ def database_url(given: str | None = None) -> URL:
         return URL.create("sqlite", database=chosen)
     try:
         url = make_url(chosen)
-    except exc.ArgumentError:
+    except (exc.ArgumentError, ValueError):
         raise DatabaseError(
             "the database URL cannot be read; write sqlite:///FILE or postgresql://..."
         ) from None
@@ -56,6 +56,7 @@ def open_database(url: str | URL | None = None, readonly: bool = False) -> Engin
     if _is_file(url):
         _check_file(url, readonly)
     engine = _engine(url, readonly)
+    event.listen(engine, "handle_error", _said, retval=True)
     try:
         with in_words(engine):
             revision = _revision(engine)
@@ -147,8 +148,7 @@ def _engine(url: URL, readonly: bool) -> Engine:
             None  # the driver begins nothing by itself: schema changes roll back, too
         )
         pragmas = ["foreign_keys = ON", "trusted_schema = OFF", "cell_size_check = ON"]
-        if not readonly:
-            pragmas += ["journal_mode = WAL", "synchronous = FULL"]
+        pragmas += ["query_only = ON"] if readonly else ["journal_mode = WAL", "synchronous = FULL"]
         for words in pragmas:
             connection.execute(f"PRAGMA {words}")
 
@@ -174,9 +174,12 @@ def _is_file(url: URL) -> bool:
 def _address(url: URL, readonly: bool) -> str:
     """The file as SQLite's own URI, which alone can say that nothing may be written."""
     path = Path(str(url.database)).resolve()
+    mode = "rwc"
+    if readonly:
+        # where writing is possible, the last reader must be able to tidy the log away
+        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
     log = path.with_name(path.name + "-wal")
-    mode = "ro" if readonly else "rwc"
-    if readonly and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
+    if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
         mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
     return f"file:{quote(str(path))}?mode={mode}"
 
@@ -222,6 +225,13 @@ def _refuse_strange(engine: Engine, revision: str | None) -> None:
         raise DatabaseError(
             f"{shown(engine.url)} holds something else (a table {strange[0][:40]!r}); choose another database"
         )
+
+
+def _said(context: Any) -> DatabaseError | None:
+    """Whatever the driver raises, anywhere, as one sentence; what concurrent writers cause is for `record`."""
+    if isinstance(context.sqlalchemy_exception, exc.IntegrityError):
+        return None
+    return DatabaseError(_sentence(shown(context.engine.url), context.original_exception))
 
 
 @contextmanager

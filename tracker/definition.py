@@ -21,6 +21,28 @@ from collections.abc import Callable, Mapping, Set
 from typing import Any
 
 OWN_PACKAGES = ("scalar_tests",)
+WORDING = {
+    "conclusion",
+    "definition",
+    "description",
+    "limit_source",
+    "misprints",
+    "model",
+    "note",
+    "question",
+    "reference_source",
+    "relative_tolerance",
+    "role",
+    "set_point",
+    "set_point_source",
+    "source",
+    "theory",
+    "title",
+    "tolerance",
+    "why",
+    "x_label",
+    "y_label",
+}
 
 
 def definition_hash(measure: Callable[..., Any], facts: object) -> str:
@@ -80,13 +102,19 @@ def _describe(thing: Any, seen: _Seen) -> Any:
     if isinstance(thing, types.ModuleType):
         return ("module", thing.__name__)
     if dataclasses.is_dataclass(thing):
-        fields = tuple((f.name, _describe(getattr(thing, f.name), seen)) for f in dataclasses.fields(thing))
+        named = [f.name for f in dataclasses.fields(thing) if not _is_wording(type(thing), f.name)]
+        fields = tuple((name, _describe(getattr(thing, name), seen)) for name in named)
         return (type(thing).__qualname__, _describe(type(thing), seen), fields)
     if hasattr(thing, "tobytes") and hasattr(thing, "shape"):
         return ("array", str(thing.dtype), tuple(thing.shape), thing.tobytes().hex())
     if hasattr(thing, "__wrapped__"):
         return ("wrapped", _describe(thing.__wrapped__, seen))
     return (type(thing).__qualname__, getattr(thing, "__name__", ""))
+
+
+def _is_wording(kind: type, field: str) -> bool:
+    """A text for the reader, or what judges a value, in a class of the questions' own vocabulary."""
+    return kind.__module__ == "scalar_tests.case" and field in WORDING
 
 
 def _describe_class(kind: type, seen: _Seen) -> Any:

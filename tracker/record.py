@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sqlalchemy import Table, insert, select
+from sqlalchemy import Table, insert, or_, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -43,15 +43,17 @@ def record(session: Session, run: RunDocument) -> bool:
 
 
 def _known(session: Session, run: RunDocument) -> bool:
-    with_key = select(models.Run.id).where(models.Run.idempotency_key == run.idempotency_key)
-    return session.scalar(with_key) is not None
+    """Whether the run is stored, asked once: between two questions another process could store it."""
+    same = or_(models.Run.idempotency_key == run.idempotency_key, models.Run.id == run.id)
+    keys = set(session.scalars(select(models.Run.idempotency_key).where(same)))
+    if keys and run.idempotency_key not in keys:
+        raise DatabaseError(f"another run with the id {run.id!r} is already stored; give this one a new id")
+    return bool(keys)
 
 
 def _store(session: Session, run: RunDocument) -> bool:
     if _known(session, run):
         return False
-    if session.scalar(select(models.Run.id).where(models.Run.id == run.id)) is not None:
-        raise DatabaseError(f"another run with the id {run.id!r} is already stored; give this one a new id")
     engine, machine = rows.engine_row(run.engine), rows.machine_row(run.machine)
     cards = rows.cards_row(run.tests)
     definitions = [rows.definition_row(definition) for definition in run.series]

@@ -23,6 +23,7 @@ from scalar_tests.case import ScalarTest, Simulate
 from tracker import ladder as ladders
 from tracker.cards import engine_version, test_card
 from tracker.document import EngineVersion, FigureData, MapData, RunDocument, Sample, SeriesDefinition
+from tracker.errors import TrackerError
 from tracker.machine import machine
 from tracker.measure import Measured, Outcome, Witness, draw, judged_sample, measure, metric_series, study
 
@@ -31,7 +32,7 @@ Part = Measured | FigureData | MapData
 CRASH = "the engine's process died while answering"
 
 
-class RunError(ValueError):
+class RunError(TrackerError):
     """The run cannot be started as asked; one sentence that names what to do."""
 
 

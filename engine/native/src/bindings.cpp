@@ -38,6 +38,7 @@ nb::dict to_dict(const RunReport& report) {
     out["steps"] = report.steps;
     out["failed_step"] = report.failed_step;
     out["failed_body"] = report.failed_body;
+    out["reason"] = report.reason;
     out["seconds"] = report.seconds;
     out["residual"] = report.residual;
     out["counters"] = counters;

@@ -56,6 +56,7 @@ public:
     /// Blocks of the factor off the diagonal that are not in the matrix.
     std::int64_t fill() const noexcept { return static_cast<std::int64_t>(row_size_.size() - edges_.size()); }
     Counters counters() const noexcept { return counters_; }
+    void clear_counters() noexcept { counters_ = {}; }
 
 private:
     struct Load {  // where an edge's block goes in the factor

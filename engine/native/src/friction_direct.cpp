@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "friction_acceleration.hpp"
+#include "friction_sweeps.hpp"
+
 namespace spook {
 
 namespace {
 
 constexpr double settled = 1e-10;
+constexpr int plain_rounds = 3;  // most systems settle within these
 
 void bound_tangents(RowBlock& block, double bound) noexcept {
     for (int i = 1; i <= 2; ++i) {
@@ -72,6 +76,24 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
     return law;
 }
 
+/// Few systems have no fixed point the rounds can find (wedged bodies); sweeps may, from where the rounds stopped.
+void finish_by_sweeps(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionReport& report) {
+    MixedSystem swept = system;
+    std::vector<FrictionPoint> swept_points = points;
+    double speed = 0.0;
+    for (const FrictionPoint& point : points) {
+        RowBlock& block = swept.rows[point.block];
+        block.softness[1] = block.softness[2] = point.slip_softness;
+    }
+    for (const Vec6& v : system.velocity) speed = std::max(speed, std::hypot(v[0], v[1], v[2]));
+    const FrictionReport sweeps = solve_iterative(swept, swept_points, FrictionModel::cone, 1000, 1e-10 * speed);
+    report.sweeps += sweeps.sweeps;
+    if (!sweeps.converged) return;
+    system = std::move(swept);
+    points = std::move(swept_points);
+    report.converged = true;
+}
+
 }  // namespace
 
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
@@ -104,6 +126,8 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     }
 
     bool same_matrix = false;
+    Acceleration acceleration;
+    std::vector<double> used(points.size()), given(points.size());
     for (int round = 0; round < max_rounds; ++round) {
         for (const FrictionPoint& point : points)
             bound_tangents(system.rows[point.block], point.coefficient * std::max(0.0, point.normal));
@@ -125,12 +149,17 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
                 residual = std::max(residual, law.residual);
                 if (law.moved) same_matrix = false;
             }
-            point.normal = now;
+            used[k] = point.normal;
+            given[k] = point.normal = now;
         }
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
         if (report.residual <= settled) return report;
+        if (round < plain_rounds) continue;
+        const std::vector<double> next = acceleration.next(used, given);
+        for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
     }
     report.converged = false;
+    if (model == FrictionModel::cone) finish_by_sweeps(system, points, report);
     return report;
 }
 

@@ -15,6 +15,7 @@ namespace spook {
 struct Health {
     Status status = Status::completed;
     int body = -1;
+    const char* reason = "";  // what is wrong with the body, when the status does not say it
 };
 
 /// A System has
@@ -72,6 +73,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
     if (health.status != Status::completed) {
         report.status = health.status;
         report.failed_body = health.body;
+        report.reason = health.reason;
     }
     report.steps = done;
     report.seconds = elapsed();

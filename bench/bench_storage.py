@@ -1,0 +1,137 @@
+"""How fast is the history? Records a million samples as nights of 1000 series, then reads them in the three ways
+that people wait for: two versions side by side, one series over all nights, all series over all nights.
+
+    python bench/bench_storage.py [--samples 1000000] [--db URL]
+
+The default is a SQLite file in a temporary folder. The target: two runs compared in under 0.3 s.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+from tracker.database import open_database
+from tracker.document import EngineVersion, Machine, RunDocument, Sample, SeriesDefinition
+from tracker.record import record
+from tracker.series import History
+
+SERIES = 1000  # in one night
+
+
+def definitions() -> tuple[SeriesDefinition, ...]:
+    return tuple(
+        SeriesDefinition(
+            key=f"test{number % 40}/plain/metric{number}/h=0.0166667",
+            test=f"test{number % 40}",
+            title="A test",
+            configuration="plain",
+            metric=f"metric{number}",
+            description="A number.",
+            unit="m",
+            role="gate",
+            better="smaller_magnitude",
+            kind="scalar",
+            time_step=1 / 60,
+            parameters={"mass": 1.0},
+            limit=1.0,
+            limit_source="",
+            set_point=None,
+            set_point_source="",
+            reference=None,
+            tolerance=0.0,
+            relative_tolerance=1e-9,
+            test_version="v1",
+        )
+        for number in range(SERIES)
+    )
+
+
+def night(number: int, series: tuple[SeriesDefinition, ...], chance: random.Random) -> RunDocument:
+    day = f"{2000 + number // 336}-{number // 28 % 12 + 1:02}-{number % 28 + 1:02}"
+    return RunDocument(
+        schema_version=1,
+        id=f"{number:032x}",
+        idempotency_key=f"night {number}",
+        started=f"{day}T03:17:00+00:00",
+        finished=f"{day}T03:20:00+00:00",
+        trigger="nightly",
+        tracker_version="1",
+        ci_address="",
+        engine=EngineVersion(
+            name="spook",
+            version=f"1.0.dev{number}",
+            git_hash=f"{number:040x}",
+            dirty=False,
+            commit_time=f"{day}T00:00:00+00:00",
+            parents=(f"{number - 1:040x}",) if number else (),
+        ),
+        machine=Machine(fingerprint="m", processor="p", cores=2, operating_system="o", float_environment="f"),
+        tests=(),
+        series=series,
+        samples=tuple(
+            Sample(
+                series=definition.key,
+                value=chance.random(),
+                outcome="value",
+                passed=True,
+                set_point_held=True,
+                counters={"steps": 600, "rows_assembled": 1200},
+                state_hash=f"{chance.getrandbits(64):016x}",
+            )
+            for definition in series
+        ),
+    )
+
+
+@contextmanager
+def timed(what: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    print(f"{what:<58} {time.perf_counter() - start:8.3f} s", flush=True)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    options.add_argument("--samples", type=int, default=1_000_000)
+    options.add_argument("--db", default=None, help="an empty database; default: a temporary SQLite file")
+    given = options.parse_args()
+    nights = max(2, given.samples // SERIES)
+    with tempfile.TemporaryDirectory() as folder:
+        url = given.db or f"sqlite:///{folder}/bench.db"
+        engine = open_database(url)
+        series, chance = definitions(), random.Random(1)
+        with timed(f"record {nights} nights of {SERIES} samples"), Session(engine) as session:
+            for number in range(nights):
+                record(session, night(number, series, chance))
+        with timed("record one more night"), Session(engine) as session:
+            record(session, night(nights, series, chance))
+        if engine.dialect.name == "postgresql":
+            with engine.begin() as connection:
+                connection.execute(text("ANALYZE"))
+        engine.dispose()
+        for attempt in ("first", "second"):
+            with timed(f"open, resolve and read two runs ({attempt} time)"):
+                engine = open_database(url, readonly=True)
+                with Session(engine) as session:
+                    history = History(session)
+                    for name in ("previous", "latest"):
+                        assert len(history.samples(history.resolve(name).id)) == SERIES
+        with Session(engine) as session:
+            with timed("read one series over all nights"):
+                (found,) = History(session).series([series[7].key]).values()
+                assert len(found.points) == nights + 1
+            with timed("read all series over all nights, values only"):
+                assert len(History(session).series(evidence=False)) == SERIES
+        engine.dispose()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+// A small world for tests of contacts: bodies without joints, stepped by the contact stage alone.
+#pragma once
+
+#include <vector>
+
+#include "contact_stage.hpp"
+
+struct ContactBody {
+    spook::Primitive shape;
+    double mass = 1.0;         // kg; 0 does not move
+    spook::Vec3 inertia{1, 1, 1};  // principal, kg m²
+    spook::Vec3 position, velocity, spin;
+    spook::Quat turn;
+    spook::SurfaceMaterial material;
+};
+
+inline spook::Vec3 box_inertia(double mass, spook::Vec3 size) {
+    return mass / 12.0 * spook::Vec3{size.y * size.y + size.z * size.z, size.x * size.x + size.z * size.z, size.x * size.x + size.y * size.y};
+}
+
+class ContactWorld {
+public:
+    ContactWorld(std::vector<ContactBody> bodies, spook::Vec3 gravity, spook::ContactOptions options)
+        : bodies(std::move(bodies)), gravity(gravity), options(options), stage(make(this->bodies, options)) {}
+
+    void step() {
+        using namespace spook;
+        const double h = options.time_step;
+        std::vector<Pose> poses;
+        std::vector<Vec6> velocity, free_velocity;
+        MixedSystem system;
+        for (const ContactBody& b : bodies) {
+            poses.push_back({b.position, rotation(b.turn)});
+            velocity.push_back(packed(b));
+            Vec6 free = velocity.back();
+            for (int i = 0; i < 3 && b.mass > 0.0; ++i) free[i] += h * gravity[i];
+            free_velocity.push_back(free);
+        }
+        auto momenta = [&](const std::vector<Vec6>& v) {
+            system.momentum.clear();
+            for (std::size_t k = 0, u = 0; k < bodies.size(); ++k) {
+                if (bodies[k].mass == 0.0) continue;
+                Vec6 p{};
+                for (int i = 0; i < 6; ++i)
+                    for (int j = 0; j < 6; ++j) p[i] += system.mass[u][6 * i + j] * v[k][j];
+                system.momentum.push_back(p);
+                ++u;
+            }
+        };
+        for (std::size_t k = 0; k < bodies.size(); ++k)
+            if (bodies[k].mass > 0.0) system.mass.push_back(mass_block(bodies[k], poses[k].rotation));
+        const bool touching = stage.detect(poses, velocity, free_velocity);
+        if (touching && stage.impact_needed()) {
+            momenta(velocity);
+            stage.impact(system);
+            for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
+                if (bodies[k].mass > 0.0) velocity[k] = system.velocity[u++];
+        }
+        for (std::size_t k = 0; k < bodies.size(); ++k)
+            for (int i = 0; i < 3 && bodies[k].mass > 0.0; ++i) {
+                free_velocity[k] = velocity[k];
+            }
+        for (std::size_t k = 0; k < bodies.size(); ++k)
+            for (int i = 0; i < 3 && bodies[k].mass > 0.0; ++i) free_velocity[k][i] += h * gravity[i];
+        if (touching) {
+            momenta(free_velocity);
+            stage.solve(system, velocity);
+        }
+        for (std::size_t k = 0, u = 0; k < bodies.size(); ++k) {
+            ContactBody& b = bodies[k];
+            if (b.mass > 0.0) {
+                const Vec6 v = touching ? system.velocity[u] : free_velocity[k];
+                b.velocity = {v[0], v[1], v[2]};
+                b.spin = {v[3], v[4], v[5]};
+            }
+            Vec3 moved = b.velocity, turned = b.spin;
+            if (b.mass > 0.0 && touching && !stage.correction().empty()) {
+                const Vec6& c = stage.correction()[u];
+                moved += {c[0], c[1], c[2]};
+                turned += {c[3], c[4], c[5]};
+            }
+            if (b.mass > 0.0) ++u;
+            b.position += h * moved;
+            const double angle = h * norm(turned), s = angle > 1e-12 ? std::sin(0.5 * angle) / norm(turned) : 0.5 * h;
+            b.turn = Quat{std::cos(0.5 * angle), s * turned.x, s * turned.y, s * turned.z} * b.turn;
+            const double n = std::sqrt(b.turn.w * b.turn.w + b.turn.x * b.turn.x + b.turn.y * b.turn.y + b.turn.z * b.turn.z);
+            b.turn = {b.turn.w / n, b.turn.x / n, b.turn.y / n, b.turn.z / n};
+        }
+    }
+
+    double energy() const {
+        using namespace spook;
+        double sum = 0.0;
+        for (const ContactBody& b : bodies) {
+            if (b.mass == 0.0) continue;
+            const Vec3 w = local(rotation(b.turn), b.spin);
+            sum += 0.5 * b.mass * dot(b.velocity, b.velocity) - b.mass * dot(gravity, b.position);
+            sum += 0.5 * (b.inertia.x * w.x * w.x + b.inertia.y * w.y * w.y + b.inertia.z * w.z * w.z);
+        }
+        return sum;
+    }
+
+    std::vector<ContactBody> bodies;
+    spook::Vec3 gravity;
+    spook::ContactOptions options;
+    spook::ContactStage stage;
+
+private:
+    static spook::Vec6 packed(const ContactBody& b) { return {b.velocity.x, b.velocity.y, b.velocity.z, b.spin.x, b.spin.y, b.spin.z}; }
+    static spook::Mat6 mass_block(const ContactBody& b, const spook::Mat3& turn) {
+        using namespace spook;
+        const Mat3 inertia = turn * Mat3::diagonal(b.inertia) * transpose(turn);
+        Mat6 m{};
+        for (int i = 0; i < 3; ++i) {
+            m[7 * i] = b.mass;
+            for (int j = 0; j < 3; ++j) m[6 * (i + 3) + j + 3] = 0.5 * (inertia(i, j) + inertia(j, i));
+        }
+        return m;
+    }
+    static spook::ContactStage make(const std::vector<ContactBody>& bodies, const spook::ContactOptions& options) {
+        using namespace spook;
+        std::vector<Collider> colliders;
+        std::vector<char> dynamic;
+        std::vector<SurfaceMaterial> materials;
+        std::vector<int> unknown;
+        int next = 0;
+        for (std::size_t k = 0; k < bodies.size(); ++k) {
+            colliders.push_back({static_cast<int>(k), bodies[k].shape, {}});
+            dynamic.push_back(bodies[k].mass > 0.0);
+            materials.push_back(bodies[k].material);
+            unknown.push_back(bodies[k].mass > 0.0 ? next++ : -1);
+        }
+        return ContactStage(Detection(colliders, dynamic, {}), materials, unknown, options);
+    }
+};

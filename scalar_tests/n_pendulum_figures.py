@@ -1,0 +1,155 @@
+"""The thesis' figures of the N-pendulum, drawn from this run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from engine import PLAIN, Energy, MaximumAbsolute, Method, Trace, Violation
+from engine.observe import Observable
+from scalar_tests.case import Drawing, Figure, Simulate
+from scalar_tests.chain import fall_to_hanging, level_chain
+from scalar_tests.sweep import line, sweep
+
+COUNT = 26
+DURATION = 22.0  # s
+TIME_STEP = 1.0 / 60.0  # s
+CURVED_TWICE = Method(corrections=2)
+TWO_SUBSTEPS = Method(substeps=2)
+TIME_STEPS = (0.001, 0.002, 0.004, 0.006, 0.008, 0.01, 0.012, 0.014, 1.0 / 60.0, 0.018, 0.02)  # s
+COUNTS = (1, 2, 5, 10, 15, 20, 26, 35, 50, 70, 85, 100)
+OBSERVE: dict[str, Observable] = {
+    "violation": MaximumAbsolute(quantity=Violation()),
+    "energy": Trace(quantity=Energy(), from_start=True),
+}
+
+
+def swing(
+    simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, method: Method = PLAIN
+) -> tuple[Any, Any]:
+    """(count,) largest |violation| of each link [%] and E − E₀ at every sample [% of the fall to hanging]."""
+    result = simulate(
+        level_chain(count, time_step / method.substeps),
+        time_step=time_step,
+        duration=DURATION,
+        method=method,
+        observe=OBSERVE,
+    )
+    return 100.0 * result["violation"], 100.0 * result["energy"] / fall_to_hanging(count)
+
+
+def draw_links(simulate: Simulate) -> Drawing:
+    """Largest deviation of each link."""
+    links = range(1, COUNT + 1)
+    return Drawing(
+        curves=tuple(
+            line(name, links, swing(simulate, method=method)[0], "points")
+            for name, method in (
+                ("plain", PLAIN),
+                ("two substeps", TWO_SUBSTEPS),
+                ("curved twice", CURVED_TWICE),
+            )
+        ),
+        x_label="link, counted from the pivot",
+        y_label="largest deviation in 22 s [%]",
+        note="The last links whip round; the last but one stretches most, as in the thesis. Its bars end at 15 %, "
+        "the plain ones here at 34 %: link length and duration are not printed there, and the first 4 s "
+        "stay below 12.2 %.",
+    )
+
+
+def draw_length(simulate: Simulate) -> Drawing:
+    """Largest deviation against time step."""
+
+    def worst(method: Method) -> tuple[float, ...]:
+        return sweep(TIME_STEPS, lambda h: swing(simulate, time_step=h, method=method)[0].max())
+
+    return Drawing(
+        curves=(
+            line("plain", TIME_STEPS, worst(PLAIN), "both"),
+            line("curved twice", TIME_STEPS, worst(CURVED_TWICE), "both"),
+            line("printed limit, 16 %", TIME_STEPS, [16.0] * len(TIME_STEPS), "limit"),
+        ),
+        x_label="time step [s]",
+        y_label="largest deviation in 22 s [%]",
+        note="Plain SPOOK keeps the printed 16 % for h ≤ 1/105 s; the thesis reads 40 % at 0.02 s too.",
+    )
+
+
+def draw_energy(simulate: Simulate) -> Drawing:
+    """Gain and loss of energy against time step."""
+    gains, losses = [], []
+    for h in TIME_STEPS:
+        energy = swing(simulate, time_step=h)[1]
+        gains.append(energy.max())
+        losses.append(-energy.min())
+    return Drawing(
+        curves=(
+            line("largest gain", TIME_STEPS, gains, "both"),
+            line("largest loss", TIME_STEPS, losses, "both"),
+        ),
+        x_label="time step [s]",
+        y_label="energy [% of the fall to hanging]",
+        y_scale="log",
+        note="The thesis draws the gain alone (0.24 % at 0.02 s there, 0.24 % at 1/60 s here). "
+        "The loss, which it leaves out, is 36 % at 1/60 s.",
+    )
+
+
+def draw_length_by_count(simulate: Simulate) -> Drawing:
+    """Largest deviation against the number of spheres."""
+
+    def worst(method: Method) -> tuple[float, ...]:
+        return sweep(COUNTS, lambda n: swing(simulate, count=int(n), method=method)[0].max())
+
+    return Drawing(
+        curves=(
+            line("plain", COUNTS, worst(PLAIN), "both"),
+            line("curved twice", COUNTS, worst(CURVED_TWICE), "both"),
+        ),
+        x_label="number of spheres",
+        y_label="largest deviation in 22 s [%]",
+        note="The thesis' engine exploded above 100. A point that is missing here did not complete.",
+    )
+
+
+def draw_energy_by_count(simulate: Simulate) -> Drawing:
+    """Gain and loss of energy against the number of spheres."""
+    gains = sweep(COUNTS, lambda n: swing(simulate, count=int(n))[1].max())
+    losses = sweep(COUNTS, lambda n: -swing(simulate, count=int(n))[1].min())
+    return Drawing(
+        curves=(
+            line("largest gain", COUNTS, gains, "both"),
+            line("largest loss", COUNTS, losses, "both"),
+        ),
+        x_label="number of spheres",
+        y_label="energy [% of the fall to hanging]",
+        y_scale="log",
+        note="The gain falls with N, as the thesis found surprising: it is taken relative to an energy that grows "
+        "as N², while most of it is the half step by which the velocity lags at the start.",
+    )
+
+
+FIGURES = (
+    Figure(name="links", title="Deviation of each link", draw=draw_links, thesis="Fig 3.26"),
+    Figure(
+        name="length-against-time-step",
+        title="Length deviation against time step",
+        draw=draw_length,
+        thesis="Fig 3.27",
+    ),
+    Figure(
+        name="energy-against-time-step", title="Energy against time step", draw=draw_energy, thesis="Fig 3.28"
+    ),
+    Figure(
+        name="length-against-number",
+        title="Length deviation against the number of spheres",
+        draw=draw_length_by_count,
+        thesis="Fig 3.29",
+    ),
+    Figure(
+        name="energy-against-number",
+        title="Energy against the number of spheres",
+        draw=draw_energy_by_count,
+        thesis="Fig 3.30",
+    ),
+)

@@ -1,0 +1,225 @@
+// The page's own script: state in the address, charts, tables, filters. Works from a file, without a network.
+"use strict";
+
+// --- state: everything a reader chose stands in the address after #, so that a link shows the same view ---
+const state = {
+  read() {
+    const hash = location.hash.slice(1);
+    return new URLSearchParams(hash.includes("=") ? hash : "");
+  },
+  get(name) { return this.read().get(name) || ""; },
+  set(name, value) {
+    const all = this.read();
+    if (value) { all.set(name, value); } else { all.delete(name); }
+    all.sort();
+    const hash = all.toString();
+    history.replaceState(null, "", hash ? "#" + hash : location.pathname + location.search);
+  },
+};
+
+function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+
+// --- charts ---
+const CONFIG = {
+  responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", displayModeBar: "hover",
+  modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], scrollZoom: false,
+};
+const CELLS = ["#0072b2", "#56b4e9", "#e69f00", "#d55e00", "#5b2333", "#8a939c"];
+
+function dressTrace(trace) {
+  const meta = trace.meta || {};
+  const dressed = { ...trace };
+  if (meta.role === "cells") {
+    const last = CELLS.length - 1;
+    dressed.colorscale = CELLS.flatMap((c, i) => [[i / CELLS.length, c], [(i + 1) / CELLS.length, c]]);
+    return { ...dressed, zmin: -0.5, zmax: last + 0.5, showscale: false, xgap: 1, ygap: 1 };
+  }
+  if (meta.role === "prediction") {
+    return { ...dressed, line: { color: colour("--ink"), width: 2.5 }, fillcolor: "rgba(0,0,0,0)" };
+  }
+  const paint = meta.style === "limit" || meta.style === "failed" ? colour("--fail-fill") : colour("--c" + meta.colour);
+  dressed.line = { width: meta.style === "front" ? 1.5 : 2, ...trace.line, color: paint };
+  if (meta.style === "front") { dressed.opacity = 0.65; }
+  if (trace.marker) {
+    const crowded = trace.x.length > 60 && meta.style === "both";
+    dressed.marker = { ...trace.marker, color: paint, size: meta.style === "failed" ? 10 : crowded ? 3 : 7 };
+    if (meta.style === "failed") { dressed.marker.line = { width: 2.5, color: paint }; }
+  }
+  return dressed;
+}
+
+function dressLayout(layout, title) {
+  const grid = colour("--line-soft");
+  const ink = colour("--ink-2");
+  const axis = (given) => ({
+    gridcolor: grid, linecolor: colour("--line"), zerolinecolor: colour("--line"), tickcolor: colour("--line"),
+    automargin: true, ...given, title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
+  });
+  const shapes = (layout.shapes || []).map((shape) => {
+    if (shape.meta === "ring") {
+      const r = shape.radius;
+      return { type: "circle", x0: -r, x1: r, y0: -r, y1: r, layer: "below", line: { color: colour("--line"), width: 1 } };
+    }
+    const log = layout.yaxis.type === "log";
+    const band = { type: "rect", xref: "paper", x0: 0, x1: 1, layer: "below", line: { width: 0 }, fillcolor: colour("--c2"), opacity: 0.16 };
+    return { ...band, y0: shape.low === null ? (log ? 1e-300 : 0) : shape.low, y1: shape.high };
+  });
+  const annotations = (layout.annotations || []).map((a) => ({ showarrow: false, font: { size: 11, color: ink }, yanchor: "bottom", ...a }));
+  return {
+    ...layout, shapes, annotations, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: ink },
+    xaxis: axis(layout.xaxis), yaxis: axis(layout.yaxis), margin: { l: 58, r: 14, t: 12, b: 46 },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12 } },
+    hoverlabel: { bgcolor: colour("--raised"), bordercolor: colour("--line"), font: { color: colour("--ink"), size: 12.5 }, align: "left" },
+    modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: colour("--ink-3"), activecolor: colour("--accent") },
+    hovermode: "closest", dragmode: "zoom", colorway: ["#0072b2"],
+  };
+}
+
+function rangesOf(name) {
+  const parts = state.get("z." + name).split(",").map(Number);
+  return parts.length === 4 && parts.every(Number.isFinite) ? parts : null;
+}
+
+function drawChart(box) {
+  const plot = box.querySelector(".plot");
+  const data = JSON.parse(box.querySelector(".chart-data").textContent);
+  const layout = dressLayout(data.layout);
+  const zoom = rangesOf(box.id);
+  if (zoom) {
+    layout.xaxis.range = zoom.slice(0, 2);
+    layout.yaxis.range = zoom.slice(2);
+  } else if (data.layout.shapes && data.layout.shapes.some((s) => s.meta === "band")) {
+    layout.yaxis.range = yRange(data);
+  }
+  plot.hidden = false;
+  box.classList.add("drawn");
+  Plotly.react(plot, data.data.map(dressTrace), layout, CONFIG);
+  if (!plot.dataset.live) {
+    plot.dataset.live = "1";
+    plot.on("plotly_relayout", () => {
+      const { xaxis, yaxis } = plot.layout;
+      const free = xaxis.autorange !== false && yaxis.autorange !== false;
+      state.set("z." + box.id, free ? "" : [...xaxis.range, ...yaxis.range].map((v) => Number(v.toPrecision(6))).join(","));
+    });
+  }
+}
+
+// The axis shows the values and the band; a band down to nothing on a logarithmic axis does not stretch it.
+function yRange(data) {
+  const log = data.layout.yaxis.type === "log";
+  let values = data.data.flatMap((t) => t.y || []).filter((v) => v !== null);
+  for (const band of data.layout.shapes) {
+    values = values.concat([band.low, band.high].filter((v) => v !== null && v !== undefined));
+  }
+  if (log) { values = values.filter((v) => v > 0).map(Math.log10); }
+  const low = Math.min(...values), high = Math.max(...values);
+  const pad = 0.06 * (high - low) || Math.abs(high) * 0.1 || 1;
+  return [low - pad, high + pad];
+}
+
+function charts() {
+  const boxes = document.querySelectorAll("figure.chart");
+  if (!boxes.length || typeof Plotly === "undefined") { return; }
+  const seen = new Set();
+  const show = (box) => { if (!seen.has(box)) { seen.add(box); drawChart(box); } };
+  const watch = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (entry.isIntersecting) { watch.unobserve(entry.target); show(entry.target); }
+    }
+  }, { rootMargin: "600px 0px" });
+  boxes.forEach((box) => watch.observe(box));
+  document.addEventListener("theme", () => seen.forEach(drawChart));
+  addEventListener("hashchange", () => seen.forEach(drawChart));
+}
+
+// --- tables ---
+function sortable(table) {
+  table.querySelectorAll("thead th[aria-sort]").forEach((head) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...head.childNodes);
+    head.append(button);
+    button.addEventListener("click", () => sortBy(table, head, head.getAttribute("aria-sort") === "ascending"));
+  });
+}
+
+function sortBy(table, head, down) {
+  const column = head.cellIndex;
+  const body = table.tBodies[0];
+  const key = (line) => {
+    const cell = line.cells[column];
+    const given = cell.dataset.value;
+    return given !== undefined && given !== "" && !Number.isNaN(Number(given)) ? Number(given) : cell.textContent.trim();
+  };
+  const compare = (a, b) => (typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b)));
+  const lines = [...body.rows].sort((a, b) => (down ? -1 : 1) * compare(key(a), key(b)));
+  body.append(...lines);
+  table.querySelectorAll("thead th[aria-sort]").forEach((th) => th.setAttribute("aria-sort", "none"));
+  head.setAttribute("aria-sort", down ? "descending" : "ascending");
+}
+
+// --- the filter of a list: lines carry data-search and data-state ---
+function filter() {
+  const tools = document.getElementById("filter");
+  if (!tools) { return; }
+  const search = document.getElementById("search"), show = document.getElementById("show");
+  const lines = [...tools.parentElement.querySelectorAll("tbody tr")];
+  const apply = () => {
+    const words = search.value.toLowerCase().trim();
+    lines.forEach((line) => {
+      line.hidden = !(line.dataset.search.includes(words) && (!show.value || line.dataset.state === show.value));
+    });
+  };
+  const restore = () => { search.value = state.get("q"); show.value = state.get("show"); apply(); };
+  search.addEventListener("input", () => { state.set("q", search.value.trim()); apply(); });
+  show.addEventListener("change", () => { state.set("show", show.value); apply(); });
+  addEventListener("hashchange", restore);
+  tools.hidden = false;
+  restore();
+}
+
+// --- groups of charts of which the reader sees one kind ---
+function switches() {
+  document.querySelectorAll(".switch[data-name]").forEach((group) => {
+    const name = group.dataset.name;
+    const buttons = [...group.querySelectorAll("button")];
+    const apply = () => {
+      const chosen = state.get(name) || buttons[0].value;
+      buttons.forEach((b) => b.setAttribute("aria-pressed", String(b.value === chosen)));
+      document.querySelectorAll(`[data-${name}]`).forEach((part) => { part.hidden = part.dataset[name] !== chosen; });
+    };
+    buttons.forEach((b) => b.addEventListener("click", () => { state.set(name, b.value === buttons[0].value ? "" : b.value); apply(); }));
+    addEventListener("hashchange", apply);
+    group.hidden = false;
+    apply();
+  });
+}
+
+function openDetails() {
+  document.querySelectorAll("details[id]").forEach((box) => {
+    box.open = state.get("open").split(" ").includes(box.id) || box.open;
+    box.addEventListener("toggle", () => {
+      const open = [...document.querySelectorAll("details[id][open]")].map((d) => d.id).join(" ");
+      state.set("open", open);
+    });
+  });
+}
+
+function late() {
+  const note = document.getElementById("late");
+  if (!note) { return; }
+  const days = Math.floor((Date.now() - Date.parse(note.dataset.started)) / 864e5);
+  if (days >= 2) {
+    note.textContent = `The newest night is ${days} days old. Either nobody measured since, or the nightly job has stopped.`;
+    note.hidden = false;
+  }
+}
+
+charts();
+document.querySelectorAll("table.sortable").forEach(sortable);
+filter();
+switches();
+openDetails();
+late();
+document.querySelectorAll("svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });

@@ -1,0 +1,126 @@
+"""Every scalar test is complete: it asks one question, says in which units, and who set its limits."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from engine import explain
+from scalar_tests.case import Metric, ScalarTest
+from scalar_tests.catalogue import CATALOGUE
+
+PRINTED = {  # thesis, section 4.2: limit and unit of the seven continuous tests
+    "beam": (4.9e-9, "%"),
+    "door": (0.02, "%"),
+    "falling_object": (4.904, "m"),
+    "friction": ((0.5 - 1e-4, 0.5 + 1e-4), "1"),
+    "pendulum": (0.004, "%"),
+    "n_pendulum": (16.0, "%"),
+    "planetarium": (2.37, "%"),
+}
+every_test = pytest.mark.parametrize(("name", "test"), CATALOGUE.items(), ids=list(CATALOGUE))
+
+
+def metrics(test: ScalarTest) -> list[Metric]:
+    return [metric for _, metric in test.metrics()]
+
+
+@every_test
+def test_it_asks_one_question_and_says_all_a_reader_needs(name: str, test: ScalarTest) -> None:
+    assert test.question.endswith("?") and test.question.count("?") == 1
+    for text in (test.title, test.why, test.model, test.reference, test.conclusion, test.source):
+        assert text.strip()
+    assert test.theory and all(test.theory)
+    assert any(label == "time step" for label, _ in test.parameters)
+    assert all(label and value for label, value in test.parameters)
+
+
+@every_test
+def test_every_metric_has_unit_description_and_source(name: str, test: ScalarTest) -> None:
+    assert test.measurements
+    for metric in metrics(test):
+        assert metric.description and metric.unit, metric.name
+        assert (metric.limit is None) == (metric.role == "reported"), metric.name
+        assert metric.limit is None or metric.limit_source, metric.name
+        assert metric.set_point is None or metric.set_point_source, metric.name
+
+
+@every_test
+def test_at_least_one_gate_decides(name: str, test: ScalarTest) -> None:
+    assert any(metric.role == "gate" for metric in metrics(test))
+
+
+@every_test
+def test_set_points_lie_inside_their_limits(name: str, test: ScalarTest) -> None:
+    for metric in metrics(test):
+        if metric.set_point is not None:
+            low, high = metric.set_point
+            assert low <= high
+            assert metric.passes(low) and metric.passes(high), metric.name
+
+
+@every_test
+def test_no_limit_accepts_what_is_not_a_number(name: str, test: ScalarTest) -> None:
+    for metric in metrics(test):
+        assert not any(metric.passes(value) for value in (math.nan, math.inf, -math.inf)), metric.name
+
+
+@every_test
+def test_every_series_has_a_name_of_its_own(name: str, test: ScalarTest) -> None:
+    keys = [
+        (m.configuration, m.time_step, tuple(sorted(m.parameters.items())), metric.name)
+        for m, metric in test.metrics()
+    ]
+
+    assert len(set(keys)) == len(keys)
+    assert len({figure.name for figure in test.figures}) == len(test.figures)
+    assert len({ladder.name for ladder in test.ladders}) == len(test.ladders)
+    assert len({study.name for study in test.stability}) == len(test.stability)
+
+
+@every_test
+def test_ladders_run_from_coarse_to_fine_and_say_what_they_expect(name: str, test: ScalarTest) -> None:
+    for ladder in test.ladders:
+        assert list(ladder.time_steps) == sorted(ladder.time_steps, reverse=True)
+        assert len({configuration.name for configuration in ladder.configurations}) == len(
+            ladder.configurations
+        )
+        for configuration in ladder.configurations:
+            if configuration.order_range is not None:
+                low, high = configuration.order_range
+                inside = [h for h in ladder.time_steps if low * (1 - 1e-9) <= h <= high * (1 + 1e-9)]
+                assert len(inside) >= 3, (ladder.name, configuration.name)
+
+
+@every_test
+def test_its_example_compiles_and_every_stage_has_a_reason(name: str, test: ScalarTest) -> None:
+    example = test.example()
+
+    choices = explain(
+        example.scene, time_step=example.time_step, method=example.method, observe=example.observe
+    )
+
+    assert all(choice.reason for choice in choices)
+    assert any(choice.kept for choice in choices)
+
+
+def test_the_seven_stand_first_with_the_limits_as_printed() -> None:
+    seven = {name: test for name, test in CATALOGUE.items() if test.seven}
+
+    assert set(seven) <= set(PRINTED)
+    for name, test in seven.items():
+        gates = [(m, metric) for m, metric in test.metrics() if metric.role == "gate"]
+        assert all(m.time_step == 1.0 / 60.0 for m, _ in gates)
+        assert all((metric.limit, metric.unit) == PRINTED[name] for _, metric in gates)
+        assert all("section 4.2" in metric.limit_source for _, metric in gates)
+    flags = [test.seven for test in CATALOGUE.values()]
+    assert flags == sorted(flags, reverse=True)
+
+
+def test_a_falling_object_needs_gravity_and_positions_only() -> None:
+    example = CATALOGUE["falling_object"].example()
+
+    choices = explain(example.scene, time_step=example.time_step, observe=example.observe)
+
+    assert [choice.stage for choice in choices if choice.kept] == ["apply_gravity", "integrate_positions"]

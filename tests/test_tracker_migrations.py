@@ -1,0 +1,235 @@
+"""The tables in a database are those of the models, by one way: the revisions. They go up and down with rows."""
+
+from __future__ import annotations
+
+from shutil import copytree
+
+import pytest
+from alembic.script import ScriptDirectory
+from sqlalchemy import DateTime, create_engine, inspect, select, text
+from sqlalchemy.orm import Session
+
+from tests.run_documents import definition, run, run_of, sample
+from tracker import models
+from tracker.database import database_url, head, open_database, upgrade
+from tracker.database_copy import digest
+from tracker.errors import DatabaseError
+from tracker.record import record
+from tracker.resources import resource
+from tracker.revisions import configuration, differences, revert
+from tracker.series import History
+
+SCRIPTS = ScriptDirectory.from_config(configuration())
+REVISIONS = [script.revision for script in reversed(list(SCRIPTS.walk_revisions()))]
+
+
+def filled(session):
+    """Rows in every table."""
+    record(session, run_of({"old": 1.0}))
+    record(session, run(series=(definition("new", aliases=("old",)),), samples=(sample("new", "nan"),)))
+
+
+def counts(connection):
+    return {
+        name: connection.execute(text(f'SELECT count(*) FROM "{name}"')).scalar_one()
+        for name in inspect(connection).get_table_names()
+        if name != "alembic_version"
+    }
+
+
+def test_there_is_one_line_of_revisions_and_its_head_is_read_from_file_names():
+    assert SCRIPTS.get_heads() == [head()]
+    assert sorted(REVISIONS) == REVISIONS
+
+
+def test_the_newest_revision_is_the_models(session):
+    with session.get_bind().connect() as connection:
+        assert differences(connection) == []
+
+
+def test_a_difference_would_be_seen(session):
+    with session.get_bind().connect() as connection:
+        connection.execute(text("ALTER TABLE machine ADD COLUMN extra TEXT"))
+        connection.execute(text("DROP INDEX ix_sample_series_id"))
+
+        kinds = {difference[0] for difference in differences(connection)}
+
+        assert kinds == {"remove_column", "add_index"}
+        connection.rollback()
+
+
+def test_revisions_carry_the_comments_of_the_models(postgresql_url):
+    """SQLite keeps no comments; PostgreSQL shows them to whoever reads the tables."""
+    engine = open_database(postgresql_url)
+    inspector = inspect(engine)
+    for table in models.Base.metadata.sorted_tables:
+        assert inspector.get_table_comment(table.name)["text"] == table.comment
+        stored = {column["name"]: column["comment"] for column in inspector.get_columns(table.name)}
+        assert stored == {column.name: column.comment for column in table.columns}
+    engine.dispose()
+
+
+def test_all_the_way_down_and_up_again(session, url):
+    filled(session)
+    session.close()
+    engine = session.get_bind().engine
+    with engine.connect() as connection:
+        assert all(counts(connection).values()), "the stairs are walked with rows in every table"
+
+    for step in reversed(REVISIONS):
+        below = SCRIPTS.get_revision(step).down_revision or "base"
+        with engine.begin() as connection:
+            revert(connection, str(below))
+        upgrade(engine, step, keep_copy=False)
+        with engine.begin() as connection:
+            revert(connection, str(below))
+
+    with engine.connect() as connection:
+        assert counts(connection) == {}
+    upgrade(engine)
+    filled(session)
+    assert len(History(session).runs()) == 2
+
+
+def at_head_with_rows(url):
+    engine = open_database(url)
+    with Session(engine) as session:
+        filled(session)
+    return engine
+
+
+def pretend_a_newer_tracker(monkeypatch, tmp_path, body):
+    """Add a revision to a copy of the migrations, as the next tracker will."""
+    folder = copytree(resource("migrations"), tmp_path / "migrations")
+    number = f"{len(REVISIONS) + 1:04}"
+    (folder / "versions" / f"{number}_next.py").write_text(
+        "import sqlalchemy as sa\nfrom alembic import op\n"
+        f"revision = {number!r}\ndown_revision = {REVISIONS[-1]!r}\n\n"
+        f"def upgrade():\n{body}\n\ndef downgrade():\n    pass\n"
+    )
+    monkeypatch.setattr("tracker.database.resource", lambda name: folder)
+    monkeypatch.setattr("tracker.revisions.resource", lambda name: folder)
+    return number
+
+
+REBUILD = """
+    with op.batch_alter_table("run") as batch:
+        batch.alter_column("ci_address", nullable=True)
+    with op.batch_alter_table("engine_version") as batch:
+        batch.alter_column("flags", nullable=True)
+"""
+
+
+def test_rebuilding_a_table_costs_no_rows(url, monkeypatch, tmp_path):
+    """On SQLite a rebuilt table is dropped; with foreign keys on, that would delete what refers to it."""
+    engine = at_head_with_rows(url)
+    with engine.connect() as connection:
+        before = counts(connection)
+        samples = digest(connection, models.Base.metadata.tables["sample"])
+    engine.dispose()
+    number = pretend_a_newer_tracker(monkeypatch, tmp_path, REBUILD)
+
+    engine = open_database(url)
+
+    with engine.connect() as connection:
+        assert connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one() == number
+        assert counts(connection) == before
+        assert digest(connection, models.Base.metadata.tables["sample"]) == samples
+        if engine.dialect.name == "sqlite":
+            assert connection.execute(text("PRAGMA foreign_keys")).scalar_one() == 1
+            assert connection.execute(text("PRAGMA foreign_key_check")).all() == []
+    engine.dispose()
+
+
+def test_a_copy_of_the_file_is_kept_before_an_upgrade(sqlite_url, monkeypatch, tmp_path):
+    at_head_with_rows(sqlite_url).dispose()
+    pretend_a_newer_tracker(monkeypatch, tmp_path, REBUILD)
+
+    open_database(sqlite_url).dispose()
+
+    copies = list(tmp_path.glob("tracker.db.revision-*"))
+    assert [path.name for path in copies] == [f"tracker.db.revision-{REVISIONS[-1]}"]
+    kept = create_engine(f"sqlite:///{copies[0]}")
+    with kept.connect() as connection:
+        assert connection.execute(select(models.Run.id)).all()
+        assert (
+            connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one() == REVISIONS[-1]
+        )
+    kept.dispose()
+
+
+def test_an_upgrade_that_fails_leaves_everything_as_it_was(url, monkeypatch, tmp_path):
+    engine = at_head_with_rows(url)
+    with engine.connect() as connection:
+        before = counts(connection)
+    engine.dispose()
+    with monkeypatch.context() as newer:
+        pretend_a_newer_tracker(newer, tmp_path, REBUILD + "    op.execute('SELECT * FROM nowhere')")
+        with pytest.raises(DatabaseError, match="nowhere"):
+            open_database(url)
+
+    engine = open_database(url, readonly=True)
+    with engine.connect() as connection:
+        assert counts(connection) == before
+        assert differences(connection) == []
+    engine.dispose()
+
+
+def test_an_older_database_is_not_upgraded_by_reading_it(url, monkeypatch, tmp_path):
+    at_head_with_rows(url).dispose()
+    pretend_a_newer_tracker(monkeypatch, tmp_path, REBUILD)
+
+    with pytest.raises(DatabaseError, match="older schema than this tracker; run: tracker db upgrade"):
+        open_database(url, readonly=True)
+
+
+def test_a_newer_database_is_refused(url, monkeypatch, tmp_path):
+    with monkeypatch.context() as newer:
+        number = pretend_a_newer_tracker(newer, tmp_path, "    pass")
+        at_head_with_rows(url).dispose()
+
+    for readonly in (False, True):
+        with pytest.raises(DatabaseError, match=f"has schema revision {number}, .* update the tracker"):
+            open_database(url, readonly=readonly)
+
+
+def test_no_key_of_a_large_table_lacks_the_time():
+    """Hypertables and partitions ask for it, and that nobody refers to the large tables."""
+    metadata = models.Base.metadata
+    large = {name for name, table in metadata.tables.items() if "run_key" in table.columns}
+
+    assert large == {"sample", "evidence", "timing", "figure", "stability_map"}
+    for name in large:
+        table = metadata.tables[name]
+        assert next(iter(table.primary_key.columns)).name == "started_at"
+        assert all("started_at" in index.columns for index in table.indexes)
+        assert not table.foreign_keys & {key for key in table.foreign_keys if key.column.table.name in large}
+    for table in metadata.tables.values():
+        assert {key.column.table.name for key in table.foreign_keys}.isdisjoint(large)
+
+
+def test_every_table_and_column_says_what_it_holds():
+    for table in models.Base.metadata.tables.values():
+        assert table.comment
+        for column in table.columns:
+            assert column.comment, f"{table.name}.{column.name} has no comment"
+
+
+def test_no_type_or_default_that_one_database_lacks():
+    for table in models.Base.metadata.tables.values():
+        for column in table.columns:
+            assert column.server_default is None
+            assert "ENUM" not in str(column.type).upper()
+            if isinstance(column.type, DateTime):
+                assert column.type.timezone
+
+
+def test_urls_are_understood(monkeypatch):
+    monkeypatch.delenv("TRACKER_DB", raising=False)
+    assert str(database_url()) == "sqlite:///tracker.db"
+    assert database_url("history.db").database == "history.db"
+    monkeypatch.setenv("TRACKER_DB", "postgresql://user:secret@host/db")
+    assert database_url().get_backend_name() == "postgresql"
+    for wrong in ("mysql://host/db", "://", "sqlite://host:port/x"):
+        with pytest.raises(DatabaseError):
+            database_url(wrong)

@@ -1,0 +1,171 @@
+"""Run times: silence where there is only noise, red where something changed."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tracker.change_points import change_points
+from tracker.document import Timing
+from tracker.noise import judge_noisy
+from tracker.timing_statistics import compare_times, rank_test
+
+
+def noisy(count: int, seed: int, level: float = 1e-3, noise: float = 0.01) -> list[float]:
+    source = random.Random(seed)
+    return [level * (1.0 + source.gauss(0.0, noise)) for _ in range(count)]
+
+
+def states(values, **options) -> list[str]:
+    return [night.state for night in judge_noisy(values, **options)]
+
+
+def test_fifty_series_of_a_thousand_noisy_nights_raise_no_alarm():
+    alarms = sum(state != "green" for seed in range(50) for state in states(noisy(1000, seed)))
+
+    assert alarms <= 1  # one unusual night may be suspected; 50 000 nights must not turn red
+    assert not any("detected" in states(noisy(1000, seed)) for seed in range(50, 55))
+
+
+def test_heavy_tails_are_suspected_at_most():
+    draws = np.random.default_rng(1).standard_t(3, size=(10, 500))
+
+    assert not any("detected" in states(list(1e-3 * (1.0 + 0.01 * series))) for series in draws)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_ten_per_cent_more_at_one_per_cent_noise_is_red_within_two_nights(seed):
+    told = judge_noisy([*noisy(60, seed), *noisy(3, 100 + seed, level=1.1e-3)])
+
+    assert "detected" not in [night.state for night in told[:60]]
+    assert told[61].state == "detected"
+    assert (told[61].verdict.name, told[61].first_bad, told[61].last_good) == ("slower", 60, 59)
+    assert told[62].state == "detected"
+
+
+def test_one_slow_night_is_suspected_and_forgotten():
+    told = states([*noisy(30, 1), 1.3e-3, *noisy(5, 2)])
+
+    assert told[30] == "suspected"
+    assert set(told[31:]) == {"green"}
+
+
+def test_a_mended_slowdown_is_recovered():
+    told = states([*noisy(30, 1), *noisy(3, 2, level=1.3e-3), *noisy(3, 3)])
+
+    assert told[30:] == ["suspected", "detected", "detected", "recovered", "green", "green"]
+
+
+def test_a_speed_up_becomes_the_new_level():
+    told = judge_noisy([*noisy(30, 1), *noisy(40, 2, level=0.8e-3), *noisy(2, 3)])
+
+    assert "detected" not in [night.state for night in told[:70]]
+    assert told[71].state == "detected"  # back to the old time is slower now
+
+
+def test_slow_creep_is_drift_against_the_last_release():
+    values = [value * 1.001**night for night, value in enumerate(noisy(200, 4))]
+    told = judge_noisy(values, releases=[night == 0 for night in range(200)])
+    red = [night for night in told if night.state == "detected"]
+
+    assert red
+    assert {night.verdict.name for night in red} <= {"drift", "slower"}
+    assert red[0].verdict.name == "drift"
+
+
+def test_a_time_that_is_not_finite_is_red_that_same_night():
+    told = judge_noisy([*noisy(10, 1), math.inf])
+
+    assert (told[-1].state, told[-1].verdict.name) == ("detected", "not finite")
+
+
+def test_a_target_that_was_never_reached_is_not_worse_for_it():
+    assert states([math.inf, math.inf]) == ["green", "green"]
+    assert states([math.inf, 1.0, math.inf]) == ["green", "green", "detected"]
+
+
+def test_an_accepted_level_is_the_new_usual():
+    values = [*noisy(30, 1), *noisy(10, 2, level=1.3e-3)]
+    told = states(values, accepted=[i >= 30 for i in range(40)])
+
+    assert told[30] == "accepted"
+    assert set(told[31:]) == {"green"}
+
+
+def test_a_step_is_found_where_it_is_and_its_levels_are_told():
+    (point,) = change_points([*noisy(45, 1), *noisy(15, 2, level=1.05e-3)], name="a")
+
+    assert abs(point.place - 45) <= 1
+    assert abs(point.after / point.before - 1.05) < 0.01
+    assert point.probability <= 0.005
+
+
+def test_two_steps_are_two_change_points():
+    values = [*noisy(40, 1), *noisy(40, 2, level=1.2e-3), *noisy(40, 3)]
+
+    assert [round(point.place / 40) for point in change_points(values)] == [1, 2]
+
+
+def test_noise_has_no_change_points():
+    assert not any(change_points(noisy(200, seed), name=str(seed)) for seed in range(30))
+    assert change_points([1.0] * 50) == []
+    assert change_points([1.0, 2.0]) == []
+    assert not change_points([math.nan] * 20)
+
+
+def test_the_same_history_gives_the_same_answer():
+    values = [*noisy(45, 1), *noisy(15, 2, level=1.05e-3)]
+
+    assert change_points(values, name="a") == change_points(values, name="a")
+
+
+@pytest.mark.parametrize(("n", "m"), [(5, 5), (5, 7), (10, 10), (30, 30)])
+def test_the_rank_test_agrees_with_scipy(n, m):
+    draws = np.random.default_rng(n)
+    low, high = list(draws.normal(size=n)), list(draws.normal(0.7, size=m))
+    expected = stats.mannwhitneyu(
+        high, low, alternative="greater", method="auto" if n > 20 else "exact"
+    ).pvalue
+
+    assert abs(rank_test(low, high) - expected) < 1e-12
+    assert rank_test([1.0] * 5, [1.0] * 5) > 0.5
+
+
+def timing(seed: int, level: float, noise: float = 0.01, instructions: int | None = None) -> Timing:
+    source = random.Random(seed)
+    seconds = tuple(level * (1.0 + abs(source.gauss(0.0, noise))) for _ in range(5))
+    return Timing(seconds=seconds, runs_per_repeat=1, instructions=instructions)
+
+
+def ladder(seed: int, factor: float = 1.0, **options) -> list[Timing]:
+    return [timing(seed * 100 + i, factor * 1e-3 * 2**i, **options) for i in range(6)]
+
+
+def test_doubled_run_times_are_slower_and_the_same_build_is_not():
+    slower = compare_times(ladder(1), ladder(2, 2.0))
+
+    assert slower.slower
+    assert abs(slower.ratio - 2.0) < 0.05
+    for seed in range(100):
+        same = compare_times(ladder(seed), ladder(1000 + seed, noise=0.05))
+        assert not same.slower
+        assert not same.faster
+
+
+def test_the_same_instructions_need_a_gross_change_to_be_believed():
+    before = ladder(1, instructions=10**6)
+
+    assert not compare_times(before, ladder(2, 1.3, instructions=10**6)).slower
+    assert compare_times(before, ladder(2, 1.3, instructions=13 * 10**5)).slower
+    assert compare_times([], []) is None
+
+
+def test_one_slow_rung_is_not_a_slower_engine():
+    after = ladder(2)
+    after[3] = timing(7, 20.0)
+
+    assert not compare_times(ladder(1), after).slower

@@ -1,0 +1,284 @@
+"""The website as files: complete, the same bytes twice, harmless, and never half written."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import re
+import time
+import xml.etree.ElementTree as ElementTree
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import ClassVar
+
+import plotly.graph_objects as go
+import plotly.offline
+import pytest
+
+from tests.synthetic_history import SEVEN, DocumentHistory, document, history
+from tracker.document import to_number
+from tracker.folder import MARKER, FolderError, replacing
+from tracker.publish import publish
+from tracker.resources import resource
+
+
+class Reader(HTMLParser):
+    """Gathers what a browser would: elements, scripts, links, text."""
+
+    VOID: ClassVar = {"meta", "link", "input", "br", "img", "hr"}
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.open: list[str] = []
+        self.texts: list[str] = []
+        self.data: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+        if tag not in self.VOID:
+            self.open.append(tag)
+        if tag == "script":
+            self.data.append("")
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag, f"</{tag}> closes another element"
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.data[-1] += data
+        else:
+            self.texts.append(data)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site of thirty nights with a regression, a NaN and a hostile test."""
+    out = tmp_path_factory.mktemp("published") / "public"
+    publish(history(30, broken=26, hostile=True), out)
+    return out
+
+
+def html_pages(site: Path) -> list[Path]:
+    return sorted(site.rglob("*.html"))
+
+
+def files(site: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(site)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in site.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_every_test_has_a_page_and_every_local_link_leads_somewhere(site: Path) -> None:
+    assert {f"{name}.html" for name in SEVEN} < {path.name for path in (site / "tests").iterdir()}
+
+    for page in html_pages(site):
+        for tag, attributes in Reader(page.read_text()).elements:
+            target = attributes.get("href") if tag in ("a", "link") else attributes.get("src")
+            if target and not target.startswith(("#", "https://github.com/example/")):
+                assert (page.parent / target.partition("#")[0]).is_file(), f"{page.name} links to {target}"
+
+
+def test_the_index_says_what_is_red_with_unit_limit_and_margin(site: Path) -> None:
+    text = " ".join(" ".join(Reader((site / "index.html").read_text()).texts).split())
+
+    assert "One limit is broken tonight" in text
+    assert "6 of 7 gates of the thesis’ seven tests hold." in text
+    assert "1.635 m ≤ 4.904 m 33.3 % of the limit PASS" in text
+    assert "0.5003 0.4999 … 0.5001 3 times the limit FAIL" in text
+
+
+def test_no_page_runs_anything_but_its_own_files(site: Path) -> None:
+    for page in html_pages(site):
+        reader = Reader(page.read_text())
+        assert reader.open == [], f"{page.name} leaves elements open"
+        policy = [
+            a["content"] for tag, a in reader.elements if a.get("http-equiv") == "Content-Security-Policy"
+        ]
+        assert len(policy) == 1
+        assert "default-src 'none'; script-src 'self';" in policy[0]
+        scripts = [a for tag, a in reader.elements if tag == "script"]
+        assert all("src" in a or a["type"] == "application/json" for a in scripts)
+        for tag, attributes in reader.elements:
+            assert not [name for name in attributes if name.startswith("on")], f"{page.name}: {tag}"
+            assert "javascript:" not in attributes.get("href", "")
+            assert not attributes.get("src", "").startswith(("http", "//"))
+
+
+def test_hostile_text_stays_text(site: Path) -> None:
+    hostile_page = next(p for p in (site / "tests").iterdir() if p.stem not in SEVEN)
+    reader = Reader(hostile_page.read_text())
+
+    assert re.fullmatch(r"[a-z0-9-]{1,60}\.html", hostile_page.name)
+    assert not [tag for tag, _ in reader.elements if tag in ("img", "b")]
+    assert "<img src=x onerror=alert(1)>" in "".join(reader.texts)
+    assert "\u202e" not in hostile_page.read_text()
+    assert "\x00" not in hostile_page.read_text()
+    for told in (json.loads(data) for data in reader.data if data.strip()):
+        assert "<" not in json.dumps([told.get("title"), told["layout"]["xaxis"]["title"]])
+
+
+def test_the_csv_files_hold_every_digit_and_no_formula(site: Path) -> None:
+    lines = list(csv.DictReader(io.StringIO((site / "data" / "tonight.csv").read_text())))
+    gates = {line["test"]: line for line in lines if line["role"] == "gate"}
+
+    assert float(gates["friction"]["value"]) == 0.5003
+    assert gates["friction"]["outcome"] == "out_of_limit"
+    assert float(gates["beam"]["value"]) == 4.1e-16
+    assert any(line["value"] == "nan" for line in lines)
+    assert not [c for line in lines for c in line.values() if c.startswith(("=", "@", "+"))]
+    nights = list(csv.reader(io.StringIO((site / "data" / "friction-history.csv").read_text())))
+    assert len(nights) == 31
+
+
+def test_the_json_files_are_strict_json(site: Path) -> None:
+    def refuse(text: str) -> float:
+        raise AssertionError(f"{text} is no JSON")
+
+    whole = json.loads((site / "data" / "n_pendulum.json").read_text(), parse_constant=refuse)
+
+    values = [v for series in whole["series"] for v in series["values"]]
+    assert "nan" in values
+    assert len(whole["nights"]) == 30
+
+
+def test_feed_and_badge_tell_the_regressions(site: Path) -> None:
+    feed = ElementTree.parse(site / "feed.xml").getroot()
+    names = {"a": "http://www.w3.org/2005/Atom"}
+    titles = [entry.text or "" for entry in feed.findall("a:entry/a:title", names)]
+    ids = [entry.text for entry in feed.findall("a:entry/a:id", names)]
+
+    assert any(title.startswith("friction: deviation regressed") for title in titles)
+    assert len(ids) == len(set(ids))
+    badge = json.loads((site / "badge.json").read_text())
+    assert badge == {"schemaVersion": 1, "label": "physics", "message": "7 of 8 limits kept", "color": "red"}
+    assert "7 of 8 limits kept" in ElementTree.parse(site / "badge.svg").getroot().attrib["aria-label"]
+
+
+def test_plotly_accepts_every_figure(site: Path) -> None:
+    """The figures are plain data made without Plotly; its own validators must take them."""
+    drawn = 0
+    for page in html_pages(site):
+        for told in (json.loads(data) for data in Reader(page.read_text()).data if data.strip()):
+            if "layout" not in told:
+                continue
+            layout = {k: v for k, v in told["layout"].items() if k not in ("shapes", "annotations")}
+            go.Figure(data=told["data"], layout=layout)
+            drawn += 1
+
+    assert drawn > 50
+
+
+def test_the_bundle_is_the_version_plotly_for_python_expects() -> None:
+    bundle = resource("site") / "static" / "plotly-cartesian.min.js"
+
+    assert bundle.stat().st_size < 3e6
+    assert f"v{plotly.offline.get_plotlyjs_version()}" in bundle.read_text(encoding="utf-8")[:200]
+
+
+def test_the_same_history_gives_the_same_bytes(site: Path, tmp_path: Path) -> None:
+    publish(history(30, broken=26, hostile=True), tmp_path / "again")
+
+    assert files(site) == files(tmp_path / "again")
+
+
+def test_unchanged_pages_are_kept_and_a_new_night_changes_them(tmp_path: Path) -> None:
+    out = tmp_path / "public"
+    first = publish(history(5), out)
+    inode = (out / "tests" / "beam.html").stat().st_ino
+    second = publish(history(5), out)
+    third = publish(history(6), out)
+
+    assert first.skipped == 0
+    assert (0, first.written) == (second.written, second.skipped)
+    assert third.written > 20
+    assert (out / "tests" / "beam.html").stat().st_ino != inode
+    assert (out / "tests" / "beam.html").stat().st_nlink == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["public"]
+
+
+def test_a_strange_folder_is_not_touched(tmp_path: Path) -> None:
+    mine = tmp_path / "photos"
+    mine.mkdir()
+    (mine / "cat.jpg").write_text("meow")
+    link = tmp_path / "link"
+    link.symlink_to(mine)
+    (tmp_path / "file").write_text("")
+
+    for out in (mine, link, tmp_path / "file"):
+        with pytest.raises(FolderError, match="choose"):
+            publish(history(1), out)
+    assert [path.name for path in mine.iterdir()] == ["cat.jpg"]
+
+
+def test_an_interrupted_build_leaves_the_old_site(tmp_path: Path) -> None:
+    out = tmp_path / "public"
+    publish(history(2), out)
+    before = files(out)
+
+    with pytest.raises(KeyboardInterrupt), replacing(out) as folder:
+        folder.add("index.html", "half", lambda: b"half")
+        raise KeyboardInterrupt
+
+    assert before == files(out)
+    assert [path.name for path in tmp_path.iterdir()] == ["public"]
+
+
+def test_the_site_can_be_swapped_without_exchanging_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the system cannot exchange two folders in one step, the old one steps aside."""
+    out = tmp_path / "public"
+    publish(history(1), out)
+    monkeypatch.setattr("tracker.folder._exchange", lambda one, other: False)
+    publish(history(2), out)
+
+    assert (out / MARKER).is_file()
+    assert [path.name for path in tmp_path.iterdir()] == ["public"]
+
+
+def test_a_history_without_runs_still_says_so(tmp_path: Path) -> None:
+    publish(DocumentHistory([]), tmp_path / "public")
+
+    assert "Nothing is recorded yet" in (tmp_path / "public" / "index.html").read_text()
+
+
+def test_other_engines_do_not_mix_into_the_nights_of_ours(tmp_path: Path) -> None:
+    runs = [document(0), document(1), document(0, name="other")]
+    publish(DocumentHistory(runs), tmp_path / "public")
+
+    lines = (tmp_path / "public" / "data" / "nights.csv").read_text().splitlines()
+    assert len(lines) == 3
+
+
+def test_ten_years_of_nights_are_published_in_seconds(tmp_path: Path) -> None:
+    long = history(3650)
+    start = time.perf_counter()
+    publish(long, tmp_path / "public")
+    taken = time.perf_counter() - start
+
+    assert taken < 20.0
+    assert max(path.stat().st_size for path in (tmp_path / "public" / "tests").iterdir()) < 1_500_000
+
+
+def test_a_value_that_is_no_number_is_never_green(tmp_path: Path) -> None:
+    run = document(0)
+    gate = next(s for s in run.series if s.role == "gate" and s.test == "beam")
+    lost = tuple(
+        type(s)(series=s.series, value=to_number(float("nan")), outcome="diverged", passed=False, set_point_held=False)
+        if s.series == gate.key else s
+        for s in run.samples
+    )  # fmt: skip
+    changed = type(run)(**{name: getattr(run, name) for name in run.__struct_fields__} | {"samples": lost})
+    publish(DocumentHistory([changed]), tmp_path / "public")
+    text = " ".join(" ".join(Reader((tmp_path / "public" / "index.html").read_text()).texts).split())
+
+    assert "diverged ≤ 4.9×10⁻⁹ % no value FAIL" in text

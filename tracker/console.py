@@ -1,0 +1,180 @@
+"""The terminal: width, colour, aligned tables, and what to show while a run is under way.
+
+Colour only underlines what words and symbols say already. A pipe gets plain text, one line per test as it
+finishes; a terminal gets a progress bar.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import unicodedata
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal, TextIO
+
+import click
+
+PIPE_WIDTH = 120  # columns, where no terminal says otherwise
+PLAIN = str.maketrans(
+    {
+        "✓": "+",
+        "✗": "x",
+        "≤": "<",
+        "≥": ">",
+        "±": "~",
+        "…": ".",
+        "→": ">",
+        "−": "-",
+        "·": "|",
+        "●": "*",
+        "─": "-",
+        "×": "x",
+    }
+)
+BARS = "▁▂▃▄▅▆▇█"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table; the flexible one gives way when the terminal is narrow."""
+
+    title: str
+    align: Literal["left", "right"] = "left"
+    flexible: bool = False
+
+
+Style = Callable[[int, str], str]  # row and padded text of a cell, to coloured text
+
+
+def width() -> int:
+    """Columns to fill: COLUMNS, the terminal's, or those of a pipe."""
+    return max(60, shutil.get_terminal_size((PIPE_WIDTH, 24)).columns)
+
+
+def is_terminal(stream: TextIO) -> bool:
+    """Whether somebody is looking at the stream."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def say(text: str = "", err: bool = False) -> None:
+    """Print, in plain letters where the stream's encoding has no others, without colour in a pipe."""
+    stream = sys.stderr if err else sys.stdout
+    try:
+        text.encode(stream.encoding or "utf-8")
+    except (UnicodeEncodeError, LookupError):
+        text = text.translate(PLAIN).encode("ascii", "replace").decode()
+    click.echo(text, err=err, color=False if "NO_COLOR" in os.environ else None)
+
+
+def cells(text: str) -> int:
+    """Columns a text takes: wide letters two, combining marks none."""
+    return sum(
+        0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
+    )
+
+
+def clean(text: str) -> str:
+    """Text from outside on one line, its control characters made visible."""
+    return "".join(
+        c if c.isprintable() else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text
+    )
+
+
+def fit(text: str, room: int, align: str = "left") -> str:
+    """A text cut or padded to exactly that many columns."""
+    if cells(text) > room:
+        while text and cells(text) > room - 1:
+            text = text[:-1]
+        text += "…"
+    padding = " " * (room - cells(text))
+    return padding + text if align == "right" else text + padding
+
+
+def table(
+    columns: Sequence[Column],
+    rows: Sequence[Sequence[str]],
+    room: int | None = None,
+    colour: dict[int, Style] | None = None,
+) -> list[str]:
+    """Aligned lines with a heading and a rule; flexible columns shrink until the table fits."""
+    room = room or width()
+    rows = [[clean(cell) for cell in row] for row in rows]
+    widths = [
+        max([cells(column.title), *(cells(row[i]) for row in rows)]) for i, column in enumerate(columns)
+    ]
+    excess = sum(widths) + 2 * (len(columns) - 1) - room
+    for i in sorted(range(len(columns)), key=lambda i: -widths[i]):
+        if excess > 0 and columns[i].flexible:
+            cut = min(excess, widths[i] - 8)
+            if cut > 0:
+                widths[i] -= cut
+                excess -= cut
+    heading = "  ".join(fit(c.title, w, c.align) for c, w in zip(columns, widths, strict=True))
+    lines = [click.style(heading.rstrip(), bold=True), "─" * min(room, sum(widths) + 2 * (len(widths) - 1))]
+    for number, row in enumerate(rows):
+        padded = [fit(cell, w, c.align) for cell, w, c in zip(row, widths, columns, strict=True)]
+        for place, style in (colour or {}).items():
+            padded[place] = style(number, padded[place])
+        lines.append("  ".join(padded).rstrip())
+    return lines
+
+
+def sparkline(values: Sequence[float], room: int = 60) -> str:
+    """Values as bars, the newest at the right; what is not finite is a cross."""
+    import math
+
+    shown = list(values)[-room:]
+    finite = [value for value in shown if math.isfinite(value)]
+    low, high = min(finite, default=0.0), max(finite, default=0.0)
+    spread = high - low
+    bars = []
+    for value in shown:
+        if not math.isfinite(value):
+            bars.append("×")
+        else:
+            level = (value - low) / spread if spread > 0.0 and math.isfinite(spread) else 0.5
+            bars.append(BARS[min(len(BARS) - 1, int(level * len(BARS)))])
+    return "".join(bars)
+
+
+@contextmanager
+def watching(title: str) -> Iterator[Callable[[int, int, str, bool, tuple[str, ...]], None]]:
+    """A function to call after each piece of work: (done, total, test, test finished, failed series)."""
+    if not is_terminal(sys.stderr):
+        failures: dict[str, list[str]] = {}
+
+        def line(done: int, total: int, test: str, finished: bool, failed: tuple[str, ...]) -> None:
+            failures.setdefault(test, []).extend(failed)
+            if finished:
+                bad = failures[test]
+                say(
+                    f"[{done:>{len(str(total))}}/{total}] {test}" + (f": {len(bad)} red" if bad else ""),
+                    err=True,
+                )
+
+        yield line
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    shown = Progress(
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[test]}", markup=False),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with shown:
+        bar = shown.add_task(title, total=None, test="")
+
+        def step(done: int, total: int, test: str, finished: bool, failed: tuple[str, ...]) -> None:
+            shown.update(bar, completed=done, total=total, test=test)
+            for key in failed:
+                shown.console.print(f"✗ {key}", style="red", markup=False, highlight=False)
+
+        yield step

@@ -1,0 +1,198 @@
+"""A comparison for a terminal, for a pull request, and the lines about what is red."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import click
+
+from tracker.analyse import Finding
+from tracker.compare_document import Change, CompareDocument, Frontier, Side
+from tracker.console import Column, clean, table, width
+from tracker.document import Number, from_number
+
+MARK = {
+    "regressed": "✗",
+    "missing": "✗",
+    "non_deterministic": "✗",
+    "not_comparable": "?",
+    "accepted": "!",
+    "fixed": "✓",
+    "improved": "✓",
+    "identical": "=",
+    "same": "=",
+}
+COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
+QUIET = {"identical", "same", "not_measured"}
+TOLD = 0.05  # relative change of a ladder worth a line
+MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
+
+
+def value(number: Number | None, unit: str = "") -> str:
+    """A value for a table; enough digits to see a change."""
+    if number is None:
+        return "-"
+    return f"{from_number(number):.9g} {unit if unit != '1' else ''}".rstrip()
+
+
+def name_of(side: Side) -> str:
+    """Version and commit of a side."""
+    commit = f" ({side.git_hash[:10]})" if side.git_hash else ""
+    return clean(f"{side.engine} {side.version}{commit}" + (" with local changes" if side.dirty else ""))
+
+
+def limit_of(change: Change) -> str:
+    if change.limit is None:
+        return "no limit"
+    if isinstance(change.limit, tuple):
+        return f"limit {change.limit[0]:g} … {change.limit[1]:g}"
+    return f"limit {change.limit:g}"
+
+
+def red_line(change: Change) -> str:
+    """All a reader needs to act: test, metric, both values, limit, first bad commit, page to open."""
+    parts = [
+        f"✗ {change.test} {change.metric} [{change.configuration}]: {change.name or change.word}",
+        f"{value(change.before, change.unit)} → {value(change.after, change.unit)}",
+        limit_of(change),
+        change.sentence,
+    ]
+    if change.first_bad:
+        parts.append(f"first bad commit {change.first_bad}, last good {change.last_good or 'unknown'}")
+    if change.page:
+        parts.append(f"see {change.page}")
+    return clean("; ".join(part for part in parts if part))
+
+
+def compare_table(document: CompareDocument, everything: bool = False, room: int | None = None) -> str:
+    """The comparison for a terminal: what is red in full, the rest in a table, the verdict last."""
+    shown = [change for change in document.changes if everything or change.word not in QUIET]
+    lines = [click.style(f"{name_of(document.before)} → {name_of(document.after)}", bold=True), ""]
+    if shown:
+        rows = [
+            (
+                _what(change),
+                change.series,
+                value(change.before),
+                value(change.after, change.unit),
+                change.sentence,
+            )
+            for change in shown
+        ]
+        columns = (
+            Column("what"),
+            Column("series", flexible=True),
+            Column("before", "right"),
+            Column("after", "right"),
+            Column("how", flexible=True),
+        )
+        lines += [*table(columns, rows, room or width(), {0: _paint}), ""]
+    reds = [click.style(red_line(change), fg="red") for change in document.changes if change.red]
+    lines += [*reds, ""] if reds else []
+    lines += _frontier_lines(document.frontiers, room or width())
+    lines += [f"note: {clean(note)}" for note in document.notes]
+    lines.append(_verdict(document))
+    return "\n".join(lines)
+
+
+def _what(change: Change) -> str:
+    """Mark and word; of a regression its name."""
+    word = change.name if change.red and change.name else change.word.replace("_", " ")
+    return f"{MARK.get(change.word, '·')} {word}"
+
+
+def _paint(_row: int, text: str) -> str:
+    return click.style(text, fg=COLOUR.get(text[:1]))
+
+
+def _frontier_lines(frontiers: Sequence[Frontier], room: int) -> list[str]:
+    told = [f for f in frontiers if any(r and abs(math.log(r)) > TOLD for r in _ratios(f))]
+    if not told:
+        return []
+    rows = [
+        (f"{f.test} {f.ladder}", f.configuration, *(f"{r:.3g}" if r else "-" for r in _ratios(f)))
+        for f in told
+    ]
+    columns = (
+        Column("error against run time", flexible=True),
+        Column("configuration"),
+        Column("time at equal error", "right"),
+        Column("error at equal time", "right"),
+        Column("steps at equal error", "right"),
+    )
+    return [*table(columns, rows, room), "(later / earlier; above 1 is worse)", ""]
+
+
+def _ratios(frontier: Frontier) -> tuple[float | None, float | None, float | None]:
+    return frontier.time_at_equal_error, frontier.error_at_equal_time, frontier.work_at_equal_error
+
+
+def counted(document: CompareDocument) -> str:
+    """Counts by word, the worst first."""
+    return ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in document.counts.items())
+
+
+def _verdict(document: CompareDocument) -> str:
+    mark = {"regressed": "✗", "not_comparable": "?"}.get(document.verdict, "✓")
+    words = f"{mark} {document.verdict.replace('_', ' ')}: {counted(document) or 'nothing measured'}"
+    return click.style(words, fg=COLOUR.get(mark), bold=True)
+
+
+def compare_markdown(document: CompareDocument) -> str:
+    """The comparison as Markdown; names and sentences from outside are data, never markup."""
+    lines = [
+        f"### {_escape(name_of(document.before))} → {_escape(name_of(document.after))}",
+        "",
+        f"**{document.verdict.replace('_', ' ')}**: {counted(document)}",
+        "",
+    ]
+    shown = [change for change in document.changes if change.word not in QUIET]
+    if shown:
+        lines += ["| | series | before | after | limit | how |", "|---|---|---:|---:|---|---|"]
+    for change in shown[:MOST_ROWS]:
+        cells = (
+            _what(change),
+            change.series,
+            value(change.before),
+            value(change.after, change.unit),
+            limit_of(change),
+            change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
+        )
+        lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
+    if len(shown) > MOST_ROWS:
+        lines.append(f"\nand {len(shown) - MOST_ROWS} more")
+    lines += ["", *(f"- {_escape(note)}" for note in document.notes)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _escape(text: str) -> str:
+    """Markdown and HTML signs made harmless."""
+    text = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return "".join("\\" + c if c in "\\`*_{}[]#|~!" else c for c in text).replace(
+        "@", "@\N{ZERO WIDTH SPACE}"
+    )
+
+
+def finding_lines(findings: Sequence[Finding]) -> list[str]:
+    """What tonight came to against the history: a line for each red series, and one over all."""
+    lines = [click.style(_finding_line(finding), fg="red") for finding in findings if finding.red]
+    if lines:
+        return [*lines, click.style(f"✗ {len(lines)} worse than the history", fg="red", bold=True)]
+    return [click.style(f"✓ {len(findings)} series hold their level", fg="green")]
+
+
+def _finding_line(finding: Finding) -> str:
+    from tracker.compare import page_of
+
+    judged, definition = finding.judged, finding.definition
+    parts = [f"✗ {finding.series}: {finding.verdict.name or finding.verdict.word}"]
+    if judged is not None and definition is not None:
+        before = judged.against.sample.value if judged.against else None
+        parts.append(f"{value(before)} → {value(judged.night.sample.value, definition.unit)}")
+        parts.append(f"limit {definition.limit}" if definition.limit is not None else "no limit")
+    parts.append(finding.verdict.sentence)
+    if finding.first_bad:
+        parts.append(f"first bad commit {finding.first_bad}, last good {finding.last_good or 'unknown'}")
+    parts.append(f"see {page_of(finding.test)}")
+    return clean("; ".join(parts))
