@@ -118,7 +118,7 @@ def test_a_green_run_prints_the_pass_table_and_ends_with_0(monkeypatch):
     assert shown.exit_code == 0
     assert f"toy 1.0.0 · {GOOD[:10]}" in shown.output
     row = next(line for line in shown.output.splitlines() if "position_error" in line)
-    for cell in ("fall", "plain", "0.01", "-0.05 m", "≤ 0.1 m", "+50 %", "held", "✓ PASS"):
+    for cell in ("position_error [plain]", "0.01", "-0.05 m", "≤ 0.1 m", "+50 %", "held", "✓ PASS"):
         assert cell in row
     assert "green: all 2 limits and set points hold" in shown.output
     assert shown.stderr.splitlines() == ["[1/2] fall", "[2/2] stand"]

@@ -9,8 +9,9 @@ import click
 
 from tracker.console import Column, Style, clean, table, width
 from tracker.document import RunDocument, Sample, SeriesDefinition, from_number
+from tracker.report_sweep import sweep_table
 
-NARROW = 100  # columns; below, the test is a heading and configuration stands beside the metric
+NARROW = 100  # columns; below, time step and set point have no column of their own
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
 Pair = tuple[SeriesDefinition, Sample]
 
@@ -20,12 +21,12 @@ def number(value: float, digits: int = 6) -> str:
     return f"{value:.{digits}g}"
 
 
-def measured(definition: SeriesDefinition, sample: Sample) -> str:
+def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> str:
     """The value with its unit, or the class of its failure."""
     value = from_number(sample.value)
     if sample.outcome not in ("value", "out_of_limit") and not math.isinf(value):
         return sample.outcome.replace("_", " ")
-    return f"{number(value)} {_unit(definition)}".rstrip()
+    return f"{number(value, digits)} {_unit(definition)}".rstrip()
 
 
 def limit(definition: SeriesDefinition) -> str:
@@ -55,7 +56,7 @@ def margin(definition: SeriesDefinition, sample: Sample) -> str:
         if bound == 0.0:
             return "-"
         share = (value - bound) / abs(bound) * (1.0 if definition.better == "larger" else -1.0)
-        return f"{100.0 * share:+.3g} %"
+        return _percent(share)
     else:
         used, allowed = abs(value), bound
     if used == 0.0:
@@ -63,7 +64,11 @@ def margin(definition: SeriesDefinition, sample: Sample) -> str:
     if allowed <= 0.0:
         return "-"
     decades = math.log10(allowed / used)
-    return f"{decades:+.1f} decades" if abs(decades) >= 1.0 else f"{100.0 * (1.0 - used / allowed):+.3g} %"
+    return f"{decades:+.1f} decades" if abs(decades) >= 1.0 else _percent(1.0 - used / allowed)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:+.3g} %" if abs(share) >= 1e-4 or share == 0.0 else f"{'+-'[share < 0.0]}<0.01 %"
 
 
 def set_point(definition: SeriesDefinition, sample: Sample) -> str:
@@ -107,12 +112,9 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
         shown = [pair for pair in shown if pair[0].role != "reported"]
     lines = [title(run), ""]
     lines += _scalars(shown, room or width())
-    ladders = [pair for pair in pairs(run) if pair[0].kind in ("order", "time")]
+    ladders = [pair for pair in pairs(run) if pair[0].kind in ("ladder", "order", "time")]
     if ladders:
-        failed = sum(d.kind == "ladder" and not s.passed for d, s in pairs(run))
-        lines += ["", click.style("Error against run time", bold=True)]
-        lines += _scalars(ladders, room or width())
-        lines += [f"{failed} ladder points failed"] if failed else []
+        lines += ["", *sweep_table(ladders, room or width())]
     points = [pair for pair in pairs(run) if pair[0].kind == "break_point"]
     if points:
         lines += ["", click.style("Stability", bold=True), *_scalars(points, room or width())]
@@ -129,34 +131,37 @@ def title(run: RunDocument) -> str:
 
 
 def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
+    """A heading row for each test, its values beneath; set point and time step where there is room."""
     narrow = room < NARROW
     rows: list[tuple[str, ...]] = []
     previous = ""
     for definition, sample in shown:
-        first = definition.test != previous
+        columns = NARROW_COLUMNS if narrow else WIDE_COLUMNS
+        if definition.test != previous:
+            rows.append((definition.test, *[""] * (len(columns) - 1)))
         previous = definition.test
-        held, judged = set_point(definition, sample), word(definition, sample)
-        value, bound, room_left = measured(definition, sample), limit(definition), margin(definition, sample)
-        if narrow:
-            if first:
-                rows.append((definition.test, "", "", "", ""))
-            name = f"  {definition.metric} [{definition.configuration}]"
-            judged = "✗ LEFT" if held == "LEFT" and sample.passed else judged
-            rows.append((name, value, bound, room_left.replace("decades", "dec"), judged))
-        else:
-            step = "" if definition.time_step is None else number(definition.time_step, 4)
-            name = definition.test if first else ""
-            place = (name, definition.metric, definition.configuration, step)
-            rows.append((*place, value, bound, room_left, held, judged))
+        rows.append(_row(definition, sample, narrow))
     return table(NARROW_COLUMNS if narrow else WIDE_COLUMNS, rows, room, _styles(narrow))
 
 
+def _row(definition: SeriesDefinition, sample: Sample, narrow: bool) -> tuple[str, ...]:
+    held, judged = set_point(definition, sample), word(definition, sample)
+    facts = [definition.configuration]
+    facts += [f"{name}={number(value, 4)}" for name, value in sorted(definition.parameters.items())]
+    mark = "●" if definition.role == "gate" else " "
+    name, room_left = f"{mark} {definition.metric} [{', '.join(facts)}]", margin(definition, sample)
+    if narrow:
+        judged = "✗ LEFT" if held == "LEFT" and sample.passed else judged
+        bound = limit(definition).removesuffix(f" {_unit(definition)}")
+        return name, measured(definition, sample, 4), bound, room_left.replace("decades", "dec"), judged
+    step = "" if definition.time_step is None else number(definition.time_step, 4)
+    return name, step, measured(definition, sample), limit(definition), room_left, held, judged
+
+
 MEASURED = (Column("measured", "right"), Column("limit", "right"), Column("margin", "right"))
-NARROW_COLUMNS = (Column("test · metric", flexible=True), *MEASURED, Column("verdict"))
+NARROW_COLUMNS = (Column("metric [configuration]", flexible=True), *MEASURED, Column("verdict"))
 WIDE_COLUMNS = (
-    Column("test"),
-    Column("metric", flexible=True),
-    Column("configuration", flexible=True),
+    Column("metric [configuration]", flexible=True),
     Column("h [s]"),
     *MEASURED,
     Column("set point"),
@@ -194,7 +199,9 @@ def verdict(run: RunDocument) -> str:
     if not judged:
         return "nothing was measured against a limit"
     if not bad:
-        return click.style(f"✓ green: all {len(judged)} limits and set points hold", fg="green", bold=True)
+        gates = sum(definition.role == "gate" for definition, _ in judged)
+        words = f"✓ green: all {len(judged)} limits and set points hold, {gates} gates (●) among them"
+        return click.style(words, fg="green", bold=True)
     words = f"✗ red: {len(bad) - left} of {len(judged)} limits broken"
     return click.style(words + (f", {left} set points left" if left else ""), fg="red", bold=True)
 
