@@ -36,7 +36,9 @@ def hanging_chain(
     [m] pushes its spheres left and right in turn."""
     x, z = np.sin(tilt), -np.cos(tilt)
     side = [zigzag * (-1.0) ** i for i in range(count)]
-    places = [((i + 1) * LENGTH * x - side[i] * z, 0.0, (i + 1) * LENGTH * z + side[i] * x) for i in range(count)]
+    places = [
+        ((i + 1) * LENGTH * x - side[i] * z, 0.0, (i + 1) * LENGTH * z + side[i] * x) for i in range(count)
+    ]
     return chain(places, damping, compliance=compliance, load=load)
 
 

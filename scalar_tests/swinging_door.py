@@ -32,6 +32,7 @@ LEAN = math.radians(30.0)  # of the hinge axis from the vertical
 START = 0.5 * math.pi  # rad from the lowest position
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 60.0  # s
+ENERGY_DURATION = 22.0  # s, that of the pendulum it is compared with
 LEVER = 0.5 * SIZE[0]  # m, from the axis to the centre of mass
 INERTIA = MASS * (SIZE[0] ** 2 + SIZE[1] ** 2) / 12.0 + MASS * LEVER**2  # kg m², about the axis
 ACROSS = GRAVITY * math.sin(LEAN)  # m/s², gravity across the axis
@@ -55,7 +56,8 @@ def angles(simulate: Simulate) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and angle [rad] of the door from its lowest position."""
     observe = {"angle": Trace(quantity=JointCoordinate("upper"))}
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
-    return result.sample_times["angle"], START + result["angle"]
+    # Unwrapped, since the far end of the swing lies where the coordinate jumps from −π to π.
+    return result.sample_times["angle"], START + np.unwrap(result["angle"])
 
 
 def measured_period(simulate: Simulate) -> float:
@@ -78,7 +80,7 @@ def _measure_companions(simulate: Simulate) -> dict[str, float]:
         "lower": MaximumAbsolute(quantity=Violation("lower")),
         "upper": MaximumAbsolute(quantity=Violation("upper")),
     }
-    result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    result = simulate(scene(), time_step=TIME_STEP, duration=ENERGY_DURATION, observe=observe)
     return {
         "energy_deviation": float(result["energy"]) / (MASS * ACROSS * LEVER),
         "hinge_violation": float(max(result["lower"].max(), result["upper"].max())),
@@ -147,11 +149,11 @@ TEST = ScalarTest(
             metrics=(
                 Metric(
                     name="energy_deviation",
-                    description="largest deviation of the energy over m g sin β d",
+                    description="largest deviation of the energy in 22 s over m g sin β d",
                     unit="1",
                     role="companion",
                     limit=0.05,
-                    limit_source="the pendulum at the same time step stays within 3.4 %; ours",
+                    limit_source="the pendulum at the same time step and as long stays within 3.4 %; ours",
                     reference=0.0,
                     tolerance=1e-9,
                 ),
