@@ -1,147 +1,175 @@
-"""A plain SPOOK for particles, written only from the equations: dense matrices, nothing clever, nothing shared.
+"""A plain SPOOK for particles, written only from the equations: dense matrices, np.linalg.solve, nothing shared.
 
-One step solves, for all velocities v₊ and multipliers λ at once,
+A row asks, averaged over three positions (Lacoursière 2007, eqs 4.27 and 4.35),
 
-    [ M   −Gᵀ ] [ v₊ ]   [ M v + h f                  ]        Ups = 1/(1 + 4 τ/h)
-    [ G   Sig ] [ λ  ] = [ −(4/h) Ups g + Ups G v      ]        Sig = 4 ε Ups/h²
+    (eps/h) lambda + (g₋ + 2 g + g₊)/4 + (tau/h) (g₊ − g) = 0,      force of the row on the bodies Gᵀ lambda / h.
 
-and then moves x₊ = x + h v₊ (Lacoursière 2007, eqs 4.27 and 4.35, linearised). Slow on purpose.
+With g± = g ± h G v± + c±, the curvatures c dropped or kept, that is one linear system per step in the new
+velocities and the row impulses lambda:
+
+    [ M   −Gᵀ  ] [ v₊     ]   [ M v + h f                                              ]
+    [ G    Sig ] [ lambda ] = [ Ups (G v − (4/h) g) − (4/h) Ups ((c₋ + c₊)/4 + theta c₊) ]
+
+with theta = tau/h, Ups = 1/(1 + 4 theta), Sig = 4 eps Ups/h², and then x₊ = x + h v₊.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from engine import PLAIN, CentralGravity, Distance, Load, Method, Scene, Spring
+from engine import PLAIN, CentralGravity, Distance, Load, Method, Particle, Scene, Spring
+from engine.forces import End
 
 Array = npt.NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Sample:
+    """The state at one time; `velocity` is read at that time, `tension` (rows,) N is of the step before."""
+
+    position: Array  # (n, 3) m
+    velocity: Array  # (n, 3) m/s
+    tension: Array  # (rows,) N, positive where a row pulls its ends together
+    violation: Array  # (rows,) m
+
+
 class Oracle:
-    """One scene of particles; `x` and `v` are (n, 3), `force` the row forces λ/h [N] of the last step."""
+    """One scene of particles, stepped with `step`; `x` and `v` are (n, 3)."""
 
     def __init__(self, scene: Scene, time_step: float, method: Method = PLAIN) -> None:
-        self.scene, self.method = scene, method
-        self.h = time_step / method.substeps
-        self.names = [body.name for body in scene.bodies]
-        self.x = np.array([body.position for body in scene.bodies], dtype=float)
-        self.v = np.array([body.velocity for body in scene.bodies], dtype=float)
-        self.m = np.repeat([body.mass for body in scene.bodies], 3).astype(float)
-        rows = [row for row in scene.constraints if isinstance(row, Distance)]
-        self.ends = [row.between for row in rows]
-        self.length = np.array([scene.length(r) if r.rest_length is None else r.rest_length for r in rows])
-        self.eps = np.array([row.compliance for row in rows])
-        self.tau = np.array([2.0 * self.h if row.damping is None else row.damping for row in rows])
-        self.force = np.zeros(len(rows))
+        self.scene, self.method, self.h = scene, method, time_step / method.substeps
+        self.index = {body.name: i for i, body in enumerate(scene.bodies)}
+        self.rows = [row for row in scene.constraints if isinstance(row, Distance)]
+        assert len(self.rows) == len(scene.constraints)
+        assert all(isinstance(body, Particle) for body in scene.bodies)
+        self.mass = np.array([float(body.mass or 0.0) for body in scene.bodies])
+        self.x = np.array([body.position for body in scene.bodies])
+        self.v = np.array([body.velocity for body in scene.bodies])
+        self.impulse = np.zeros(len(self.rows))  # lambda, N s
+        self.rest = np.array([scene.length(r) if r.rest_length is None else r.rest_length for r in self.rows])
+        self.eps = np.array([r.compliance for r in self.rows])
+        self.theta = np.array([2.0 if r.damping is None else r.damping / self.h for r in self.rows])
         if method.half_step_velocities:
-            self.v = self.v - 0.5 * self.h * self.acceleration()
+            self.v = self.v - 0.5 * self._gain()
 
-    def place(self, end: object, x: Array) -> Array:
-        """Where an end of a row or spring is."""
-        return x[self.names.index(end)] if isinstance(end, str) else np.array(end, dtype=float)
+    # --- the rows ---
+    def between(self, ends: tuple[End, End], x: Array) -> Array:
+        """From the first end to the second, m."""
+        first, second = (x[self.index[end]] if isinstance(end, str) else np.array(end) for end in ends)
+        return second - first
+
+    def rate(self, ends: tuple[End, End], v: Array) -> Array:
+        """How fast that changes, m/s; the world stands still."""
+        first, second = (v[self.index[end]] if isinstance(end, str) else np.zeros(3) for end in ends)
+        return second - first
+
+    def apart(self, x: Array) -> Array:
+        """(rows, 3): from the first end of each row to the second."""
+        return np.array([self.between(row.between, x) for row in self.rows]).reshape(-1, 3)
 
     def violation(self, x: Array) -> Array:
-        """g = |d| − L of every row."""
-        apart = [np.linalg.norm(self.place(b, x) - self.place(a, x)) for a, b in self.ends]
-        return np.array(apart) - self.length
+        return np.linalg.norm(self.apart(x), axis=1) - self.rest
 
     def jacobian(self, x: Array) -> Array:
-        """G, (rows, 3 n)."""
-        out = np.zeros((len(self.ends), x.size))
-        for row, (first, second) in enumerate(self.ends):
-            apart = self.place(second, x) - self.place(first, x)
-            unit = apart / np.linalg.norm(apart)
-            for end, sign in ((first, -1.0), (second, 1.0)):
+        """G (rows, 3 n): the gradient of the violations."""
+        directions = self.apart(x)
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        gradient = np.zeros((len(self.rows), *x.shape))
+        for k, row in enumerate(self.rows):
+            for end, sign in zip(row.between, (-1.0, 1.0), strict=True):
                 if isinstance(end, str):
-                    i = 3 * self.names.index(end)
-                    out[row, i : i + 3] += sign * unit
-        return out
+                    gradient[k, self.index[end]] += sign * directions[k]
+        return gradient.reshape(len(self.rows), x.size)
 
-    def external(self, x: Array, v: Array) -> Array:
-        """f, (3 n,) N: gravity, central gravity, springs, loads."""
-        mass = self.m.reshape(-1, 3)
-        total = mass * np.array(self.scene.gravity)
+    # --- the forces ---
+    def force(self, x: Array, v: Array) -> Array:
+        """External force f (n, 3) N."""
+        total = self.mass[:, None] * np.array(self.scene.gravity)
         for force in self.scene.forces:
             if isinstance(force, CentralGravity):
-                away = x - np.array(force.centre)
-                total -= mass * force.strength * away / np.linalg.norm(away, axis=1, keepdims=True) ** 3
+                r = x - np.array(force.centre)
+                distance = np.linalg.norm(r, axis=1)[:, None]
+                total -= force.strength * self.mass[:, None] * r / distance**3
             elif isinstance(force, Load):
-                total[self.names.index(force.body)] += force.force
+                total[self.index[force.body]] += force.force
             elif isinstance(force, Spring):
-                total += self._spring(force, x, v)
-        return total.reshape(-1)
+                d, rate = self.between(force.between, x), self.rate(force.between, v)
+                length = float(np.linalg.norm(d))
+                pull = force.stiffness * d
+                if force.rest_length > 0.0:
+                    pull = pull - force.stiffness * force.rest_length * d / length
+                if force.viscosity > 0.0:
+                    pull = pull + force.viscosity * (rate @ d) / length**2 * d
+                for end, sign in zip(force.between, (1.0, -1.0), strict=True):
+                    if isinstance(end, str):
+                        total[self.index[end]] += sign * pull
+        return total
 
-    def _spring(self, spring: Spring, x: Array, v: Array) -> Array:
-        first, second = spring.between
-        apart = self.place(second, x) - self.place(first, x)
-        pull = spring.stiffness * apart
-        if spring.rest_length > 0.0:
-            pull = spring.stiffness * (1.0 - spring.rest_length / np.linalg.norm(apart)) * apart
-        if spring.viscosity > 0.0:
-            unit = apart / np.linalg.norm(apart)
-            zero = np.zeros(3)
-            speeds = [v[self.names.index(e)] if isinstance(e, str) else zero for e in (first, second)]
-            pull = pull + spring.viscosity * float((speeds[1] - speeds[0]) @ unit) * unit
-        out = np.zeros_like(x)
-        for end, sign in ((first, 1.0), (second, -1.0)):
-            if isinstance(end, str):
-                out[self.names.index(end)] += sign * pull
-        return out
+    # --- the step ---
+    def solve(self, extra: Array) -> tuple[Array, Array]:
+        """v₊ (n, 3) and lambda of the linear system, `extra` added to the right side of the rows."""
+        n, rows, h = self.x.size, len(self.rows), self.h
+        upsilon = 1.0 / (1.0 + 4.0 * self.theta)
+        jacobian, mass = self.jacobian(self.x), np.repeat(self.mass, 3)
+        matrix = np.zeros((n + rows, n + rows))
+        matrix[:n, :n] = np.diag(mass)
+        matrix[:n, n:] = -jacobian.T
+        matrix[n:, :n] = jacobian
+        matrix[n:, n:] = np.diag(4.0 * self.eps * upsilon / h**2)
+        right = np.concatenate(
+            [
+                mass * self.v.ravel() + h * self.force(self.x, self.v).ravel(),
+                upsilon * (jacobian @ self.v.ravel() - 4.0 / h * self.violation(self.x)) + extra,
+            ]
+        )
+        solution = np.linalg.solve(matrix, right)
+        return solution[:n].reshape(-1, 3), solution[n:]
 
-    def acceleration(self) -> Array:
-        """Acceleration (n, 3) of a start from rest: M a − Gᵀ µ = f and G a + Sig µ = 0, softness included."""
-        if np.any(self.v) or np.any(np.abs(self.violation(self.x)) > 1e-15):
-            raise ValueError("the oracle's half-step start is for scenes at rest with closed rows")
-        g, f = self.jacobian(self.x), self.external(self.x, self.v)
-        softness = 4.0 * self.eps / (self.h * (self.h + 4.0 * self.tau))
-        schur = (g / self.m) @ g.T + np.diag(softness)
-        mu = np.linalg.solve(schur, -g @ (f / self.m)) if len(self.ends) else np.zeros(0)
-        return ((f + g.T @ mu) / self.m).reshape(-1, 3)
+    def curvature(self, move: Array) -> Array:
+        """c = g(x + move) − g(x) − G move, at most the cap."""
+        straight = self.jacobian(self.x) @ move.ravel()
+        exact = self.violation(self.x + move) - self.violation(self.x) - straight
+        return np.minimum(exact, self.method.correction_cap * self.rest)
 
-    def velocity_after(self) -> tuple[Array, Array]:
-        """v₊ (n, 3) and λ of one substep from the present state, which does not change."""
-        h, x, v = self.h, self.x, self.v.reshape(-1)
-        theta = self.tau / h
-        ups = 1.0 / (1.0 + 4.0 * theta)
-        g, jac = self.violation(x), self.jacobian(x)
-        n, k = v.size, len(g)
-        matrix = np.zeros((n + k, n + k))
-        matrix[:n, :n] = np.diag(self.m)
-        matrix[:n, n:] = -jac.T
-        matrix[n:, :n] = jac
-        matrix[n:, n:] = np.diag(4.0 * self.eps * ups / h**2)
-        top = self.m * v + h * self.external(x, self.v)
-        bottom = -(4.0 / h) * ups * g + ups * (jac @ v)
-        corrections = self.method.corrections if k else 0
-        cap = self.method.correction_cap * self.length
-        if corrections:  # the curvature of g on the way here is known before the first solve
-            behind = self.violation(x - h * self.v) - g + h * (jac @ v)
-            bottom = bottom - (4.0 / h) * ups * np.minimum(behind, cap) / 4.0
-        solved = np.linalg.solve(matrix, np.concatenate([top, bottom]))
-        for _ in range(corrections):
-            ahead = self.violation(x + h * solved[:n].reshape(-1, 3)) - g - h * (jac @ solved[:n])
-            curved = bottom - (4.0 / h) * ups * (0.25 + theta) * np.minimum(ahead, cap)
-            solved = np.linalg.solve(matrix, np.concatenate([top, curved]))
-        return solved[:n].reshape(-1, 3), solved[n:]
+    def next_velocity(self) -> tuple[Array, Array]:
+        """v₊ and lambda of the coming substep; the state does not change."""
+        if not (self.rows and self.method.corrections):
+            return self.solve(np.zeros(len(self.rows)))
+        scale = 4.0 / self.h / (1.0 + 4.0 * self.theta)
+        before = self.curvature(-self.h * self.v)
+        velocity, impulse = self.solve(-scale * 0.25 * before)  # c₊ is not known yet
+        for _ in range(self.method.corrections):
+            after = self.curvature(self.h * velocity)
+            velocity, impulse = self.solve(-scale * (0.25 * (before + after) + self.theta * after))
+        return velocity, impulse
+
+    def _gain(self) -> Array:
+        """h times the acceleration at the start, of which half is taken back so that v lives at mid-step."""
+        bend = np.zeros(len(self.rows))  # Ġ v = (|ḋ|² − (u·ḋ)²)/|d|
+        if self.rows:
+            d = self.apart(self.x)
+            rate = np.array([self.rate(row.between, self.v) for row in self.rows])
+            length = np.linalg.norm(d, axis=1)
+            bend = (np.sum(rate**2, axis=1) - np.sum(rate * d, axis=1) ** 2 / length**2) / length
+        return self.solve(-self.h * bend)[0] - self.v
 
     def step(self) -> None:
-        """Advance one time step: all its substeps."""
+        """One reported time step: all its substeps."""
         for _ in range(self.method.substeps):
-            self.v, multiplier = self.velocity_after()
-            self.force = multiplier / self.h
+            self.v, self.impulse = self.next_velocity()
             self.x = self.x + self.h * self.v
 
-    def samples(self, steps: int) -> Iterator[tuple[Array, Array, Array]]:
-        """Position, velocity read at the sample's time, and row forces, for samples 0 … steps."""
+    def samples(self, steps: int) -> Iterator[Sample]:
+        """Samples 0 … steps, 0 the start as given. Velocities that live at mid-step are read as the mean of two."""
+        start = np.array([body.velocity for body in self.scene.bodies])
         for sample in range(steps + 1):
-            shown = self.v
-            if self.method.half_step_velocities and sample == 0:
-                shown = np.array([body.velocity for body in self.scene.bodies])
-            elif self.method.half_step_velocities:
-                shown = 0.5 * (self.v + self.velocity_after()[0])
-            yield self.x.copy(), shown.copy(), self.force.copy()
-            if sample < steps:
+            if sample > 0:
                 self.step()
+            seen = start if sample == 0 else self.v
+            if sample > 0 and self.method.half_step_velocities:
+                seen = 0.5 * (self.v + self.next_velocity()[0])
+            yield Sample(self.x, seen, -self.impulse / self.h, self.violation(self.x))

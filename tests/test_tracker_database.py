@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from sqlalchemy.orm import Session
 from tests.run_documents import run, run_of
 from tracker.database import open_database, shown
 from tracker.database_check import check
-from tracker.errors import DatabaseError
+from tracker.errors import DatabaseError, UnknownName
 from tracker.record import record
 from tracker.series import History
 
@@ -153,12 +154,17 @@ def test_a_truncated_file(file):
 
 
 def test_overwritten_pages_never_give_wrong_values_silently(file):
-    """Whatever page is overwritten: reading fails with a sentence, or `check` finds it."""
-    content, page = file.read_bytes(), 4096
+    """Whatever page is overwritten: reading fails with a sentence or gives what was stored; `check` finds it."""
+    (info,) = runs_in(file)
+    content, page, given = file.read_bytes(), 4096, read_all(file, info.id)
     for number in range(1, len(content) // page):
         damaged = bytearray(content)
         damaged[number * page : (number + 1) * page] = b"\xa5" * page
         file.write_bytes(damaged)
+
+        with suppress(DatabaseError, UnknownName):
+            assert read_all(file, info.id) == given
+
         try:
             engine = open_database(str(file), readonly=True)
             faults = check(engine)
@@ -167,6 +173,16 @@ def test_overwritten_pages_never_give_wrong_values_silently(file):
             faults = (str(error),)
         assert faults, f"page {number}"
         assert "damaged" in faults[0]
+
+
+def read_all(file, run_id):
+    engine = open_database(str(file), readonly=True)
+    try:
+        with Session(engine) as session:
+            history = History(session)
+            return history.document(run_id), history.series(), history.samples(run_id)
+    finally:
+        engine.dispose()
 
 
 AS_ANOTHER = """

@@ -6,6 +6,7 @@ Databases refuse some text (NUL in PostgreSQL, lone surrogates everywhere); it i
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from typing import Any
 
@@ -16,12 +17,12 @@ from tracker.document import RunDocument
 from tracker.errors import DocumentError
 from tracker.rows import moment
 
-MAX_BYTES = 64 * 1024 * 1024  # of one document
-MAX_DEPTH = 32  # of nested lists and objects
+MAX_BYTES = 32 * 1024 * 1024  # of one document
 MAX_SAMPLES = 100_000  # of one document, and as many series
 MAX_TEXT = 65_536  # characters of one text
 MAX_INTEGER = 2**63 - 1  # what a column holds
 REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+ESCAPE = re.compile(rb"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)  # one escape of a JSON text
 
 
 def clean_text(text: str) -> str:
@@ -32,7 +33,7 @@ def clean_text(text: str) -> str:
     return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
 
 
-def _cleaned(part: Any, place: str, depth: int = 0) -> Any:
+def _cleaned(part: Any, place: str) -> Any:
     if isinstance(part, str):
         if len(part) > MAX_TEXT:
             raise DocumentError(f"{place}: a text of {len(part)} characters; at most {MAX_TEXT} are stored")
@@ -43,14 +44,10 @@ def _cleaned(part: Any, place: str, depth: int = 0) -> Any:
         if abs(part) > MAX_INTEGER:
             raise DocumentError(f"{place}: the number {part:.3e} is larger than 64 bits hold")
         return part
-    if depth > MAX_DEPTH:
-        raise DocumentError(f"{place[:80]}: nested deeper than {MAX_DEPTH} levels")
     if isinstance(part, dict):
-        return {
-            clean_text(name): _cleaned(inner, f"{place}.{name}", depth + 1) for name, inner in part.items()
-        }
+        return {clean_text(name): _cleaned(inner, f"{place}.{name}") for name, inner in part.items()}
     if isinstance(part, (list, tuple)):
-        return tuple(_cleaned(inner, place, depth + 1) for inner in part)
+        return tuple(_cleaned(inner, place) for inner in part)
     return part
 
 
@@ -71,16 +68,42 @@ def checked(run: RunDocument) -> RunDocument:
 
 
 def decoded(data: bytes, origin: str = "the document") -> RunDocument:
-    """A run document from JSON bytes. DocumentError if it is too large, malformed or makes no sense."""
+    """A run document from JSON bytes. DocumentError if it is too large, malformed or makes no sense.
+
+    Read straight into the types, which are not nested deeply: a hostile file costs no more than its size.
+    """
     if len(data) > MAX_BYTES:
         raise DocumentError(f"{origin}: {len(data)} bytes; a run document has at most {MAX_BYTES}")
     try:
-        parts = msgspec.json.decode(data)
-        return _sensible(_typed(_cleaned(parts, "$")))
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise DocumentError(f"{origin} is not JSON: {error}") from None
-    except DocumentError as error:
+        return checked(msgspec.json.decode(_without_surrogates(data), type=RunDocument))
+    except (msgspec.ValidationError, DocumentError) as error:
         raise DocumentError(f"{origin} is not a valid run document: {error}") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise DocumentError(f"{origin} is not JSON: {error}") from None
+
+
+def _without_surrogates(data: bytes) -> bytes:
+    """JSON with every escaped surrogate that has no partner replaced: other tools write them, none can be read."""
+    if not re.search(rb"\\u[dD][89a-fA-F]", data):
+        return data
+    pieces, end, waiting = [], 0, None  # waiting: a high surrogate just seen, with its place
+    for escape in ESCAPE.finditer(data):
+        code = int(escape[1], 16) if escape[1] else 0
+        adjacent = waiting is not None and waiting.end() == escape.start()
+        if 0xDC00 <= code <= 0xDFFF and adjacent:
+            waiting = None
+            continue
+        lone = [waiting] if waiting is not None else []
+        waiting = escape if 0xD800 <= code <= 0xDBFF else None
+        if 0xDC00 <= code <= 0xDFFF:
+            lone.append(escape)
+        for found in lone:
+            pieces += [data[end : found.start()], rb"\ufffd"]
+            end = found.end()
+    if waiting is not None:
+        pieces += [data[end : waiting.start()], rb"\ufffd"]
+        end = waiting.end()
+    return b"".join([*pieces, data[end:]])
 
 
 def _typed(parts: Any) -> RunDocument:

@@ -262,4 +262,4 @@ def _notes(before: Measured, after: Measured, changes: Sequence[Change]) -> list
 
 def page_of(test: str) -> str:
     """The page of the website about a test."""
-    return f"test/{test}/"
+    return f"tests/{test}.html"

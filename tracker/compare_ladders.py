@@ -54,7 +54,7 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
                 after_outcome="value",
                 limit=None,
                 decades=math.log10(found.ratio),
-                page=f"test/{definition.test}/",
+                page=f"tests/{definition.test}.html",
             )
         )
     return changes

@@ -56,6 +56,7 @@ def open_database(url: str | URL | None = None, readonly: bool = False) -> Engin
     if _is_file(url):
         _check_file(url, readonly)
     engine = _engine(url, readonly)
+    event.listen(engine, "handle_error", _said, retval=True)
     try:
         with in_words(engine):
             revision = _revision(engine)
@@ -224,6 +225,13 @@ def _refuse_strange(engine: Engine, revision: str | None) -> None:
         raise DatabaseError(
             f"{shown(engine.url)} holds something else (a table {strange[0][:40]!r}); choose another database"
         )
+
+
+def _said(context: Any) -> DatabaseError | None:
+    """Whatever the driver raises, anywhere, as one sentence; what concurrent writers cause is for `record`."""
+    if isinstance(context.sqlalchemy_exception, exc.IntegrityError):
+        return None
+    return DatabaseError(_sentence(shown(context.engine.url), context.original_exception))
 
 
 @contextmanager

@@ -36,6 +36,7 @@ public:
     std::int64_t block() const noexcept { return 64; }
 
     void reset(StageClock* clock);
+    void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
     bool contacts_possible() const noexcept { return contacts_.has_value(); }
     void count(RunReport& report, std::int64_t steps) const;

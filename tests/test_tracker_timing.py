@@ -1,0 +1,123 @@
+"""Timing protocol, orders of accuracy and the ladder's scalars, on runs of known cost."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from tracker.order import error_in_time, in_range, observed_order, time_at_error
+from tracker.timing import MOST_RUNS, Stopwatch, interleaved, once
+
+
+class Clockwork:
+    """An engine whose runs take as long as their scene says, on paper."""
+
+    def __init__(self, failing: str = "") -> None:
+        self.calls: list[tuple[str, bool]] = []
+        self.failing = failing
+
+    def __call__(self, scene, *, time_stages: bool = False, **options):
+        self.calls.append((scene.name, time_stages))
+        return SimpleNamespace(
+            seconds=scene.seconds,
+            completed=scene.name != self.failing,
+            stage_seconds={"solve_path": 0.5 * scene.seconds} if time_stages else {},
+        )
+
+
+def runs(**seconds: float):
+    return [lambda s, n=n, t=t: s(SimpleNamespace(name=n, seconds=t)) for n, t in seconds.items()]
+
+
+def test_repeats_are_interleaved_and_all_kept():
+    engine = Clockwork()
+    slow, fast = interleaved(runs(slow=0.1, fast=0.01), engine, 5)
+    order = [name for name, stages in engine.calls if not stages]
+
+    assert order == ["slow", "fast", *["slow", "fast"] * 5]
+    assert slow.seconds == (0.1,) * 5
+    assert (fast.runs_per_repeat, fast.stage_seconds) == (1, {"solve_path": 0.005})
+
+
+def test_short_runs_are_repeated_until_the_clock_resolves_them():
+    engine = Clockwork()
+    (short, shortest) = interleaved(runs(a=5e-4, b=1e-9), engine, 3)
+
+    assert (short.runs_per_repeat, len(short.seconds)) == (4, 3)
+    assert shortest.runs_per_repeat == MOST_RUNS
+
+
+def test_long_runs_are_repeated_less_often_but_never_once():
+    (long,) = interleaved(runs(a=10.0), Clockwork(), 5)
+
+    assert len(long.seconds) == 2
+
+
+def test_a_run_that_fails_is_not_timed():
+    good, bad = interleaved(runs(a=0.01, b=0.01), Clockwork(failing="b"), 3)
+
+    assert good is not None
+    assert bad is None
+
+
+def test_nothing_is_recorded_while_timing_but_the_time_limit_is_passed_on():
+    seen = {}
+
+    def engine(scene, **options):
+        seen.update(options)
+        return SimpleNamespace(seconds=0.1, completed=True, stage_seconds={})
+
+    assert once(lambda s: s(None), engine, time_limit=3.0) == 0.1
+    assert seen == {"time_limit": 3.0}
+
+
+def test_the_stopwatch_adds_up_the_native_loops_of_one_run():
+    watch = Stopwatch(Clockwork())
+    for seconds in (0.1, 0.2):
+        watch(SimpleNamespace(name="a", seconds=seconds))
+
+    assert watch.seconds == pytest.approx(0.3, rel=1e-15)
+
+
+STEPS = [0.1 / 2**k for k in range(6)]
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_the_order_of_a_power_law_is_found(order):
+    assert observed_order(STEPS, [3.0 * h**order for h in STEPS]) == pytest.approx(order, abs=1e-12)
+
+
+def test_one_spoiled_rung_does_not_move_the_order():
+    errors = [h**2 for h in STEPS]
+    errors[3] *= -1e-3  # a lucky zero crossing
+
+    assert observed_order(STEPS, errors) == pytest.approx(2.0, abs=0.05)
+
+
+def test_too_few_usable_rungs_give_no_order():
+    assert observed_order(STEPS[:2], [1.0, 2.0]) is None
+    assert observed_order(STEPS, [0.0] * 6) is None
+    assert observed_order(STEPS, [math.nan] * 4 + [1.0, 2.0]) is None
+
+
+def test_the_asymptotic_range_includes_its_ends():
+    assert in_range(1.0 / 60.0, (1.0 / 960.0, 1.0 / 60.0))
+    assert not in_range(0.1, (0.001, 0.01))
+    assert in_range(0.1, None)
+
+
+def test_time_and_error_are_read_between_rungs_by_powers():
+    seconds, errors = [1.0, 2.0, 4.0], [0.04, -0.01, 0.0025]
+
+    assert time_at_error(seconds, errors, 0.02) == pytest.approx(math.sqrt(2.0), rel=1e-12)
+    assert error_in_time(seconds, errors, math.sqrt(8.0)) == pytest.approx(0.005, rel=1e-12)
+    assert time_at_error(seconds, errors, 0.01) == 2.0
+
+
+def test_what_no_rung_reaches_is_infinite():
+    assert time_at_error([1.0, 2.0], [0.1, 0.01], 1e-6) == math.inf
+    assert error_in_time([1.0, 2.0], [0.1, 0.01], 0.5) == math.inf
+    assert time_at_error([], [], 1.0) == math.inf
+    assert time_at_error([1.0], [math.nan], 1.0) == math.inf
