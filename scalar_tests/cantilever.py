@@ -241,7 +241,7 @@ TEST = ScalarTest(
         "A piece of beam of length d bends by M d/(EI) about its middle and shears by V d³/(12EI): with these two "
         "compliances a chain of rigid pieces passes through the exact nodes.",
         "At rest g = −ε F for any time step and damping, so the answer is static.",
-        "Large deflections shorten the lever: the elastica EI θ'' = −P cos θ ends 9.73e-5 short.",
+        "Large deflections shorten the lever: the elastica EI θ'' = −P cos θ ends (4/35)(P l²/(EI))² = 9.73e-5 short.",
     ),
     reference="Euler-Bernoulli (closed form) for small loads; the elastica by collocation for the printed load.",
     conclusion="Green: compliance means what it says. Red: joints are softer, stiffer or wrongly placed.",
