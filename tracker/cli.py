@@ -248,12 +248,11 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
+    from tracker.console import say
     from tracker.publish import publish as build
 
-    from tracker.console import say
-
     report = build(history, out)
-    say(f"published {out}/index.html" + (f": {report}" if isinstance(report, str) else ""))
+    say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 
 def _json(document: Any) -> str:

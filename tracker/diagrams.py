@@ -70,7 +70,7 @@ def grid_view(grid: Grid) -> View:
     )
 
 
-def trend_chart(trend: Trend, nights: Sequence[Night]) -> Chart:
+def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart:
     """A series over versions, with its limit, set point and reference."""
     definition = trend.definition
     values = trend.values[-MOST_NIGHTS * 4 :]
@@ -116,7 +116,8 @@ def trend_chart(trend: Trend, nights: Sequence[Night]) -> Chart:
     magnitude = "magnitude of " if scale == "log" and any(v < 0.0 for v in values) else ""
     return Chart(
         name=f"v-{slug(definition.key)}",
-        title=opening(f"{definition.description} ({definition.configuration})"),
+        title=(f"{title}: " if title else "")
+        + opening(f"{definition.description} ({definition.configuration})"),
         x_label="night",
         y_label=f"{magnitude}value" + (f" [{definition.unit}]" if definition.unit != "1" else ""),
         lines=tuple(lines),
@@ -165,7 +166,7 @@ def _at_night(night: Night, value: float, unit: str, outcome: str) -> str:
     return f"{head}\n{shown + ' · ' if shown else ''}{word}"
 
 
-def figure_chart(data: FigureData) -> Chart:
+def figure_chart(data: FigureData, prefix: str = "") -> Chart:
     """A figure of the document as a chart."""
     lines = tuple(
         Line(
@@ -178,7 +179,7 @@ def figure_chart(data: FigureData) -> Chart:
         for i, curve in enumerate(data.curves)
     )
     return Chart(
-        name=f"f-{slug(data.name)}",
+        name=f"{prefix}f-{slug(data.name)}",
         title=data.title,
         x_label=data.x_label,
         y_label=data.y_label,
@@ -191,11 +192,11 @@ def figure_chart(data: FigureData) -> Chart:
     )
 
 
-def map_grid(data: MapData) -> Grid:
+def map_grid(data: MapData, prefix: str = "") -> Grid:
     """A stability map of the document as a grid."""
     prediction = data.prediction
     return Grid(
-        name=f"m-{slug(data.name + '/' + data.configuration)}",
+        name=f"{prefix}m-{slug(data.name + '/' + data.configuration)}",
         title=f"{data.title} ({data.configuration})",
         x_label=data.x_label,
         y_label=data.y_label,

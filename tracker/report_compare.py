@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import click
@@ -24,6 +25,7 @@ MARK = {
 }
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
 QUIET = {"identical", "same", "not_measured"}
+TOLD = 0.05  # relative change of a ladder worth a line
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
 
 
@@ -105,7 +107,7 @@ def _paint(_row: int, text: str) -> str:
 
 
 def _frontier_lines(frontiers: Sequence[Frontier], room: int) -> list[str]:
-    told = [f for f in frontiers if any(_ratios(f))]
+    told = [f for f in frontiers if any(r and abs(math.log(r)) > TOLD for r in _ratios(f))]
     if not told:
         return []
     rows = [
