@@ -248,10 +248,11 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
+    from tracker.cli_history import accepted_levels
     from tracker.console import say
     from tracker.publish import publish as build
 
-    report = build(history, out)
+    report = build(history, out, accepted_levels())
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 

@@ -50,10 +50,27 @@ def limit_of(change: Change) -> str:
     return f"limit {change.limit:g}"
 
 
+def red_lines(changes: Sequence[Change]) -> list[str]:
+    """A line for each red series; of a ladder its worst rung speaks for the others."""
+    lines: list[str] = []
+    rungs: dict[tuple[str, str, str], list[Change]] = {}
+    for change in changes:
+        if change.red and change.kind == "ladder":
+            rungs.setdefault((change.test, change.metric, change.configuration), []).append(change)
+        elif change.red:
+            lines.append(red_line(change))
+    for group in rungs.values():
+        worst = max(group, key=lambda change: change.decades or 0.0)
+        more = f"; and {len(group) - 1} more of its time steps" if len(group) > 1 else ""
+        lines.append(red_line(worst) + more)
+    return lines
+
+
 def red_line(change: Change) -> str:
     """All a reader needs to act: test, metric, both values, limit, first bad commit, page to open."""
+    place = ", ".join([change.configuration, *change.series.split("/")[3:]])
     parts = [
-        f"✗ {change.test} {change.metric} [{change.configuration}]: {change.name or change.word}",
+        f"✗ {change.test} {change.metric} [{place}]: {change.name or change.word}",
         f"{value(change.before, change.unit)} → {value(change.after, change.unit)}",
         limit_of(change),
         change.sentence,
@@ -76,24 +93,33 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
                 change.series,
                 value(change.before),
                 value(change.after, change.unit),
-                change.sentence,
+                _how(change),
             )
             for change in shown
         ]
         columns = (
             Column("what"),
-            Column("series", flexible=True),
+            Column("series", flexible=True, least=24),
             Column("before", "right"),
             Column("after", "right"),
             Column("how", flexible=True),
         )
         lines += [*table(columns, rows, room or width(), {0: _paint}), ""]
-    reds = [click.style(red_line(change), fg="red") for change in document.changes if change.red]
+    reds = [click.style(line, fg="red") for line in red_lines(document.changes)]
     lines += [*reds, ""] if reds else []
     lines += _frontier_lines(document.frontiers, room or width())
     lines += [f"note: {clean(note)}" for note in document.notes]
     lines.append(_verdict(document))
     return "\n".join(lines)
+
+
+def _how(change: Change) -> str:
+    """The size of the change in few letters: decades, or per cent; else the sentence."""
+    if change.kind == "run_time" or not change.decades:
+        return change.sentence
+    if abs(change.decades) >= 0.05:
+        return f"{change.decades:+.1f} decades"
+    return f"{100.0 * (10.0**change.decades - 1.0):+.2g} %"
 
 
 def _what(change: Change) -> str:
