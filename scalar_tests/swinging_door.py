@@ -55,7 +55,8 @@ def angles(simulate: Simulate) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and angle [rad] of the door from its lowest position."""
     observe = {"angle": Trace(quantity=JointCoordinate("upper"))}
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
-    return result.sample_times["angle"], START + result["angle"]
+    # Unwrapped, since the far end of the swing lies where the coordinate jumps from −π to π.
+    return result.sample_times["angle"], START + np.unwrap(result["angle"])
 
 
 def measured_period(simulate: Simulate) -> float:

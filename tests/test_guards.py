@@ -10,10 +10,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from scalar_tests.catalogue import CATALOGUE
 
 import engine
 import scalar_tests
+from scalar_tests.catalogue import CATALOGUE
 
 ROOT = Path(__file__).parent.parent
 PYTHON_FILES = sorted(

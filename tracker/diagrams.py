@@ -123,9 +123,17 @@ def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart
         lines=tuple(lines),
         y_scale=scale,
         bands=bands,
-        x_ticks=tuple((float(n), day(nights[n].started)[5:]) for n in dict.fromkeys(kept)),
+        x_ticks=_night_ticks(nights, list(dict.fromkeys(kept))),
         note=note,
     )
+
+
+def _night_ticks(nights: Sequence[Night], shown: Sequence[int]) -> tuple[tuple[float, str], ...]:
+    """Days under the axis; where several nights share a day, their commits."""
+    days = [day(nights[n].started)[5:] for n in shown]
+    if len(set(days)) < len(days):
+        days = [short_hash(nights[n].engine)[:7] or version(nights[n].engine) for n in shown]
+    return tuple(zip(map(float, shown), days, strict=True))
 
 
 def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:

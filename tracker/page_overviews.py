@@ -16,8 +16,8 @@ from tracker.page_rows import Page, address, event_row, row
 from tracker.svg import grid_picture, picture
 from tracker.wording import slug, web_address
 
-MOST_CLOSED = 200  # events on the page; the file has all
-MOST_NIGHTS = 400
+MOST_CLOSED = 100  # events on the page; the file has all
+MOST_NIGHTS = 120
 
 
 def error_time(book: Book) -> Page:

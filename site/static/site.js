@@ -89,8 +89,6 @@ function drawChart(box) {
   if (zoom) {
     layout.xaxis.range = zoom.slice(0, 2);
     layout.yaxis.range = zoom.slice(2);
-  } else if (data.layout.shapes && data.layout.shapes.some((s) => s.meta === "band")) {
-    layout.yaxis.range = yRange(data);
   }
   plot.hidden = false;
   box.classList.add("drawn");
@@ -98,24 +96,11 @@ function drawChart(box) {
   if (!plot.dataset.live) {
     plot.dataset.live = "1";
     plot.on("plotly_relayout", () => {
-      const { xaxis, yaxis } = plot.layout;
-      const free = xaxis.autorange !== false && yaxis.autorange !== false;
-      state.set("z." + box.id, free ? "" : [...xaxis.range, ...yaxis.range].map((v) => Number(v.toPrecision(6))).join(","));
+      const words = (axes) => [...axes.xaxis.range, ...axes.yaxis.range].map((v) => Number(v.toPrecision(6))).join(",");
+      const now = words(plot.layout);
+      state.set("z." + box.id, data.layout.xaxis.range && data.layout.yaxis.range && now === words(data.layout) ? "" : now);
     });
   }
-}
-
-// The axis shows the values and the band; a band down to nothing on a logarithmic axis does not stretch it.
-function yRange(data) {
-  const log = data.layout.yaxis.type === "log";
-  let values = data.data.flatMap((t) => t.y || []).filter((v) => v !== null);
-  for (const band of data.layout.shapes) {
-    values = values.concat([band.low, band.high].filter((v) => v !== null && v !== undefined));
-  }
-  if (log) { values = values.filter((v) => v > 0).map(Math.log10); }
-  const low = Math.min(...values), high = Math.max(...values);
-  const pad = 0.06 * (high - low) || Math.abs(high) * 0.1 || 1;
-  return [low - pad, high + pad];
 }
 
 function charts() {
