@@ -224,7 +224,7 @@ def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
 
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())
-        say("\n".join(finding_lines(findings)))
+        say("\n".join(finding_lines(findings, f"{out}/")))
     _retain(database)
     with history_of(database) as history:
         _publish(history, out)
