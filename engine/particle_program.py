@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -97,7 +98,12 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
         assert isinstance(row, Distance)  # the scene refuses joints between particles
         indices, points = _ends(row.between, bodies)
         row_ends.append(indices)
-        length = scene.length(row) if row.rest_length is None else row.rest_length
+        length = row.rest_length
+        if length is None:
+            first, second = (
+                scene.bodies[bodies[end]].position if isinstance(end, str) else end for end in row.between
+            )
+            length = math.dist(first, second)
         damping = default_damping if row.damping is None else row.damping
         rows.append((*points, length, row.compliance, damping))
     particles = [

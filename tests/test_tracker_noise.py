@@ -83,6 +83,11 @@ def test_a_time_that_is_not_finite_is_red_that_same_night():
     assert (told[-1].state, told[-1].verdict.name) == ("detected", "not finite")
 
 
+def test_a_target_that_was_never_reached_is_not_worse_for_it():
+    assert states([math.inf, math.inf]) == ["green", "green"]
+    assert states([math.inf, 1.0, math.inf]) == ["green", "green", "detected"]
+
+
 def test_an_accepted_level_is_the_new_usual():
     values = [*noisy(30, 1), *noisy(10, 2, level=1.3e-3)]
     told = states(values, accepted=[i >= 30 for i in range(40)])

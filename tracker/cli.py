@@ -224,7 +224,7 @@ def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
 
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())
-        say("\n".join(finding_lines(findings)))
+        say("\n".join(finding_lines(findings, f"{out}/")))
     _retain(database)
     with history_of(database) as history:
         _publish(history, out)
@@ -248,12 +248,12 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
+    from tracker.cli_history import accepted_levels
+    from tracker.console import say
     from tracker.publish import publish as build
 
-    from tracker.console import say
-
-    report = build(history, out)
-    say(f"published {out}/index.html" + (f": {report}" if isinstance(report, str) else ""))
+    report = build(history, out, accepted_levels())
+    say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 
 def _json(document: Any) -> str:

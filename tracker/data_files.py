@@ -15,6 +15,7 @@ from typing import Any
 import msgspec
 
 from tracker.document import to_number
+from tracker.events import Event
 from tracker.nights import Book, Night, TestHistory, Trend
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -92,6 +93,24 @@ def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list
         line = [found.get(night.index) for found in values]
         if any(value is not None for value in line):
             yield [night.started, night.engine.version, night.engine.git_hash, *line]
+
+
+def regressions_csv(events: Sequence[Event]) -> bytes:
+    """Every regression: what, from what to what, between which commits, and what became of it."""
+    columns = (
+        "series", "name", "sentence", "before", "after", "unit", "last_good", "first_bad", "first_bad_started",
+        "standing", "ended", "accepted",
+    )  # fmt: skip
+    return table(columns, (_event_line(event) for event in events))
+
+
+def _event_line(event: Event) -> list[Any]:
+    good, end = event.good, event.end
+    return [
+        event.trend.definition.key, event.name, event.sentence, event.before, event.value,
+        event.trend.definition.unit, good.engine.git_hash if good else "", event.first.engine.git_hash,
+        event.first.started, event.standing, end.started if end else "", event.accepted,
+    ]  # fmt: skip
 
 
 def nights_csv(book: Book) -> bytes:

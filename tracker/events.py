@@ -1,7 +1,7 @@
-"""What left its limit or set point, since which night, and what came back.
+"""What went wrong, since which night, and what came back: the verdicts of `tracker.analyse` as stretches.
 
-An event is a stretch of nights on which one series stood worse than the night before the stretch. It is read
-from the verdicts as they were recorded on each night, so a limit that changes later rewrites no history.
+A series that stands still costs nothing: nights with the same bits as the night before and after are left out
+before judging, which changes no verdict.
 """
 
 from __future__ import annotations
@@ -9,67 +9,133 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, cast
 
-from tracker.nights import Night, State, TestHistory, Trend
+from tracker import analyse
+from tracker.accepted import Accepted
+from tracker.nights import Book, Night, State, TestHistory, Trend
+from tracker.verdict import same_bits
 
-RANK = {"pass": 0, "watch": 1, "fail": 2}
+NOISY_NIGHTS = 400  # how far back run times are judged again on every publication
+Standing = Literal["detected", "accepted", "recovered"]
 
 
 @dataclass(frozen=True)
 class Event:
-    """One stretch of one series outside its limit (fail) or set point (watch)."""
+    """One stretch of nights on which a series was red."""
 
     trend: Trend
-    state: State  # the worst of the stretch
-    first: Night
-    last: Night  # the last bad night
-    before: float  # the value before it; NaN if it was never good
+    name: str  # what it is called: "limit crossed", "drift", "slower"
+    sentence: str
+    first: Night  # where it began
+    last: Night  # the last red night
+    good: Night | None  # the night it is compared with
+    before: float  # the value then; NaN if there was none
     value: float  # the last value of the stretch
-    back: Night | None  # the night it came back; None while it lasts
+    standing: Standing
+    end: Night | None  # the night it came back or was accepted; None while it lasts
+    accepted: str = ""
 
     @property
     def lasting(self) -> bool:
-        """Whether the newest value is still outside."""
-        return self.back is None
+        """Whether it is red tonight."""
+        return self.standing == "detected"
+
+    @property
+    def state(self) -> State:
+        """fail if the limit is broken or there is no value; watch if it only got worse."""
+        i = self.trend.nights.index(self.last.index)
+        return (
+            "fail" if self.trend.outcomes[i] != "value" and self.trend.definition.role == "gate" else "watch"
+        )
 
 
 def judged(trend: Trend) -> bool:
-    """Whether anything about this series can be red."""
+    """Whether a limit or a set point makes this series red on its own."""
     return trend.definition.role != "reported"
 
 
-def events_of(trend: Trend, nights: Sequence[Night]) -> list[Event]:
-    """The stretches of one series, oldest first."""
+def telling_nights(trend: Trend) -> list[int]:
+    """The places whose neighbours differ: the others say nothing."""
+    last = len(trend.nights) - 1
+
+    def same(i: int, j: int) -> bool:
+        return (
+            trend.outcomes[i] == trend.outcomes[j]
+            and trend.versions[i] == trend.versions[j]
+            and trend.held[i] == trend.held[j]
+            and same_bits(trend.values[i], trend.values[j])
+        )
+
+    return [i for i in range(last + 1) if i in (0, last) or not (same(i, i - 1) and same(i, i + 1))]
+
+
+def events_of(trend: Trend, nights: Sequence[Night], accepted: Sequence[Accepted] = ()) -> list[Event]:
+    """The red stretches of one series, oldest first."""
+    noisy = analyse.is_noisy(trend.definition)
+    places = telling_nights(trend)
+    if noisy:
+        places = list(range(max(0, len(trend.nights) - NOISY_NIGHTS), len(trend.nights)))
+    history = [analyse.Night(nights[trend.nights[i]], trend.samples[i], trend.versions[i]) for i in places]
+    verdicts = analyse.judge_history(trend.definition.key, trend.definition, history, accepted)
     found: list[Event] = []
-    start: int | None = None
-    states = [trend.state_at(i) for i in range(len(trend.values))]
-    for i, state in enumerate([*states, "pass"]):
-        if state != "pass" and start is None:
-            start = i
-        elif start is not None and (state == "pass"):
-            lasting = i == len(states)
-            found.append(
-                Event(
-                    trend=trend,
-                    state="fail" if "fail" in states[start:i] else "watch",
-                    first=nights[trend.nights[start]],
-                    last=nights[trend.nights[i - 1]],
-                    before=trend.values[start - 1] if start else math.nan,
-                    value=trend.values[i - 1],
-                    back=None if lasting else nights[trend.nights[i]],
-                )
-            )
-            start = None
+    stretch: list[int] = []  # places in `verdicts`
+    for at, verdict in enumerate(verdicts):
+        if verdict.state == "detected" and (verdict.verdict.word != "new" or judged(trend)):
+            stretch.append(at)
+        elif stretch and verdict.state != "suspected":
+            standing: Standing = "accepted" if verdict.state == "accepted" else "recovered"
+            found.append(_event(trend, nights, places, verdicts, stretch, standing, at))
+            stretch = []
+        elif verdict.state == "accepted":
+            found.append(_event(trend, nights, places, verdicts, [at], "accepted", at))
+    if stretch:
+        found.append(_event(trend, nights, places, verdicts, stretch, "detected", None))
     return found
 
 
-def all_events(tests: Sequence[TestHistory], nights: Sequence[Night]) -> list[Event]:
-    """Every stretch of every judged series, newest beginning first."""
+def _event(
+    trend: Trend,
+    nights: Sequence[Night],
+    places: Sequence[int],
+    verdicts: Sequence[analyse.Judged],
+    stretch: Sequence[int],
+    standing: Standing,
+    end: int | None,
+) -> Event:
+    worst = verdicts[stretch[-1]]
+    first = worst.first_bad or verdicts[stretch[0]].night
+    good = worst.last_good or worst.against
+    level = cast(Night, good.run) if good else None  # the runs given to `analyse` are nights of ours
+    if level is not None and level.index >= cast(Night, first.run).index:
+        level = None  # red from its first night on: there was nothing good before
+    before = math.nan if level is None else trend.values[trend.nights.index(level.index)]
+    return Event(
+        trend=trend,
+        name=worst.verdict.name or ("outside the limit" if not worst.night.sample.passed else "worse"),
+        sentence=worst.verdict.sentence,
+        first=cast(Night, first.run),
+        last=nights[trend.nights[places[stretch[-1]]]],
+        good=level,
+        before=before,
+        value=trend.values[places[stretch[-1]]],
+        standing=standing,
+        end=None if end is None else nights[trend.nights[places[end]]],
+        accepted="" if end is None else verdicts[end].accepted,
+    )
+
+
+def all_events(book: Book, accepted: Sequence[Accepted] = ()) -> list[Event]:
+    """Every red stretch of every series, newest beginning first."""
     found = [
         event
-        for test in tests
+        for test in book.tests
         for trend in test.trends
-        if judged(trend)
-        for event in events_of(trend, nights)
+        for event in events_of(trend, book.nights, accepted)
     ]
     return sorted(found, key=lambda e: (-e.first.index, e.trend.definition.key))
+
+
+def of_test(events: Sequence[Event], test: TestHistory) -> list[Event]:
+    """The events of one test."""
+    return [event for event in events if event.trend.definition.test == test.name]

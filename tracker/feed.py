@@ -27,7 +27,7 @@ def atom(book: Book, events: Sequence[Event], addresses: dict[str, str]) -> byte
     author = ElementTree.SubElement(feed, f"{{{ATOM}}}author")
     _put(author, "name", "SPOOK tracker")
     news: list[tuple[Night, Event, str]] = [(e.first, e, "regressed") for e in events]
-    news += [(e.back, e, "recovered") for e in events if e.back is not None]
+    news += [(e.end, e, e.standing) for e in events if e.end is not None]
     news.sort(key=lambda item: (-item[0].index, item[1].trend.definition.key, item[2]))
     for night, event, word in news[:MOST_ENTRIES]:
         _entry(feed, night, event, word, addresses.get(event.trend.definition.test, "index.html"))

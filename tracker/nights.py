@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any, Literal, Protocol
 
 from tracker.document import (
@@ -21,8 +22,10 @@ from tracker.document import (
     TestCard,
     from_number,
 )
+from tracker.wording import instant, version
 
 NIGHTS_FOR_FIGURES = 30  # how far back figures, maps and cards are looked for
+EARLIEST = datetime.min.replace(tzinfo=UTC)
 State = Literal["pass", "watch", "fail", "none"]
 
 
@@ -50,6 +53,8 @@ class Trend:
     values: list[float] = field(default_factory=list)
     outcomes: list[str] = field(default_factory=list)
     held: list[bool] = field(default_factory=list)  # set point
+    samples: list[Sample] = field(default_factory=list)  # without evidence
+    versions: list[str] = field(default_factory=list)  # of the test's definition
     latest: Sample | None = None  # of the newest night that has one, with its evidence
     before: Sample | None = None  # of the night before that, where it was timed
     order: int = 0  # place in its run's document
@@ -117,6 +122,17 @@ class Book:
     tests: list[TestHistory]
     others: list[tuple[Night, list[TestHistory]]] = field(default_factory=list)  # other engines, newest night
 
+    def peers(self, test: str) -> list[tuple[str, TestHistory]]:
+        """The same test put to other engines, where it ran on the machine of tonight."""
+        machine = self.tonight.machine.fingerprint if self.nights else ""
+        return [
+            (f"{night.engine.name} {version(night.engine)}", found)
+            for night, tests in self.others
+            if night.machine.fingerprint == machine
+            for found in tests
+            if found.name == test
+        ]
+
     @property
     def tonight(self) -> Night:
         """The newest night."""
@@ -140,17 +156,26 @@ def book(history: Source) -> Book:
     if not runs:
         return Book([], [])
     own = [run for run in runs if run.trigger != "import"] or runs
-    name = max(own, key=lambda run: run.started).engine.name
+    name = max(own, key=lambda run: instant(run.started) or EARLIEST).engine.name
     of_engine: dict[str, list[Any]] = {}
     for run in runs:
         of_engine.setdefault(run.engine.name, []).append(run)
     series = history.series(evidence=False)
-    nights, tests = _chapter(history, of_engine.pop(name), series)
+    nights, tests = _chapter(history, _line(of_engine.pop(name)), series)
     others = []
     for runs_of_other in of_engine.values():
-        other_nights, other_tests = _chapter(history, runs_of_other, series)
+        other_nights, other_tests = _chapter(history, _line(runs_of_other), series)
         others.append((other_nights[-1], other_tests))
     return Book(nights, tests, others)
+
+
+def _line(runs: Sequence[Any]) -> list[Any]:
+    """The runs that have a place in the commit order, and the newest one whatever it was built from.
+
+    This is what `latest` and `previous` choose from on the command line.
+    """
+    newest = max(runs, key=lambda run: instant(run.started) or EARLIEST)
+    return [run for run in runs if (run.engine.git_hash and not run.engine.dirty) or run is newest]
 
 
 def _chapter(
@@ -169,13 +194,15 @@ def _chapter(
     last_with: dict[str, int] = {}  # the newest night of each test
     for key, found in series.items():
         trend = Trend(found.definition)
-        for run, sample, _ in found.points:
+        for run, sample, test_version in found.points:
             at = place.get(run.id)
             if at is not None:
                 trend.nights.append(at)
                 trend.values.append(from_number(sample.value))
                 trend.outcomes.append(sample.outcome)
                 trend.held.append(sample.set_point_held)
+                trend.samples.append(sample)
+                trend.versions.append(test_version)
         if trend.nights:
             trends[key] = trend
             test = trend.definition.test

@@ -53,8 +53,7 @@ def judge_noisy(
     for place, value in enumerate(values):
         if not usual:
             usual, anchor = [place], [place]
-            state: Literal["green", "detected"] = "green" if math.isfinite(value) else "detected"
-            found.append(Noisy(verdict=Verdict(word="new", sentence="the first value"), state=state))
+            found.append(Noisy(verdict=Verdict(word="new", sentence="the first value"), state="green"))
             continue
         level, threshold = _usual([values[i] for i in usual])
         change = _worse_by(level, value, larger_is_better)

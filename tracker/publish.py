@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,10 +17,14 @@ from typing import Any
 import msgspec
 
 from tracker import data_files, feed
-from tracker.events import all_events
+from tracker.accepted import Accepted
+from tracker.comparisons import FILE, comparisons, read_known, stored
+from tracker.events import Event, all_events
 from tracker.folder import FolderError, digest, replacing
-from tracker.nights import Book, Source, book
-from tracker.pages import NAVIGATION, Page, address, health, pages
+from tracker.nights import Book, Source, TestHistory, book
+from tracker.page_index import health
+from tracker.page_rows import Page, address
+from tracker.pages import NAVIGATION, pages
 from tracker.resources import resource
 from tracker.templates import environment
 from tracker.wording import slug
@@ -51,8 +55,11 @@ class Report:
         return self.written + self.skipped
 
 
-def publish(history: Source, out: Path) -> Report:
-    """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's."""
+def publish(history: Source, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
+    """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
+
+    `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red.
+    """
     site = resource("site")
     static, templates = site / "static", site / "templates"
     contents = {name: (static / file).read_bytes() for name, file in ASSETS.items()}
@@ -66,7 +73,10 @@ def publish(history: Source, out: Path) -> Report:
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
-        for page in pages(told):
+        events = all_events(told, accepted) if told.nights else []
+        levels = digest(making.encode(), repr(accepted).encode())
+        compared = comparisons(history, told, events, accepted, read_known(out, levels))
+        for page in pages(told, events, compared):
             context = _context(page, names, told.nights[-1] if told.nights else None)
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
 
@@ -74,20 +84,20 @@ def publish(history: Source, out: Path) -> Report:
                 return made.get_template(page.template).render(context).encode("utf-8", "replace")
 
             folder.add(page.path, source, render)
-        for path, made_from, make in _data(told):
+        pairs = stored(compared, levels)
+        folder.add(FILE, digest(pairs), partial(bytes, pairs))
+        for path, made_from, make in _data(told, events):
             folder.add(path, digest(making.encode(), made_from), make)
     return Report(folder.written, folder.skipped, folder.old)
 
 
-def _data(told: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
+def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
     """Files of numbers: path, what they are made from, and how."""
     if not told.nights:
         return
     newest = _bytes_of({"nights": len(told.nights), "tonight": told.tonight})
     for test in told.tests:
-        source = digest(
-            newest, _bytes_of({"trends": test.trends, "maps": test.maps, "figures": test.figures})
-        )
+        source = digest(newest, _bytes_of(_facts(test)))
         yield f"data/{slug(test.name)}.csv", source.encode(), partial(data_files.newest_csv, told, [test])
         yield (
             f"data/{slug(test.name)}-history.csv",
@@ -99,13 +109,23 @@ def _data(told: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
     yield "data/tonight.csv", whole, partial(bytes, whole)
     nights = data_files.nights_csv(told)
     yield "data/nights.csv", nights, partial(bytes, nights)
-    events = all_events(told.tests, told.nights)
+    red = data_files.regressions_csv(events)
+    yield "data/regressions.csv", red, partial(bytes, red)
     news = feed.atom(told, events, {test.name: address(test) for test in told.tests})
     yield "feed.xml", news, partial(bytes, news)
     state, kept, gates = health(told, events)
     words = feed.badge_words(kept, gates)
     yield "badge.svg", (state + words).encode(), partial(feed.badge_svg, state, words)
     yield "badge.json", (state + words).encode(), partial(feed.badge_json, state, words)
+
+
+def _facts(test: TestHistory) -> dict[str, Any]:
+    """What the files of a test are made from."""
+    trends = [
+        [t.definition, t.nights, list(map(repr, t.values)), t.outcomes, t.held[-1:], t.latest]
+        for t in test.trends
+    ]
+    return {"card": test.card, "trends": trends, "figures": test.figures, "maps": test.maps}
 
 
 def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:

@@ -23,6 +23,12 @@ Vec3 world_tangent(Vec3 normal) noexcept {
     return (1.0 / norm(t)) * t;
 }
 
+double speed_between(const std::vector<Vec6>& from, const std::vector<Vec6>& to, int body) noexcept {
+    return norm(linear(to[body]) - linear(from[body]));
+}
+
+constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
+
 }  // namespace
 
 ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
@@ -56,6 +62,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     correction_.clear();
     impact_needed_ = false;
     detection_.detect(poses, margin_, contacts_);
+    drop_unreachable(velocity, free_velocity);
     if (contacts_.empty()) {
         touches_.clear();
         return false;
@@ -81,22 +88,35 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         point.approach = relative(k, contact.point.normal, velocity, false);
         const double free_approach = relative(k, contact.point.normal, free_velocity, false);
         point.push = free_approach - point.approach;
-        const double size = std::max(radius[contact.first], radius[contact.second]);
-
         const double psi = point.material.restitution, speed = -point.approach;
         point.bounce = -1.0;
-        if (gap <= 1e-12 * size) {
+        if (is_closed(k)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
         } else if (speed > 0.0 && psi > 0.0 && gap + h * free_approach < 0.0) {
             const double left = psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
         }
-        const double rounding = 1e-6 * std::abs(point.push) + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
+        const double kick = speed_between(velocity, free_velocity, contact.first) + speed_between(velocity, free_velocity, contact.second);
+        const double rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
         if (point.bounce >= 0.0 && speed > rounding) impact_needed_ = true;
     }
     touches_.assign(contacts_.size(), {});
     for (std::size_t k = 0; k < contacts_.size(); ++k) touches_[k].contact = contacts_[k];
     return true;
+}
+
+void ContactStage::drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity) {
+    const std::vector<double>& radius = detection_.radius();
+    auto speed = [&](int body, Vec3 n) {
+        const double spin = std::max(norm(angular(velocity[body])), norm(angular(free_velocity[body])));
+        return std::max(std::abs(dot(n, linear(velocity[body]))), std::abs(dot(n, linear(free_velocity[body])))) +
+               spin * radius[body];
+    };
+    std::erase_if(contacts_, [&](const Contact& contact) {
+        const double size = std::max(radius[contact.first], radius[contact.second]);
+        const Vec3 n = contact.point.normal;
+        return contact.point.gap > options_.time_step * (speed(contact.first, n) + speed(contact.second, n)) + closed * size;
+    });
 }
 
 RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {
@@ -203,11 +223,17 @@ void ContactStage::impact(MixedSystem& system) {
     for (std::size_t j = 0; j < who.size(); ++j) touches_[who[j]].impact = hit.rows[joints + j].multiplier[0];
 }
 
+bool ContactStage::is_closed(std::size_t k) const noexcept {
+    const Contact& contact = contacts_[k];
+    const double size = std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
+    return contact.point.gap <= closed * size;
+}
+
 double ContactStage::explained_depth(std::size_t k) const noexcept {
     const Contact& contact = contacts_[k];
     const double carried = std::max(0.0, points_[k].before) / options_.time_step;
     const double size = std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
-    return 2.0 * points_[k].material.compliance * carried + 1e-9 * size;
+    return 2.0 * points_[k].material.compliance * carried + closed * size;
 }
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
@@ -221,10 +247,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         RowBlock block = row_block(k, material.friction > 0.0);
         const double gap = contacts_[k].point.gap;
         point.approach = relative(k, contacts_[k].point.normal, velocity, false);
-        block.right[0] += gap > 0.0 ? -gap / h
-                                    : -row.violation_gain * std::max(gap, -explained_depth(k)) + row.upsilon * point.approach;
+        block.right[0] += !is_closed(k) ? -gap / h
+                                        : -row.violation_gain * std::max(gap, -explained_depth(k)) + row.upsilon * point.approach;
         block.softness[0] = row.softness;
-        const bool pressed = point.before > 0.0 || (point.before < 0.0 && gap + h * (point.approach + point.push) < 0.0);
+        const bool pressed = point.before > 0.0 || (point.before < 0.0 && (is_closed(k) || gap + h * (point.approach + point.push) < 0.0));
         block.state[0] = pressed ? RowState::free : RowState::at_lower;
         block.multiplier[0] = std::max(0.0, point.before);
         if (block.size == 3) {
@@ -249,7 +275,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         }
         touch.tangent[0] = dot(touch.impulse, points_[k].tangent);
         touch.tangent[1] = dot(touch.impulse, cross(normal, points_[k].tangent));
-        touch.active = touch.normal > 0.0 || touch.impact > 0.0 || contacts_[k].point.gap <= 0.0;
+        touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(k);
     }
     if (report.finite) part_overlaps(system, joints);
     return report.finite;

@@ -111,12 +111,15 @@ private:
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0};
     };
+    /// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
+    void drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity);
     RowBlock row_block(std::size_t k, bool tangents) const;
     double relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
     double explained_depth(std::size_t k) const noexcept;
+    bool is_closed(std::size_t k) const noexcept;
 
     Detection detection_;
     std::vector<SurfaceMaterial> materials_;

@@ -77,24 +77,32 @@ private:
         if constexpr (Timed) clock_->mark(stage);
     }
     void position_stage() noexcept;
-    void fly_freely(std::int64_t steps) noexcept;
     void half_kick_back();
 
     void apply_central_gravity() noexcept;
     void apply_springs() noexcept;
     void assemble_rows() noexcept;
-    void factor();
-    void back_substitute();
-    void factor_path() noexcept;
-    void analyse_blocks();
-    void factor_blocks();
-    void stiffen_strings();
-    void solve_blocks();
-    void solve_path() noexcept;
+    void solve_rows();
+    void solve_rows_again();  // new right sides, same matrix
     void solve_iterative() noexcept;
     void bend_rows_back() noexcept;
     void correct_curvature();
-    void add_impulses(std::vector<Vec3>& v) const noexcept;
+    void kick_nodes(std::vector<Vec3>& v) const noexcept;
+
+    // particle_paths.cpp: rows in open paths, tridiagonal
+    void factor_paths() noexcept;
+    void substitute_paths() noexcept;
+    void kick_paths(std::vector<Vec3>& v) const noexcept;
+
+    // particle_blocks.cpp: rows that branch or close loops, and stiff strings
+    void analyse_blocks();
+    void factor_blocks();
+    void stiffen_strings();
+    void substitute_blocks();
+
+    // particle_kernels.cpp: the same arithmetic with the time loop inside, for scenes that need no more
+    void fly(std::int64_t steps) noexcept;
+    void swing(std::int64_t steps) noexcept;
 
     ParticleScene scene_;
     double h_;  // s, of a substep

@@ -11,7 +11,7 @@ Vec3 transposed_times(const Mat3& a, Vec3 v) noexcept {
 /// The turn of a constant angular velocity over h.
 Quat turn_of(double h, Vec3 angular_velocity) noexcept {
     const double angle = 0.5 * h * norm(angular_velocity);
-    const Vec3 e = (angle > 0.0 ? 0.5 * h * std::sin(angle) / angle : 0.0) * angular_velocity;
+    const Vec3 e = (angle != 0.0 ? 0.5 * h * std::sin(angle) / angle : 0.0) * angular_velocity;
     return {std::cos(angle), e.x, e.y, e.z};
 }
 
