@@ -75,7 +75,7 @@ def growth(matrix: np.ndarray, steps: int = 1) -> float:
     determinant = float(matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
     square = half * half - determinant
     largest = math.sqrt(determinant) if square < 0.0 else abs(half) + math.sqrt(square)
-    return largest ** (1.0 / steps)
+    return math.pow(largest, 1.0 / steps)
 
 
 def run_map(simulate: Simulate, stiffness: float, damping: float, time_step: float, steps: int) -> np.ndarray:

@@ -50,7 +50,7 @@ def _growth(matrix: np.ndarray, speed: float, theta: float, steps: int) -> float
     """Largest |eigenvalue| per step. Where the method says that the pair is complex, however nearly double,
     the determinant gives it to rounding; trace and determinant would lose half the digits there."""
     if one_row_oscillates(MASS, 1.0 / stiffness_of(speed), theta * TIME_STEP, TIME_STEP):
-        return float(np.linalg.det(matrix)) ** (0.5 / steps)
+        return math.pow(float(np.linalg.det(matrix)), 0.5 / steps)
     return growth(matrix, steps)
 
 
