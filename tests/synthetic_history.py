@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import msgspec
+
 from tracker.document import (
     Curve,
     EngineVersion,
@@ -312,4 +314,20 @@ def history(nights: int = 24, *, broken: int = 10**9, hostile: bool = False) -> 
     )
 
 
-__all__ = ["DocumentHistory", "document", "from_number", "history"]
+def decade(nights: int = 3650) -> DocumentHistory:
+    """Ten years of nights: the values of forty, again and again."""
+    few = [document(n) for n in range(40)]
+    return DocumentHistory(
+        [
+            msgspec.structs.replace(
+                few[n % 40],
+                id=f"run-spook-{n:04d}",
+                started=(START + timedelta(days=n)).isoformat(),
+                engine=engine(n),
+            )
+            for n in range(nights)
+        ]
+    )
+
+
+__all__ = ["DocumentHistory", "decade", "document", "from_number", "history"]

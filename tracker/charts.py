@@ -55,6 +55,13 @@ class Chart:
     thesis: str = ""
     rings: tuple[float, ...] = ()  # of a polar chart drawn flat: radii of its grid
 
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Ends of both axes that show every line and band, in decades where logarithmic."""
+        xs = [x for line in self.lines for x in line.x]
+        ys = [y for line in self.lines for y in line.y]
+        ys += [end for band in self.bands for end in (band.low, band.high)]
+        return range_of(xs, self.x_scale, 0.03), range_of(ys, self.y_scale)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Grid:

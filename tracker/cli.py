@@ -224,7 +224,7 @@ def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
 
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())
-        say("\n".join(finding_lines(findings)))
+        say("\n".join(finding_lines(findings, f"{out}/")))
     _retain(database)
     with history_of(database) as history:
         _publish(history, out)
@@ -248,10 +248,11 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
+    from tracker.cli_history import accepted_levels
     from tracker.console import say
     from tracker.publish import publish as build
 
-    report = build(history, out)
+    report = build(history, out, accepted_levels())
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, range_of, thinned, ticks
+from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, thinned, ticks
 from tracker.svg import CELL_WORDS, describe
 from tracker.wording import clean, number
 
@@ -35,9 +35,10 @@ def plain(text: str) -> str:
 def figure(chart: Chart) -> dict[str, Any]:
     """Traces and layout of a chart, colours as slots in `meta`."""
     chart = flattened(drawable(chart))
+    x_ends, y_ends = chart.ends()
     layout: dict[str, Any] = {
-        "xaxis": _axis(chart.x_label, chart.x_scale, [x for line in chart.lines for x in line.x]),
-        "yaxis": _axis(chart.y_label, chart.y_scale, [y for line in chart.lines for y in line.y]),
+        "xaxis": _axis(chart.x_label, chart.x_scale, x_ends),
+        "yaxis": _axis(chart.y_label, chart.y_scale, y_ends),
         "showlegend": sum(not line.quiet for line in chart.lines) > 1,
         "shapes": [],
         "annotations": [],
@@ -130,9 +131,9 @@ def _places(label: str, values: tuple[float, ...]) -> dict[str, Any]:
     }
 
 
-def _axis(label: str, scale: Scale, values: list[float]) -> dict[str, Any]:
-    axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "automargin": True}
-    low, high = range_of(values, scale)
+def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]:
+    low, high = ends
+    axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "range": [low, high]}
     if scale == "log":
         decades = ticks(low, high, scale)
         within = [e + math.log10(m) for e in range(math.floor(low), math.ceil(high)) for m in (1, 2, 5)]

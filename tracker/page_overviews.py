@@ -16,15 +16,15 @@ from tracker.page_rows import Page, address, event_row, row
 from tracker.svg import grid_picture, picture
 from tracker.wording import slug, web_address
 
-MOST_CLOSED = 200  # events on the page; the file has all
-MOST_NIGHTS = 400
+MOST_CLOSED = 100  # events on the page; the file has all
+MOST_NIGHTS = 120
 
 
 def error_time(book: Book) -> Page:
     """What accuracy costs, for all tests."""
     charts = []
     for test in book.tests:
-        for chart in ladder_charts(test, f"{slug(test.name)}-"):
+        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name)):
             shown = view(chart, table=False)
             axis = "work" if chart.name.endswith("-work") else "seconds"
             charts.append((axis, shown, address(test)))

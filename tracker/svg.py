@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, range_of, thinned, ticks
+from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, thinned, ticks
 from tracker.wording import clean, number
 
 WIDTH, HEIGHT = 640.0, 360.0
@@ -56,13 +56,7 @@ class Picture:
 def picture(chart: Chart) -> Picture:
     """The chart as a picture."""
     chart = flattened(drawable(chart))
-    xs = [x for line in chart.lines for x in line.x]
-    ys = [y for line in chart.lines for y in line.y if math.isfinite(y)]
-    ys += [
-        end for band in chart.bands for end in (band.low, band.high) if chart.y_scale == "linear" or end > 0.0
-    ]
-    x_low, x_high = range_of(xs, chart.x_scale, 0.03)
-    y_low, y_high = range_of(ys, chart.y_scale)
+    (x_low, x_high), (y_low, y_high) = chart.ends()
     legend, rows = _legend(chart.lines)
     top = TOP + 18.0 * rows
     box = (LEFT, top, WIDTH - RIGHT, HEIGHT - BOTTOM + 18.0 * rows)

@@ -91,11 +91,10 @@ void RigidSystem::solve_block() {
     }
     if (clock_) clock_->mark(Stage::assemble_rows);
 
-    if (!matrix_.factor(method_.floor)) {
+    if (!matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), method_.refinements)) {
         live_.not_solved = tied_.front();
         return;
     }
-    matrix_.solve_refined(right_.data(), solution_.data(), method_.refinements);
     const double* x = solution_.data();
     for (int k = 0; k < row_blocks; ++k) {
         JointSet::State& state = joints_.states[blocks[k].joint];

@@ -67,7 +67,7 @@ public:
 
 private:
     struct Live {
-        std::vector<BodyState> bodies;
+        LargeArray<BodyState> bodies;
         int too_fast = -1;   // the first body that turned too fast
         int not_solved = -1;  // the first body of a system that could not be factored
     };
@@ -94,8 +94,8 @@ private:
     }
 
     // The scene.
-    std::vector<BodyConstants> constants_;
-    std::vector<BodyState> start_;
+    LargeArray<BodyConstants> constants_;
+    LargeArray<BodyState> start_;
     std::vector<Vec3> acceleration_;  // gravity and constant loads
     std::vector<RigidSpring> springs_;
     std::vector<RigidField> fields_;
@@ -107,20 +107,20 @@ private:
     // The state.
     Live live_, saved_;
     JointSet joints_;
-    std::vector<JointSet::State> saved_joints_;
+    LargeArray<JointSet::State> saved_joints_;
 
     // One step's work.
     std::vector<Vec3> force_;           // of springs and centres, per body
     std::vector<int> tied_;             // dynamic bodies that have rows
     std::vector<int> slot_;             // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
-    std::vector<double> right_, solution_;
+    LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
         bool first_particle = false, second_particle = false;
     };
     std::vector<BlockPlace> places_;
-    std::vector<double> spare_;         // Jacobians with nowhere else to go, per block 2 × rows × 6
+    LargeArray<double> spare_;         // Jacobians with nowhere else to go, per block 2 × rows × 6
     std::vector<std::size_t> spare_at_;
     bool mixed_values_ = false;         // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_, saved_mixed_;
