@@ -263,8 +263,11 @@ def ladders(test: TestHistory) -> dict[str, dict[str, list[Trend]]]:
     return found
 
 
-def ladder_charts(test: TestHistory, prefix: str = "") -> list[Chart]:
-    """Error against seconds and against work for every ladder of a test."""
+Peers = Sequence[tuple[str, TestHistory]]  # other engines on the same machine: name, the same test
+
+
+def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> list[Chart]:
+    """Error against seconds and against work for every ladder of a test; peers against seconds only."""
     charts = []
     orders = {
         (t.definition.metric.removeprefix("ladder:").rpartition(":")[0], t.definition.configuration): t.value
@@ -289,6 +292,8 @@ def ladder_charts(test: TestHistory, prefix: str = "") -> list[Chart]:
                         f"{configuration}, the night before", before, of, colour, definition.unit
                     )
                     lines.append(_ghost(line))
+            if axis == "seconds":
+                lines += _peer_lines(peers, name, definition.unit, len(points))
             if not any(line.x for line in lines):
                 continue
             lines.append(_front([r for found in points.values() for r in found], of))
@@ -306,6 +311,17 @@ def ladder_charts(test: TestHistory, prefix: str = "") -> list[Chart]:
                 )
             )
     return charts
+
+
+def _peer_lines(peers: Peers, ladder: str, unit: str, colour: int) -> list[Line]:
+    """The ladders of other engines, after ours."""
+    lines = []
+    for engine, test in peers:
+        for configuration, trends in ladders(test).get(ladder, {}).items():
+            found = rungs(trends, lambda t: t.latest)
+            lines.append(_ladder_line(f"{engine}: {configuration}", found, lambda r: r.seconds, colour, unit))
+            colour += 1
+    return lines
 
 
 def _ghost(line: Line) -> Line:

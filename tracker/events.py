@@ -107,6 +107,8 @@ def _event(
     first = worst.first_bad or verdicts[stretch[0]].night
     good = worst.last_good or worst.against
     level = cast(Night, good.run) if good else None  # the runs given to `analyse` are nights of ours
+    if level is not None and level.index >= cast(Night, first.run).index:
+        level = None  # red from its first night on: there was nothing good before
     before = math.nan if level is None else trend.values[trend.nights.index(level.index)]
     return Event(
         trend=trend,

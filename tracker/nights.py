@@ -22,7 +22,7 @@ from tracker.document import (
     TestCard,
     from_number,
 )
-from tracker.wording import instant
+from tracker.wording import instant, version
 
 NIGHTS_FOR_FIGURES = 30  # how far back figures, maps and cards are looked for
 EARLIEST = datetime.min.replace(tzinfo=UTC)
@@ -122,6 +122,17 @@ class Book:
     tests: list[TestHistory]
     others: list[tuple[Night, list[TestHistory]]] = field(default_factory=list)  # other engines, newest night
 
+    def peers(self, test: str) -> list[tuple[str, TestHistory]]:
+        """The same test put to other engines, where it ran on the machine of tonight."""
+        machine = self.tonight.machine.fingerprint if self.nights else ""
+        return [
+            (f"{night.engine.name} {version(night.engine)}", found)
+            for night, tests in self.others
+            if night.machine.fingerprint == machine
+            for found in tests
+            if found.name == test
+        ]
+
     @property
     def tonight(self) -> Night:
         """The newest night."""
@@ -183,7 +194,7 @@ def _chapter(
     last_with: dict[str, int] = {}  # the newest night of each test
     for key, found in series.items():
         trend = Trend(found.definition)
-        for run, sample, version in found.points:
+        for run, sample, test_version in found.points:
             at = place.get(run.id)
             if at is not None:
                 trend.nights.append(at)
@@ -191,7 +202,7 @@ def _chapter(
                 trend.outcomes.append(sample.outcome)
                 trend.held.append(sample.set_point_held)
                 trend.samples.append(sample)
-                trend.versions.append(version)
+                trend.versions.append(test_version)
         if trend.nights:
             trends[key] = trend
             test = trend.definition.test

@@ -24,7 +24,7 @@ def error_time(book: Book) -> Page:
     """What accuracy costs, for all tests."""
     charts = []
     for test in book.tests:
-        for chart in ladder_charts(test, f"{slug(test.name)}-"):
+        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name)):
             shown = view(chart, table=False)
             axis = "work" if chart.name.endswith("-work") else "seconds"
             charts.append((axis, shown, address(test)))

@@ -20,7 +20,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     break_points = test.of_kind("break_point")
     scalars = shown + test.reported()
     newest = max((t.nights[-1] for t in test.trends), default=book.tonight.index)
-    charts = ladder_charts(test)
+    charts = ladder_charts(test, peers=book.peers(test.name))
     contents = [("scene", "The question"), ("versions", "Over versions")]
     contents += [("figures", "Figures")] if test.figures else []
     contents += [("error-time", "Error against run time")] if charts else []

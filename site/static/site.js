@@ -53,7 +53,7 @@ function dressLayout(layout, title) {
   const ink = colour("--ink-2");
   const axis = (given) => ({
     gridcolor: grid, linecolor: colour("--line"), zerolinecolor: colour("--line"), tickcolor: colour("--line"),
-    automargin: true, ...given, title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
+    automargin: true, exponentformat: "power", ...given, title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
   });
   const shapes = (layout.shapes || []).map((shape) => {
     if (shape.meta === "ring") {
@@ -76,6 +76,13 @@ function dressLayout(layout, title) {
   };
 }
 
+// Our own marks of a logarithmic axis fit the whole chart; a part of it is marked by the library.
+function freeTicks(layout) {
+  for (const axis of [layout.xaxis, layout.yaxis]) {
+    if (axis.type === "log") { axis.tickmode = "auto"; axis.minor = { showgrid: false }; axis.dtick = "D2"; }
+  }
+}
+
 function rangesOf(name) {
   const parts = state.get("z." + name).split(",").map(Number);
   return parts.length === 4 && parts.every(Number.isFinite) ? parts : null;
@@ -89,6 +96,7 @@ function drawChart(box) {
   if (zoom) {
     layout.xaxis.range = zoom.slice(0, 2);
     layout.yaxis.range = zoom.slice(2);
+    freeTicks(layout);
   }
   plot.hidden = false;
   box.classList.add("drawn");
@@ -98,7 +106,10 @@ function drawChart(box) {
     plot.on("plotly_relayout", () => {
       const words = (axes) => [...axes.xaxis.range, ...axes.yaxis.range].map((v) => Number(v.toPrecision(6))).join(",");
       const now = words(plot.layout);
+      if (now === plot.dataset.shown) { return; }
+      plot.dataset.shown = now;
       state.set("z." + box.id, data.layout.xaxis.range && data.layout.yaxis.range && now === words(data.layout) ? "" : now);
+      drawChart(box);
     });
   }
 }
