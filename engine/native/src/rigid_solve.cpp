@@ -1,5 +1,6 @@
 // The rows of a step, solved: one factorisation when all are bilateral, else with bounds and contacts.
 #include <algorithm>
+#include <cmath>
 
 #include "rigid_system.hpp"
 
@@ -95,6 +96,10 @@ void RigidSystem::solve_block() {
         live_.not_solved = tied_.front();
         return;
     }
+    if (matrix_.counters().floored_pivots != floored_) {
+        floored_ = matrix_.counters().floored_pivots;
+        find_contradiction();
+    }
     const double* x = solution_.data();
     for (int k = 0; k < row_blocks; ++k) {
         JointSet::State& state = joints_.states[blocks[k].joint];
@@ -110,6 +115,29 @@ void RigidSystem::solve_block() {
         x += 3;
     }
     if (clock_) clock_->mark(Stage::solve_block);
+}
+
+void RigidSystem::find_contradiction() {
+    // Redundant rows agree with the others, and refinement leaves them a residual of rounding. Rows that cannot
+    // hold together keep one of the size of the speeds they ask for.
+    double speed = 0.0;
+    for (int i : tied_) {
+        const Vec3 v = live_.bodies[i].velocity + kick(i);
+        speed = std::max({speed, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    }
+    left_.resize(right_.size());
+    matrix_.residual(right_.data(), solution_.data(), left_.data());
+    std::size_t row = 0, worst = 0;
+    double largest = 0.0;
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
+        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
+            speed = std::max(speed, std::abs(right_[row]));
+            if (std::abs(left_[row]) > largest) largest = std::abs(left_[row]), worst = k;
+        }
+    if (!(largest > 1e-3 * speed)) return;
+    const JointBlock& block = joints_.blocks()[worst];
+    const bool second = block.second >= 0 && constants_[block.second].moves();
+    live_.contradicted = second ? block.second : block.first;
 }
 
 void RigidSystem::fill_rows() {
