@@ -54,8 +54,9 @@ RigidSystem::RigidSystem(const RigidScene& scene)
 }
 
 void RigidSystem::reset(StageClock* clock) {
-    live_ = {start_, -1, -1, -1};
-    floored_ = 0;
+    live_ = {};
+    live_.bodies = start_;
+    matrix_.shift_constraints(0.0);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
     clock_ = clock;
     rounds_ = sweeps_ = 0;

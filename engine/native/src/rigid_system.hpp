@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "block_ldlt.hpp"
@@ -72,6 +73,7 @@ private:
         LargeArray<BodyState> bodies;
         int too_fast = -1;   // the first body that turned too fast
         int not_solved = -1;  // a body of a system that could not be factored
+        double share = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
         int contradicted = -1;  // a body held by rows that cannot hold together
     };
 
@@ -86,6 +88,9 @@ private:
     void impact();
     void take_velocities(bool angular_too);
     void solve_block();
+    bool solve_once();
+    bool solve_shared();
+    std::pair<double, int> row_residual(double& speed);
     void find_contradiction();
     void solve_mixed(bool touching);
     void integrate_all();
@@ -119,7 +124,6 @@ private:
     std::vector<int> slot_;             // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     LargeArray<double> right_, solution_, left_;
-    std::uint64_t floored_ = 0;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
         bool first_particle = false, second_particle = false;
