@@ -6,9 +6,34 @@ import math
 
 import numpy as np
 
-from engine import Energy, Final, Maximum, Plane, Position, RigidBody, Scene, Sphere, Trace, Velocity
+from engine import (
+    PLAIN,
+    Energy,
+    Final,
+    Maximum,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
 from engine.bodies import Material
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 RADIUS = 0.1  # m
 MASS = 1.0  # kg
@@ -44,17 +69,18 @@ def scene(gap: float = HEIGHT, speed: float = 0.0) -> Scene:
     return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def gaps(simulate: Simulate, time_step: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
+def gaps(
+    simulate: Simulate, time_step: float, duration: float, method: Method = PLAIN
+) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and gap [m] between ball and floor."""
-    result = simulate(
-        scene(), time_step=time_step, duration=duration, observe={"place": Trace(quantity=Position("ball"))}
-    )
+    observe = {"place": Trace(quantity=Position("ball"))}
+    result = simulate(scene(), time_step=time_step, duration=duration, method=method, observe=observe)
     return result.sample_times["place"], result["place"][:, 2] - RADIUS
 
 
-def bounce_heights(simulate: Simulate, time_step: float = TIME_STEP) -> np.ndarray:
+def bounce_heights(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> np.ndarray:
     """(BOUNCES,) peak gap [m] after each bounce."""
-    _, gap = gaps(simulate, time_step, 0.95 * STOP)
+    _, gap = gaps(simulate, time_step, 0.95 * STOP, method)
     rising = np.diff(gap) > 0.0
     peaks = np.nonzero(rising[:-1] & ~rising[1:])[0] + 1
     heights = gap[peaks]
@@ -132,6 +158,16 @@ def _draw_order(simulate: Simulate) -> Drawing:
         y_scale="log",
         note="An impact is met up to one step off, so single points scatter about first order.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest relative error of the first five heights."""
+    return float(np.abs(bounce_heights(simulate, time_step, method) / expected_heights() - 1.0).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same bounces with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=0.95 * STOP, method=method)
 
 
 TEST = ScalarTest(
@@ -243,5 +279,18 @@ TEST = ScalarTest(
     figures=(
         Figure(name="heights", title="Bounces", draw=_draw_heights),
         Figure(name="order", title="Error of the heights against the time step", draw=_draw_order),
+    ),
+    ladders=(
+        Ladder(
+            name="heights",
+            description="largest relative error of the first five heights",
+            unit="1",
+            time_steps=(4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=1.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.05,
+            target_seconds=1e-3,
+        ),
     ),
 )

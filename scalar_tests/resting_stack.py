@@ -4,9 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import Box, ContactForce, Energy, Maximum, Plane, Position, RigidBody, Scene, Trace
+from engine import (
+    PLAIN,
+    Box,
+    ContactForce,
+    Energy,
+    Final,
+    Maximum,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+)
 from engine.bodies import Material
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 COUNT = 20
 EDGE = 1.0  # m
@@ -14,6 +39,8 @@ MASS = 1.0  # kg
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 600  # 10 s
+LADDER_COUNT = 8
+LADDER_DURATION = 2.0  # s
 
 
 def scene(count: int = COUNT) -> Scene:
@@ -76,6 +103,24 @@ def _draw_loads(simulate: Simulate) -> Drawing:
         x_label="contact, from the floor up",
         y_label="force [N]",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest relative error of the force under each of eight boxes after 2 s."""
+    below = ["floor", *(f"box {i}" for i in range(1, LADDER_COUNT))]
+    observe = {
+        f"box {i + 1}": Final(quantity=ContactForce(f"box {i + 1}", below[i])) for i in range(LADDER_COUNT)
+    }
+    result = simulate(
+        scene(LADDER_COUNT), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
+    )
+    held = np.array([result[name][2] for name in observe])
+    return float(np.abs(held / expected(LADDER_COUNT) - 1.0).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same stack with nothing observed."""
+    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=LADDER_DURATION, method=method)
 
 
 TEST = ScalarTest(
@@ -146,4 +191,28 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP),
     figures=(Figure(name="loads", title="Force of every contact", draw=_draw_loads),),
+    ladders=(
+        Ladder(
+            name="loads",
+            description="largest relative error of a contact's load in a stack of eight after 2 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+                Configuration(
+                    name="iterative, 500 sweeps",
+                    method=Method(solver="iterative", iterations=500),
+                    expected_order=None,
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-6,
+            target_seconds=1e-2,
+        ),
+    ),
 )
