@@ -8,8 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import WORLD, Box, ConstraintForce, Hinge, RigidBody, Scene, Trace
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import PLAIN, WORLD, Box, ConstraintForce, Hinge, Method, Result, RigidBody, Scene, Trace
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 SIZE = (1.0, 0.06, 2.0)  # m
 MASS = 45.0  # kg
@@ -17,6 +28,7 @@ GRAVITY = 10.0  # m/s²
 COMPLIANCE = 1e-13  # m/N and rad/(N m)
 PRINTED_DAMPING = 1e-13  # s, as printed in the thesis: next to nothing
 TIME_STEP = 1.0 / 60.0  # s
+LADDER_COUNT = 5
 COUNTS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 40, 60, 80)
 COUNTS_TO_200 = (1, 2, 3, 5, 10, 20, 50, 100, 200)
 MASSES = (1.0, 10.0, 45.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0)
@@ -162,6 +174,25 @@ def _draw_against_mass(simulate: Simulate) -> Drawing:
         y_scale="log",
         note="The ringing grows with √(m/N): heavier doors leave the printed limit.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest |ΔFz| in the second second, damping 2 h [%]."""
+    half = round(1.0 / time_step)
+    observe = {
+        f"hinge {i + 1}": Trace(quantity=ConstraintForce(f"hinge {i + 1}"), first=half)
+        for i in range(LADDER_COUNT)
+    }
+    built = scene(LADDER_COUNT, damping=2.0 * time_step)
+    result = simulate(built, time_step=time_step, duration=2.0, method=method, observe=observe)
+    held = np.stack([result[name] for name in observe], axis=1)
+    return abs(_largest(weight_error(held)))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same door with nothing observed."""
+    built = scene(LADDER_COUNT, damping=2.0 * time_step)
+    return simulate(built, time_step=time_step, duration=2.0, method=method)
 
 
 TEST = ScalarTest(
@@ -326,4 +357,25 @@ TEST = ScalarTest(
         ),
     ),
     seven=True,
+    ladders=(
+        Ladder(
+            name="weight",
+            description="largest deviation of the vertical force from the weight in the second second, five hinges",
+            unit="%",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(
+                    name="direct, no refinement", method=Method(refinements=0), expected_order=None
+                ),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-6,
+            target_seconds=1e-2,
+        ),
+    ),
 )

@@ -11,9 +11,11 @@ from engine.observe import Observable
 from scalar_tests.bracket import break_point, cell, is_stable, table
 from scalar_tests.case import (
     BreakPoint,
+    Configuration,
     Drawing,
     Example,
     Figure,
+    Ladder,
     Measurement,
     Metric,
     ScalarTest,
@@ -30,6 +32,8 @@ STEPS = 1200  # 20 s
 TILT = 0.01  # rad
 WIDE_TILT = 1.0  # rad, for the chain that swings far
 ZIGZAG = 1e-12  # m: wakes the fastest sideways mode
+LADDER_RATIO, LADDER_TILT = 1000.0, 1e-4  # rad: small motion to 1e-9
+STRING_HALF_STEP = Method(string_stiffness=True, half_step_velocities=True)
 STRING = Method(string_stiffness=True)
 HEAVY, LIGHT, BELOW_BREAK = 1e6, 10.0, 300.0  # load over a sphere's mass
 BOUND = 0.01  # of a link's length, and of the energy above hanging; a tenth for the chain that swings far
@@ -55,11 +59,11 @@ def lift(ratio: float, tilt: float = TILT) -> float:
     return weight * (1.0 - float(np.cos(tilt)))
 
 
-def exact_load(ratio: float, time: Any) -> Any:
-    """Sideways place [m] of the load in small motion: the sum of the ten modes."""
+def exact_load(ratio: float, time: Any, tilt: float = TILT) -> Any:
+    """Sideways place [m] of the load in small motion from a lean `tilt` [rad]: the sum of the ten modes."""
     squares, shapes = sideways_modes(COUNT, ratio * MASS)
     masses = np.append(np.full(COUNT - 1, MASS), ratio * MASS)
-    share = shapes.T @ (masses * np.sin(TILT) * LENGTH * np.arange(1, COUNT + 1))
+    share = shapes.T @ (masses * np.sin(tilt) * LENGTH * np.arange(1, COUNT + 1))
     return (shapes[-1] * share) @ np.cos(np.sqrt(squares)[:, None] * np.asarray(time)[None, :])
 
 
@@ -250,6 +254,26 @@ def _metrics(role: Any, path: float, lost: float, why: str) -> tuple[Metric, ...
     )
 
 
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest distance of the load from small motion over 5 s, of the start's excursion."""
+    result = simulate(
+        scene(LADDER_RATIO, time_step, tilt=LADDER_TILT),
+        time_step=time_step,
+        duration=5.0,
+        method=method,
+        observe={"places": Trace(quantity=Position())},
+    )
+    exact = exact_load(LADDER_RATIO, result.sample_times["places"], LADDER_TILT)
+    return float(np.abs(result["places"][:, -1, 0] - exact).max()) / (COUNT * LENGTH * LADDER_TILT)
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same 5 s with nothing observed."""
+    return simulate(
+        scene(LADDER_RATIO, time_step, tilt=LADDER_TILT), time_step=time_step, duration=5.0, method=method
+    )
+
+
 PREDICTED = predicted_break()
 HOLDS = (
     "20 s (13 s in maps) without a link off by more than 1 % of its length, or energy above its start by more than "
@@ -382,6 +406,31 @@ TEST = ScalarTest(
             configuration="string",
             definition=HOLDS,
             study=_map(STRING),
+        ),
+    ),
+    ladders=(
+        Ladder(
+            name="load",
+            description="largest distance of a load of 1000 : 1 from small motion over 5 s, of its excursion",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 120)),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=2.0,
+                    order_range=(1 / 960, 1 / 120),
+                ),
+                Configuration(
+                    name="string", method=STRING, expected_order=1.0, order_range=(1 / 960, 1 / 120)
+                ),
+                Configuration(name="string, half-step", method=STRING_HALF_STEP, expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.01,
+            target_seconds=1e-2,
         ),
     ),
 )

@@ -204,8 +204,8 @@ TEST = ScalarTest(
                     name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
                 ),
                 Configuration(
-                    name="iterative, 500 sweeps",
-                    method=Method(solver="iterative", iterations=500),
+                    name="iterative, 200 sweeps",
+                    method=Method(solver="iterative", iterations=200),
                     expected_order=None,
                 ),
             ),
