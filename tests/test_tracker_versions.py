@@ -115,6 +115,13 @@ def test_a_dirty_build_is_the_latest_until_something_else_has_run():
     assert found([first, last, dirty], "previous") == first
 
 
+def test_an_engine_without_commits_has_a_latest_and_a_previous_run():
+    runs = runs_of(*(commit("", name="mujoco", version=version) for version in ("3.1", "3.2", "3.3")))
+
+    assert found(runs, "mujoco@latest").engine.version == "3.3"
+    assert found(runs, "mujoco@previous").engine.version == "3.2"
+
+
 def test_no_runs_at_all_are_explained():
     with pytest.raises(UnknownName, match="no runs are stored yet; record one with: tracker run"):
         found([], "latest")
