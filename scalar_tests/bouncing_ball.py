@@ -8,10 +8,12 @@ import numpy as np
 
 from engine import (
     PLAIN,
+    Box,
     Energy,
     Final,
     Maximum,
     Method,
+    Minimum,
     Plane,
     Position,
     Result,
@@ -22,7 +24,9 @@ from engine import (
     Velocity,
 )
 from engine.bodies import Material
+from scalar_tests.bracket import break_point
 from scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -33,6 +37,7 @@ from scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 
 RADIUS = 0.1  # m
@@ -42,6 +47,7 @@ HEIGHT = 1.0  # m, gap at the start
 RESTITUTION = 0.8
 TIME_STEP = 1e-3  # s
 BOUNCES = 5
+PLATE = 0.02  # m, thickness of the plate in the tunnelling study
 FALL = math.sqrt(2.0 * HEIGHT / GRAVITY)  # s, the first fall
 STOP = FALL * (1.0 + RESTITUTION) / (1.0 - RESTITUTION)  # s
 IMPACT_SPEED = math.sqrt(2.0 * GRAVITY * HEIGHT)  # m/s
@@ -170,6 +176,28 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(), time_step=time_step, duration=0.95 * STOP, method=method)
 
 
+def fastest_impact(simulate: Simulate) -> BreakPoint:
+    """Highest speed [m/s] at which the ball does not pass a plate of PLATE [m], at h = 1/60 s."""
+
+    def holds(speed: float) -> bool:
+        plate = RigidBody(
+            name="plate", motion="static", shape=Box((10.0, 10.0, PLATE)), position=(0.0, 0.0, -0.5 * PLATE)
+        )
+        ball = RigidBody(
+            name="ball",
+            mass=MASS,
+            shape=Sphere(RADIUS),
+            position=(0.0, 0.0, RADIUS + HEIGHT),
+            velocity=(0.0, 0.0, -speed),
+        )
+        shot = Scene(bodies=(plate, ball), gravity=(0.0, 0.0, -GRAVITY))
+        observe = {"place": Minimum(quantity=Position("ball"))}
+        result = simulate(shot, time_step=1.0 / 60.0, steps=120, observe=observe)
+        return result.completed and float(result["place"][2]) > 0.0
+
+    return break_point(holds, 0.1, 1e6, resolution=0.05, walk=15)
+
+
 TEST = ScalarTest(
     title="Bouncing ball",
     question="Does a ball bounce as high as its restitution allows, and come to rest in time?",
@@ -291,6 +319,16 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=0.05,
             target_seconds=1e-3,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="fastest-impact",
+            title="Fastest ball that does not pass a plate of 2 cm at h = 1/60 s",
+            configuration="plain",
+            definition="120 steps with the ball's centre always above the plate's top",
+            study=fastest_impact,
+            unit="m/s",
         ),
     ),
 )

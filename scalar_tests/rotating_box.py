@@ -24,7 +24,9 @@ from engine import (
     Scene,
     Trace,
 )
+from scalar_tests.bracket import break_point
 from scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -35,6 +37,7 @@ from scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 
 INERTIA = (0.9144, 1.098, 1.66)  # kg m²
@@ -149,6 +152,22 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
+def highest_spin(simulate: Simulate) -> BreakPoint:
+    """Largest h |ω| about the axis of largest inertia, a little off it."""
+
+    def holds(turn: float) -> bool:
+        spin = (1e-3 * turn / TIME_STEP, 0.0, turn / TIME_STEP)
+        body = RigidBody(
+            name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=spin
+        )
+        observe = {"turn": MaximumAbsolute(quantity=AngularMomentum(), from_start=True)}
+        result = simulate(Scene(bodies=(body,)), time_step=TIME_STEP, steps=2000, observe=observe)
+        momentum = INERTIA[2] * turn / TIME_STEP
+        return result.completed and float(result["turn"].max()) <= 1e-9 * momentum
+
+    return break_point(holds, 0.01, 10.0, resolution=1e-3)
+
+
 TEST = ScalarTest(
     title="Rotating box",
     question="Does a free body spinning about its middle axis flip when it should, and lose nothing?",
@@ -234,6 +253,18 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-4,
             target_seconds=1e-2,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="highest-spin",
+            title="Highest spin h |ω| about the axis of largest inertia",
+            configuration="plain",
+            definition="2000 steps, angular momentum kept to 1e-9",
+            study=highest_spin,
+            unit="1",
+            expected=(0.998, 1.0),
+            expected_source="c x = h |ω|, c = √(1 − x²/4), the equation of the mid-step spin x, has a root up to h |ω| = 1",
         ),
     ),
 )
