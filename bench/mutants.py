@@ -10,18 +10,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import sysconfig
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-# Runs the tracker of a clone, past the finder of an editable install of this checkout.
-RUNNER = (
-    "import sys; sys.meta_path = [f for f in sys.meta_path if 'skbc' not in type(f).__module__ + type(f).__name__]; "
-    "sys.path.insert(0, {clone!r}); from tracker.cli import main; main()"
-)
 
 
 @dataclass(frozen=True)
@@ -101,9 +98,9 @@ MUTANTS = (
 )
 
 
-def call(*command: str, cwd: Path, check: bool = True) -> subprocess.CompletedProcess[str]:
+def call(*command: str, cwd: Path, check: bool = True, **env: str) -> subprocess.CompletedProcess[str]:
     """Run a command quietly; its output is shown only if it fails."""
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | env)
     if check and done.returncode != 0:
         sys.exit(f"{' '.join(command[:6])} … failed in {cwd}:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
     return done
@@ -128,7 +125,10 @@ def build(clone: Path, changes: tuple[tuple[str, str, str], ...], message: str) 
 
 def tracker(clone: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """The tracker of a clone, with that clone's engine."""
-    return call(sys.executable, "-c", RUNNER.format(clone=str(clone)), *arguments, cwd=clone, check=False)
+    # -S leaves out the finder of an editable install, here and in the worker processes it starts.
+    packages = sysconfig.get_path("purelib")
+    search = os.pathsep.join([str(clone), packages])
+    return call(sys.executable, "-S", "-m", "tracker", *arguments, cwd=clone, check=False, PYTHONPATH=search)
 
 
 def measure(clone: Path, database: str, tests: tuple[str, ...], sweep: bool) -> str:
@@ -171,7 +171,7 @@ def main() -> int:
             report = tracker(original, "compare", before, after, "--db", database, "--format", "json")
             same = report.returncode == 0
             failed += not same
-            summary = json.loads(report.stdout).get("summary", {}) if same else report.stdout[-1500:]
+            summary = json.loads(report.stdout)["counts"] if same else report.stdout[-1500:]
             print(
                 f"{'identical' if same else 'DIFFERENT'}  rebuild {number + 1} of {given.rebuilds}: {summary}",
                 flush=True,
