@@ -153,7 +153,10 @@ def test_hostile_names_and_versions_show_as_text(driver: Any, site: Path) -> Non
 def test_compare_shows_the_verdicts_of_the_command(driver: Any, site: Path, nights: Any) -> None:
     runs = nights.runs()
     for before, after in ((15, 23), (23, 15), (22, 23)):
-        sides = [Measured(side=side_of(runs[i]), samples=nights.samples(runs[i].id)) for i in (before, after)]
+        sides = [
+            Measured(side=side_of(runs[i]), samples=nights.samples(runs[i].id), maps=nights.maps(runs[i].id))
+            for i in (before, after)
+        ]
         told = compare(*sides)
         visit(driver, site, f"compare.html#before={runs[before].id}&after={runs[after].id}")
 

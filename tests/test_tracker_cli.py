@@ -132,6 +132,7 @@ def test_the_table_fits_its_terminal(monkeypatch, columns):
     lines = shown.stdout.splitlines()
 
     assert max(len(line) for line in lines) <= columns
+    assert "map fall map [plain]: 1 settled, 1 bounded" in lines
     assert not Path("tracker.db").exists()
 
 

@@ -53,6 +53,7 @@ class Chart:
     x_ticks: tuple[tuple[float, str], ...] = ()  # where x is a place in a list
     note: str = ""
     thesis: str = ""
+    direct: bool = False  # horizontal lines carry their names, so no legend is needed
     rings: tuple[float, ...] = ()  # of a polar chart drawn flat: radii of its grid
 
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -129,6 +130,13 @@ def drawable(chart: Chart) -> Chart:
     if zeros:
         note = f"{note} Values of exactly 0 are drawn at the lower edge.".strip()
     return replace(chart, lines=tuple(lines), note=note)
+
+
+def names_on_lines(chart: Chart) -> list[tuple[float, str]]:
+    """Height and name of each horizontal line that carries its name."""
+    if not chart.direct:
+        return []
+    return [(line.y[0], line.name) for line in chart.lines if line.style in ("limit", "reference") and line.y]
 
 
 def flattened(chart: Chart) -> Chart:

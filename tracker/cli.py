@@ -217,10 +217,10 @@ def _exit_red_if(document: Any) -> None:
 
 def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
     """Whether tonight is worse than the history, having said so and published the site."""
-    from tracker.analyse import tonight
     from tracker.cli_history import accepted_levels, history_of
     from tracker.console import say
     from tracker.report_compare import finding_lines
+    from tracker.tonight import tonight
 
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())

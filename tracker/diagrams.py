@@ -9,6 +9,7 @@ from typing import Any
 
 from tracker.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
 from tracker.document import FigureData, MapData, Sample, from_number
+from tracker.events import Event
 from tracker.figures import figure, grid_figure
 from tracker.nights import Night, TestHistory, Trend
 from tracker.svg import Picture, grid_picture, picture
@@ -70,8 +71,10 @@ def grid_view(grid: Grid) -> View:
     )
 
 
-def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart:
-    """A series over versions, with its limit, set point and reference."""
+def trend_chart(
+    trend: Trend, nights: Sequence[Night], events: Sequence[Event] = (), title: str = ""
+) -> Chart:
+    """A series over versions, with its limit, set point, reference, and where it became worse."""
     definition = trend.definition
     values = trend.values[-MOST_NIGHTS * 4 :]
     at = trend.nights[-MOST_NIGHTS * 4 :]
@@ -91,6 +94,9 @@ def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart
                 notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
             )
         )  # fmt: skip
+    began = [e for e in events if e.trend is trend and e.first.index in at]
+    if began:
+        lines.append(_beginnings(began, trend))
     scale, bounds, note = _axis_of(trend)
     ends = (float(at[0]), float(at[-1])) if len(at) > 1 else (at[0] - 0.5, at[0] + 0.5)
     for bound in bounds:
@@ -123,8 +129,27 @@ def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart
         lines=tuple(lines),
         y_scale=scale,
         bands=bands,
+        direct=True,
         x_ticks=_night_ticks(nights, list(dict.fromkeys(kept))),
         note=note,
+    )
+
+
+def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
+    """A mark at each first bad commit."""
+    places = [trend.nights.index(event.first.index) for event in events]
+    notes = [
+        f"{event.name}: {event.sentence}\nfirst bad commit {short_hash(event.first.engine) or 'unknown'}, "
+        f"{day(event.first.started)}\nnow {event.standing}"
+        for event in events
+    ]
+    return Line(
+        name="became worse",
+        x=tuple(float(event.first.index) for event in events),
+        y=tuple(trend.values[place] for place in places),
+        style="points",
+        colour=3,
+        notes=tuple(notes),
     )
 
 
@@ -200,12 +225,12 @@ def figure_chart(data: FigureData, prefix: str = "") -> Chart:
     )
 
 
-def map_grid(data: MapData, prefix: str = "") -> Grid:
+def map_grid(data: MapData, prefix: str = "", title: str = "") -> Grid:
     """A stability map of the document as a grid."""
     prediction = data.prediction
     return Grid(
         name=f"{prefix}m-{slug(data.name + '/' + data.configuration)}",
-        title=f"{data.title} ({data.configuration})",
+        title=(f"{title}: " if title else "") + f"{data.title} ({data.configuration})",
         x_label=data.x_label,
         y_label=data.y_label,
         x=data.x,

@@ -13,8 +13,9 @@ from typing import Literal, cast
 
 from tracker import analyse
 from tracker.accepted import Accepted
+from tracker.document import MapData
 from tracker.nights import Book, Night, State, TestHistory, Trend
-from tracker.verdict import same_bits
+from tracker.verdict import Verdict, same_bits
 
 NOISY_NIGHTS = 400  # how far back run times are judged again on every publication
 Standing = Literal["detected", "accepted", "recovered"]
@@ -134,6 +135,17 @@ def all_events(book: Book, accepted: Sequence[Accepted] = ()) -> list[Event]:
         for event in events_of(trend, book.nights, accepted)
     ]
     return sorted(found, key=lambda e: (-e.first.index, e.trend.definition.key))
+
+
+def map_verdicts(test: TestHistory) -> dict[str, Verdict]:
+    """What became of the stability maps of a test since the night before that has them, by series key."""
+    found = analyse.judge_maps(test.earlier_maps, test.maps)
+    return {finding.series: finding.verdict for finding in found}
+
+
+def map_key(stability_map: MapData) -> str:
+    """The series key of a map."""
+    return f"{stability_map.test}/{stability_map.configuration}/map:{stability_map.name}"
 
 
 def of_test(events: Sequence[Event], test: TestHistory) -> list[Event]:

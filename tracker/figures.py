@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, thinned, ticks
+from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, names_on_lines, thinned, ticks
 from tracker.svg import CELL_WORDS, describe
 from tracker.wording import clean, number
 
@@ -39,7 +39,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     layout: dict[str, Any] = {
         "xaxis": _axis(chart.x_label, chart.x_scale, x_ends),
         "yaxis": _axis(chart.y_label, chart.y_scale, y_ends),
-        "showlegend": sum(not line.quiet for line in chart.lines) > 1,
+        "showlegend": not chart.direct and sum(not line.quiet for line in chart.lines) > 1,
         "shapes": [],
         "annotations": [],
     }
@@ -50,6 +50,9 @@ def figure(chart: Chart) -> dict[str, Any]:
         }
     if chart.polar:
         _polar(layout, chart)
+    for y, name in names_on_lines(chart):
+        at = math.log10(y) if chart.y_scale == "log" else y
+        layout["annotations"].append({"meta": "line", "y": at, "text": plain(name)})
     for band in chart.bands:
         low = band.low if chart.y_scale == "linear" or band.low > 0.0 else None
         layout["shapes"].append({"meta": "band", "low": low, "high": band.high, "name": plain(band.name)})

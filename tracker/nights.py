@@ -24,7 +24,8 @@ from tracker.document import (
 )
 from tracker.wording import instant, version
 
-NIGHTS_FOR_FIGURES = 30  # how far back figures, maps and cards are looked for
+NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
+MapKey = tuple[str, str, str]  # test, configuration, name
 EARLIEST = datetime.min.replace(tzinfo=UTC)
 State = Literal["pass", "watch", "fail", "none"]
 
@@ -87,6 +88,7 @@ class TestHistory:
     trends: list[Trend]
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
+    earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
 
     def gates(self) -> list[Trend]:
         """The series that decide green or red."""
@@ -211,19 +213,18 @@ def _chapter(
     _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
     figures: dict[str, list[FigureData]] = {}
-    maps: dict[str, list[MapData]] = {}
+    maps: dict[MapKey, MapData] = {}
+    earlier_maps: dict[MapKey, MapData] = {}
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
-        figures_found, maps_found = set(figures), set(maps)
+        figures_found = set(figures)
         for card in history.cards(night.id):
             cards.setdefault(card.name, card)
         for figure in history.figures(night.id):
             if figure.test not in figures_found:
                 figures.setdefault(figure.test, []).append(figure)
         for stability_map in history.maps(night.id):
-            if stability_map.test not in maps_found:
-                maps.setdefault(stability_map.test, []).append(stability_map)
-        if set(cards) >= set(last_with) and set(figures) >= set(cards) and set(maps) >= set(cards):
-            break
+            place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
+            (earlier_maps if place_of_map in maps else maps).setdefault(place_of_map, stability_map)
     by_test: dict[str, list[Trend]] = {}
     for trend in trends.values():
         by_test.setdefault(trend.definition.test, []).append(trend)
@@ -231,7 +232,12 @@ def _chapter(
         ordered.sort(key=lambda trend: trend.order)
     tests = [
         TestHistory(
-            test, card, by_test.get(test, []), tuple(figures.get(test, ())), tuple(maps.get(test, ()))
+            name=test,
+            card=card,
+            trends=by_test.get(test, []),
+            figures=tuple(figures.get(test, ())),
+            maps=tuple(m for m in maps.values() if m.test == test),
+            earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
         )
         for test, card in cards.items()
     ]

@@ -34,8 +34,10 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),
         "gates": gates,
         "contents": contents,
-        "trends": [view(trend_chart(t, book.nights)) for t in [*shown, *break_points]],
-        "more_trends": [view(trend_chart(t, book.nights)) for t in [*test.reported(), *test.of_kind("time")]],
+        "trends": [view(trend_chart(t, book.nights, events)) for t in [*shown, *break_points]],
+        "more_trends": [
+            view(trend_chart(t, book.nights, events)) for t in [*test.reported(), *test.of_kind("time")]
+        ],
         "figures": [view(figure_chart(f)) for f in test.figures],
         "ladders": [view(c) for c in charts],
         "orders": [every[id(t)] for t in [*test.of_kind("order"), *test.of_kind("time")]],

@@ -263,6 +263,11 @@ def judge_map(before: MapData, after: MapData) -> Verdict:
     return Verdict(word="identical", sentence="the same cells")
 
 
+def cell_rank(cell: str) -> int:
+    """How bad a cell is; a word nobody knows is the worst."""
+    return CELL_RANK.get(cell, len(CELL_RANK))
+
+
 Cell = tuple[float, float, str, str]
 
 
@@ -270,7 +275,7 @@ def _moved(before: MapData, after: MapData) -> tuple[Sequence[Cell], Sequence[Ce
     worse, better = [], []
     for y, old_row, new_row in zip(after.y, before.cells, after.cells, strict=True):
         for x, old, new in zip(after.x, old_row, new_row, strict=True):
-            step = CELL_RANK.get(new, len(CELL_RANK)) - CELL_RANK.get(old, len(CELL_RANK))
+            step = cell_rank(new) - cell_rank(old)
             if step > 0:
                 worse.append((x, y, old, new))
             elif step < 0:

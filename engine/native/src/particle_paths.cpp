@@ -6,16 +6,18 @@
 
 namespace spook {
 
-void ParticleSystem::factor_paths() noexcept {
+/// `rigid` leaves the softness out.
+void ParticleSystem::factor_paths(bool rigid) noexcept {
+    const double soft = rigid ? 0.0 : 1.0;
     for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
         const int first = path_first_[path], end = path_first_[path + 1];
-        double pivot_inverse = 1.0 / row_[first].diagonal;
+        double pivot_inverse = 1.0 / (row_[first].stiff + soft * row_[first].softness);
         link_[first].pivot_inverse = pivot_inverse;
         link_[first].lower = 0.0;
         for (int k = first + 1; k < end; ++k) {
             const double off = -w_[row_[k].a] * dot(link_[k - 1].u, link_[k].u);
             const double lower = off * pivot_inverse;
-            pivot_inverse = 1.0 / (row_[k].diagonal - lower * off);
+            pivot_inverse = 1.0 / (row_[k].stiff + soft * row_[k].softness - lower * off);
             link_[k].lower = lower;
             link_[k].pivot_inverse = pivot_inverse;
         }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "composition.hpp"
 #include "path_order.hpp"
 
 namespace spook {
@@ -39,7 +40,18 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
         w_[node] = 1.0 / scene.bodies[body].mass;
         steady_kick_[node] = h_ * (scene.gravity + w_[node] * scene.bodies[body].load);
     }
-    for (Row& row : row_) row.diagonal = w_[row.a] + w_[row.b] + row.softness;
+    for (Row& row : row_) {
+        row.stiff = w_[row.a] + w_[row.b];
+        row.diagonal = row.stiff + row.softness;
+    }
+    composed_ = scene.method.composition > 2;
+    if (composed_) {
+        history_.resize(3 * row_.size() * composition_stages(scene.method.composition).size());
+        for (int depth = 0; depth < MOST_HALVINGS; ++depth) {
+            step_x_[depth].reserve(x_.size());
+            step_v_[depth].reserve(x_.size());
+        }
+    }
     moving_forces_ = !scene.fields.empty() || !springs_.empty();
     v_.resize(x_.size());
     kick_ = steady_kick_;
@@ -73,8 +85,8 @@ void ParticleSystem::lay_out_paths(const std::vector<Path>& paths) {
             const Regularisation r = regularise(row.compliance, row.damping, h_);
             slot_of_row_[path.rows[k]] = static_cast<int>(row_.size());
             const int a = first + static_cast<int>(k);
-            row_.push_back({a, a + 1, row.rest_length, 0.0, r.violation_gain, r.velocity_gain, r.upsilon,
-                            r.relaxation, r.softness});
+            row_.push_back({a, a + 1, row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
+                            r.relaxation, r.softness, 1.0 / (row.rest_length * row.rest_length)});
         }
     }
     path_first_.push_back(static_cast<int>(row_.size()));
@@ -92,8 +104,8 @@ void ParticleSystem::lay_out_plain() {
             node[side] = end.body >= 0 ? node_of_body_[end.body] : anchor(end.point);
         }
         slot_of_row_[k] = static_cast<int>(k);
-        row_.push_back({node[0], node[1], row.rest_length, 0.0, r.violation_gain, r.velocity_gain, r.upsilon,
-                        r.relaxation, r.softness});
+        row_.push_back({node[0], node[1], row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
+                        r.relaxation, r.softness, 1.0 / (row.rest_length * row.rest_length)});
     }
 }
 
@@ -101,6 +113,7 @@ void ParticleSystem::reset(StageClock* clock) {
     clock_ = clock;
     velocity_ready_ = false;
     sweeps_ = 0;
+    newton_iterations_ = 0;
     residual_ = 0.0;
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
     for (int body = 0; body < bodies(); ++body) {
@@ -110,7 +123,8 @@ void ParticleSystem::reset(StageClock* clock) {
     for (Link& link : link_) link = {};
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
-    if (scene_.method.half_step_velocities) half_kick_back();
+    if (composed_) start_composition();
+    else if (scene_.method.half_step_velocities) half_kick_back();
     save();
 }
 
@@ -118,6 +132,7 @@ void ParticleSystem::reset(StageClock* clock) {
 
 void ParticleSystem::advance(std::int64_t steps) {
     steps *= scene_.method.substeps;
+    if (composed_) return compose(steps);
     if (clock_) return advance_by<true>(steps);
     if (velocity_ready_ && steps > 0) {
         position_stage();
@@ -354,7 +369,9 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->start();
     for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = link_[k].lambda;
     seen_v_ = v_;
-    if (scene_.method.half_step_velocities) {
+    if (composed_) {
+        if (sample > 0) read_composition();
+    } else if (scene_.method.half_step_velocities) {
         velocity_stage<false>();
         velocity_ready_ = true;
         for (std::size_t node = 0; node < v_.size(); ++node) seen_v_[node] = 0.5 * (seen_v_[node] + v_[node]);
@@ -384,6 +401,11 @@ void ParticleSystem::save() {
     for (std::size_t k = 0; k < link_.size(); ++k) saved_.lambda[k] = link_[k].lambda;
     saved_.velocity_ready = velocity_ready_;
     saved_.sweeps = sweeps_;
+    saved_.pending = pending_;
+    saved_.stage_steps = stage_steps_;
+    saved_.newton_iterations = newton_iterations_;
+    saved_.halved_steps = halved_steps_;
+    saved_.history = history_;
     saved_.residual = residual_;
 }
 
@@ -393,6 +415,11 @@ void ParticleSystem::restore() {
     for (std::size_t k = 0; k < link_.size(); ++k) link_[k].lambda = saved_.lambda[k];
     velocity_ready_ = saved_.velocity_ready;
     sweeps_ = saved_.sweeps;
+    pending_ = saved_.pending;
+    stage_steps_ = saved_.stage_steps;
+    newton_iterations_ = saved_.newton_iterations;
+    halved_steps_ = saved_.halved_steps;
+    history_ = saved_.history;
     residual_ = saved_.residual;
 }
 
@@ -415,13 +442,26 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
     if (solver_ == ParticleSolver::block)
         report.counters["block_operations"] =
             static_cast<std::int64_t>(ldlt_.counters().block_operations) - operations_at_start_;
+    if (composed_) {
+        const auto stages = static_cast<std::int64_t>(composition_stages(scene_.method.composition).size());
+        report.counters["composition_stages"] = inner * stages;
+        report.counters["halved_steps"] = halved_steps_;
+        report.counters["newton_iterations"] = newton_iterations_;
+        report.counters["force_evaluations"] *= stages;
+        report.counters["rows_assembled"] *= stages;
+        report.counters["back_substitutions"] = rows > 0 ? newton_iterations_ : 0;
+        report.counters["block_operations"] = newton_iterations_ * blocks;
+    }
     report.residual = residual_;
 }
 
 std::vector<double> ParticleSystem::final_state() {
     std::vector<double> state;
     std::vector<Vec3> reported = v_;
-    if (scene_.method.half_step_velocities) {
+    if (composed_) {
+        read_composition();
+        reported = seen_v_;
+    } else if (scene_.method.half_step_velocities) {
         if (velocity_ready_) reported = seen_v_;
         else {
             velocity_stage<false>();

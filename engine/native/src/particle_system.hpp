@@ -55,8 +55,8 @@ public:
 private:
     struct Row {  // one distance: constants
         int a, b;  // nodes
-        double rest, diagonal;
-        double violation_gain, velocity_gain, upsilon, relaxation, softness;
+        double rest, stiff, diagonal;  // m; w_a + w_b; the same + softness, 1/kg
+        double violation_gain, velocity_gain, relaxation, softness, rest_inverse_square;
     };
     struct Link {  // what this step found out about it
         Vec3 u;
@@ -90,7 +90,7 @@ private:
     void kick_nodes(std::vector<Vec3>& v) const noexcept;
 
     // particle_paths.cpp: rows in open paths, tridiagonal
-    void factor_paths() noexcept;
+    void factor_paths(bool rigid = false) noexcept;
     void substitute_paths() noexcept;
     void kick_paths(std::vector<Vec3>& v) const noexcept;
 
@@ -99,6 +99,22 @@ private:
     void factor_blocks();
     void stiffen_strings();
     void substitute_blocks();
+
+    // particle_composition.cpp: symmetric compositions of higher order
+    void start_composition();
+    void compose(std::int64_t steps);
+    void drift_kick(double tau) noexcept;
+    void find_kicks() noexcept;
+    void constrained_step(double h, int depth);
+    bool constrained_stage(double tau, double* history);
+    void push(std::vector<Vec3>& v) const noexcept;
+    double lengthen_paths(double tau, bool fresh) noexcept;
+    void shorten_paths() noexcept;
+    double lengthen_blocks(double tau, bool fresh);
+    void shorten_blocks();
+    void factor_rigid_blocks();
+    void solve_rigidly();
+    void read_composition();
 
     // particle_kernels.cpp: the same arithmetic with the time loop inside, for scenes that need no more
     void fly(std::int64_t steps) noexcept;
@@ -135,9 +151,20 @@ private:
     double residual_ = 0.0;
     std::int64_t sweeps_ = 0;
 
+    // compositions
+    bool composed_ = false;
+    double pending_ = 0.0;             // s: half a stage still to be kicked (with rows) or drifted (without)
+    std::int64_t stage_steps_ = 0;     // steps the history has seen
+    std::int64_t newton_iterations_ = 0, halved_steps_ = 0;
+    static constexpr int MOST_HALVINGS = 12;
+    std::vector<Vec3> step_x_[MOST_HALVINGS], step_v_[MOST_HALVINGS];  // where each step began
+    std::vector<double> history_;      // stages × three steps × rows, N
+
     struct Snapshot {
         std::vector<Vec3> x, v;
-        std::vector<double> lambda;
+        std::vector<double> lambda, history;
+        double pending = 0.0;
+        std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         bool velocity_ready = false;
         std::int64_t sweeps = 0;
         double residual = 0.0;

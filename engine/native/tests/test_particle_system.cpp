@@ -42,13 +42,15 @@ Vec3 tip_after(const ParticleScene& scene, int steps) {
 }
 
 void a_step_allocates_nothing() {
-    for (const int kind : {0, 1, 2, 3, 4, 5}) {
+    for (const int kind : {0, 1, 2, 3, 4, 5, 6, 7}) {
         ParticleScene scene = chain(kind == 5 ? 1 : 8);
         scene.method.iterative = kind == 1;
         scene.method.force_block = kind == 2;
         scene.method.string_stiffness = kind == 3;
         scene.method.corrections = kind == 4 ? 2 : 0;
         if (kind == 5) scene.rows.clear();
+        if (kind >= 6) scene.method.composition = 4;
+        if (kind == 7) scene.method.time_step = 0.2;  // steps are halved
         ParticleProgram program(scene, {{"violation", -1, {}}, {"energy", -1, {}}},
                                 {{0, Reduction::maximum_absolute, 0, -1, false, 1}, {1, Reduction::final, 0, -1, false, 1}});
         ParticleSystem system(scene);
