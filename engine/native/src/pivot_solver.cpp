@@ -238,7 +238,8 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         }
 
     // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
-    const int refined_rounds = 50 + 4 * bounded, last_round = refined_rounds + 50 + 8 * bounded;
+    const int refined_rounds = 50 + 4 * bounded;
+    const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
     int best = 1 << 30, left = patience;
     for (int round = 0; round < last_round; ++round) {
         bool stale = !same_matrix || factored_free_.empty();

@@ -35,6 +35,7 @@ public:
     double floor = 1e-12;   // of BlockLdlt::factor
     double relief = 1e-6;   // of bounded rows, in the factor only
     int max_refinements = 8;
+    int round_limit = 1 << 30;  // give up after so many rounds; without it the search ends by itself
 
     /// Fills velocity, multipliers and states. With `same_matrix` the caller promises that mass, Jacobians and
     /// softness are those of the call before: a factor of the same free set is then used again.
