@@ -55,7 +55,7 @@ struct Law {
 };
 
 /// Measures the disc law at one point; if it does not hold, prepares the point's next Newton step.
-Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double bound, double accepted,
+Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double bound, double accepted, double reluctant,
               const std::vector<Vec6>& velocity) {
     const double s1 = slip(block, point, 1, velocity), s2 = slip(block, point, 2, velocity);
     const double b1 = block.multiplier[1], b2 = block.multiplier[2];
@@ -68,7 +68,7 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
     block.softness[1] = block.softness[2] = point.slip_softness;
     if (reach > bound) {
         turn_tangents(block, -d1 / reach, -d2 / reach);
-        if (bound > 0.0) block.softness[2] += std::max(std::hypot(s1, s2) / bound, reluctance * scale);
+        if (bound > 0.0) block.softness[2] += std::max(std::hypot(s1, s2) / bound, reluctant * scale);
         block.state[1] = RowState::at_lower;  // beta_1 = −mu nu: against the slip
         block.state[2] = RowState::free;
         law.moved = true;
@@ -157,8 +157,9 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
             const double now = std::max(0.0, block.multiplier[0]);
             if (model != FrictionModel::box) change = std::max(change, point.coefficient * std::abs(now - point.normal));
             if (model == FrictionModel::cone) {
+                const double reluctant = reluctance * std::pow(0.5, std::max(0, round - 5));
                 const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
-                                          accepted * point.coefficient * largest, system.velocity);
+                                          accepted * point.coefficient * largest, reluctant, system.velocity);
                 residual = std::max(residual, law.residual);
                 if (law.moved) same_matrix = false;
             }
