@@ -194,7 +194,10 @@ class Prismatic(AxialJoint):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Universal(Joint):
-    """Ball, and `axis` (fixed to the first body) stays normal to `cross_axis` (fixed to the second)."""
+    """Ball, and `axis` (fixed to the first body) stays normal to `cross_axis` (fixed to the second).
+
+    Rows: translations along axis, cross_axis and the normal of both, then the rotation about that normal.
+    """
 
     rows: ClassVar[int] = 4
     kind: ClassVar[str] = "universal"

@@ -19,7 +19,9 @@ class Method:
     half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out
     string_stiffness   treat the transverse stiffness of taut links implicitly
     substeps           steps of h/substeps per reported step
-    composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes
+    composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
+                       5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
+                       compliance, damping and corrections play no part; forces are those at the sample's time
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
     iterations, residual_tolerance   when an iterative solve stops
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -50,6 +51,7 @@ _OF_BODIES: dict[type[Quantity], tuple[str, int]] = {
 _OF_ROWS: dict[type[Quantity], str] = {Violation: "violation", ConstraintForce: "constraint_force"}
 _QuantityTuple = tuple[str, int, tuple[float, float, float]]
 _ORIGIN = (0.0, 0.0, 0.0)
+_RIGID = 1e-7  # m/N, the softest row a composition takes for rigid
 
 
 def compile_particles(
@@ -58,6 +60,8 @@ def compile_particles(
     """The Program of a scene that has only particles, distances and forces."""
     if method.string_stiffness and method.solver == "iterative":
         raise MethodError("method: string_stiffness needs the direct solver")
+    if method.composition != "none":
+        _check_smooth(scene, method)
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     rows = {row.name: index for index, row in enumerate(scene.constraints)}
     requests, shapes = [], {}
@@ -79,6 +83,32 @@ def compile_particles(
     )
 
 
+def _check_smooth(scene: Scene, method: Method) -> None:
+    """Compositions go back and forth in time and hold rows rigidly: refuse what that cannot do."""
+    if method.solver == "iterative" or method.string_stiffness:
+        raise MethodError("method: a composition needs the direct solver, without string stiffness")
+    for force in scene.forces:
+        if isinstance(force, Spring) and force.viscosity > 0.0:
+            raise MethodError(
+                f"method: a composition goes back in time, where the viscosity of spring {force.name!r} explodes"
+            )
+    positions = {body.name: body.position for body in scene.bodies}
+    for row in scene.constraints:
+        assert isinstance(row, Distance)
+        if row.compliance > _RIGID:
+            raise MethodError(
+                f"method: a composition holds rows rigidly, but {row.name!r} has a compliance of "
+                f"{row.compliance:g} m/N; make it {_RIGID:g} at most, or a Spring"
+            )
+        first, second = (positions[end] if isinstance(end, str) else end for end in row.between)
+        length = math.dist(first, second)
+        if row.rest_length is not None and abs(length - row.rest_length) > 1e-9 * row.rest_length:
+            raise MethodError(
+                f"method: a composition holds rows rigidly, but {row.name!r} starts {length:g} m long instead of "
+                f"its rest length of {row.rest_length:g} m"
+            )
+
+
 def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, int]) -> dict[str, Any]:
     loads = np.zeros((len(bodies), 3))
     fields, springs, spring_ends = [], [], []
@@ -97,7 +127,12 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
         assert isinstance(row, Distance)  # the scene refuses joints between particles
         indices, points = _ends(row.between, bodies)
         row_ends.append(indices)
-        length = scene.length(row) if row.rest_length is None else row.rest_length
+        length = row.rest_length
+        if length is None:
+            first, second = (
+                scene.bodies[bodies[end]].position if isinstance(end, str) else end for end in row.between
+            )
+            length = math.dist(first, second)
         damping = default_damping if row.damping is None else row.damping
         rows.append((*points, length, row.compliance, damping))
     particles = [
@@ -196,7 +231,8 @@ def _choose(
         not_path = "string stiffness couples the bodies of a row"
     if solver == "iterative":
         not_path = "the method asks for the iterative solver"
-    half = method.half_step_velocities or method.composition != "none"
+    composed = method.composition != "none"
+    half = method.half_step_velocities or composed
     return (
         leave("collision", no_contacts),
         choose("apply_gravity", any(scene.gravity), "uniform gravity acts", "gravity is zero"),
@@ -248,14 +284,18 @@ def _choose(
         leave("friction", no_contacts),
         choose(
             "correct_curvature",
-            method.corrections > 0 and bool(rows),
-            f"{method.corrections} extra back-substitutions keep the curvature of the rows",
+            (method.corrections > 0 or composed) and bool(rows),
+            "Newton's method keeps the curvature of the rows to rounding"
+            if composed
+            else f"{method.corrections} extra back-substitutions keep the curvature of the rows",
             no_rows if not rows else "the method linearises the rows",
         ),
         choose(
             "half_step",
             half,
-            "velocities live at mid-step: half-kick start, mid-step read-out",
+            f"a symmetric composition of half-step steps, {method.composition}"
+            if composed
+            else "velocities live at mid-step: half-kick start, mid-step read-out",
             "velocities live at whole steps",
         ),
         StageChoice("integrate_positions", True, "every body can move"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from engine import check
@@ -86,7 +86,7 @@ class Scene:
                 raise SceneError(
                     f"{owner}: particle {body.name!r} has only its centre; leave its anchor at zero"
                 )
-        if self.length(constraint) == 0.0:
+        if self._length(constraint, known) == 0.0:
             raise SceneError(f"{owner}: its ends coincide, so it has no direction; move one of them")
 
     def _check_force(self, force: Force, known: dict[str, Body]) -> None:
@@ -134,9 +134,14 @@ class Scene:
     def anchor(self, constraint: Distance, end: int) -> Vector:
         """World position [m] at the start of one end (0 or 1) of a distance constraint."""
         where = constraint.between[end]
+        return self._anchor(constraint, end, {where: self.body(where)} if isinstance(where, str) else {})
+
+    @staticmethod
+    def _anchor(constraint: Distance, end: int, known: Mapping[str, Body]) -> Vector:
+        where = constraint.between[end]
         if not isinstance(where, str):
             return where
-        body, anchor = self.body(where), constraint.anchors[end]
+        body, anchor = known[where], constraint.anchors[end]
         if isinstance(body, Particle) or not any(anchor):
             return body.position
         return _placed(body, anchor)
@@ -144,6 +149,10 @@ class Scene:
     def length(self, constraint: Distance) -> float:
         """Distance [m] at the start between the two ends."""
         return math.dist(self.anchor(constraint, 0), self.anchor(constraint, 1))
+
+    def _length(self, constraint: Distance, known: Mapping[str, Body]) -> float:
+        # Looking names up one by one would make a scene of n rows cost n².
+        return math.dist(self._anchor(constraint, 0, known), self._anchor(constraint, 1, known))
 
 
 def _placed(body: RigidBody, point: Vector) -> Vector:

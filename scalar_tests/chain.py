@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
 from scipy.special import roots_laguerre
 
 from engine import Distance, Particle, Scene
@@ -23,11 +24,21 @@ def level_chain(count: int, damping: float, *, compliance: float = COMPLIANCE) -
 
 
 def hanging_chain(
-    count: int, damping: float, *, load: float = MASS, compliance: float = COMPLIANCE, tilt: float = 0.0
+    count: int,
+    damping: float,
+    *,
+    load: float = MASS,
+    compliance: float = COMPLIANCE,
+    tilt: float = 0.0,
+    zigzag: float = 0.0,
 ) -> Scene:
-    """`count` spheres straight below the pivot, the last of mass `load` [kg]; `tilt` [rad] leans the chain."""
-    along = (np.sin(tilt), 0.0, -np.cos(tilt))
-    places = [tuple((i + 1) * LENGTH * part for part in along) for i in range(count)]
+    """`count` spheres below the pivot, the last of mass `load` [kg]; `tilt` [rad] leans the chain, `zigzag`
+    [m] pushes its spheres left and right in turn."""
+    x, z = np.sin(tilt), -np.cos(tilt)
+    side = [zigzag * (-1.0) ** i for i in range(count)]
+    places = [
+        ((i + 1) * LENGTH * x - side[i] * z, 0.0, (i + 1) * LENGTH * z + side[i] * x) for i in range(count)
+    ]
     return chain(places, damping, compliance=compliance, load=load)
 
 
@@ -81,14 +92,20 @@ def exact_tip(count: int, time: float) -> tuple[float, float]:
     return float(LENGTH * np.sin(end).sum()), float(-LENGTH * np.cos(end).sum())
 
 
-def small_motion(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Squared frequencies [1/s²] of a hanging chain, and the shapes (count, modes) of its modes.
+def sideways_modes(count: int, load: float = MASS) -> tuple[np.ndarray, np.ndarray]:
+    """Squared frequencies [1/s²] and shapes (count, modes), normed by mass, of small motion about hanging.
 
-    ω² = (g/l) x with x the roots of the Laguerre polynomial of degree N; shapes from the stiffness matrix of
-    links that carry the weights below them.
+    From the stiffness matrix of links that carry the weights below them; the last sphere weighs `load` [kg].
     """
-    tension = GRAVITY * MASS * np.arange(count, 0, -1.0)  # N, link by link
+    masses = np.full(count, MASS)
+    masses[-1] = load
+    tension = GRAVITY * np.cumsum(masses[::-1])[::-1]  # N, link by link
     below = np.append(tension[1:], 0.0)
     stiffness = (np.diag(tension + below) - np.diag(tension[1:], 1) - np.diag(tension[1:], -1)) / LENGTH
-    shapes = np.linalg.eigh(stiffness / MASS)[1]
-    return GRAVITY / LENGTH * roots_laguerre(count)[0], shapes
+    squares, shapes = eigh(stiffness, np.diag(masses))
+    return np.asarray(squares), np.asarray(shapes)
+
+
+def small_motion(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same for equal masses: ω² = (g/l) x, x the roots of the Laguerre polynomial of degree N."""
+    return GRAVITY / LENGTH * roots_laguerre(count)[0], sideways_modes(count)[1]

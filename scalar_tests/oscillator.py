@@ -13,6 +13,7 @@ import numpy as np
 
 from engine import Distance, Particle, Position, Scene, Spring, Trace, Velocity
 from engine.observe import Observable
+from engine.theory import one_row_matrix
 from scalar_tests.case import Simulate
 
 MASS = 1.0  # kg
@@ -56,19 +57,8 @@ def traced(
 
 
 def one_step(stiffness: float, damping: float, time_step: float = TIME_STEP) -> np.ndarray:
-    """The map A of (x, v) over one step of SPOOK, from the step itself:
-    (1/m + Σ) λ = −a x − b v, v₊ = v + λ/m, x₊ = x + h v₊, a = 4 Υ/h, b = 1 − Υ."""
-    theta = damping / time_step
-    upsilon = 1.0 / (1.0 + 4.0 * theta)
-    softness = 4.0 * upsilon / (stiffness * time_step**2)
-    share = 1.0 / (1.0 + MASS * softness)
-    a, b = 4.0 * upsilon / time_step, 1.0 - upsilon
-    return np.array(
-        [
-            [1.0 - share * a * time_step, time_step * (1.0 - share * b)],
-            [-share * a, 1.0 - share * b],
-        ]
-    )
+    """The map A of (x, v) over one step of SPOOK: (1/m + Σ) λ = −a x − b v, v₊ = v + λ/m, x₊ = x + h v₊."""
+    return one_row_matrix(MASS, 1.0 / stiffness, damping, time_step)
 
 
 def decay(stiffness: float, damping: float, time_step: float = TIME_STEP) -> float:
@@ -76,14 +66,16 @@ def decay(stiffness: float, damping: float, time_step: float = TIME_STEP) -> flo
     return math.sqrt(float(np.linalg.det(one_step(stiffness, damping, time_step))))
 
 
-def growth(matrix: np.ndarray) -> float:
-    """Largest |eigenvalue| of a 2 × 2 map, from trace and determinant."""
+def growth(matrix: np.ndarray, steps: int = 1) -> float:
+    """Largest |eigenvalue| per step of a 2 × 2 map over `steps` steps, from trace and determinant.
+
+    The determinant decides for a complex pair, so that a double eigenvalue loses no digits.
+    """
     half = 0.5 * float(matrix[0, 0] + matrix[1, 1])
     determinant = float(matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
     square = half * half - determinant
-    if square < 0.0:
-        return math.sqrt(determinant)
-    return abs(half) + math.sqrt(square)
+    largest = math.sqrt(determinant) if square < 0.0 else abs(half) + math.sqrt(square)
+    return math.pow(largest, 1.0 / steps)
 
 
 def run_map(simulate: Simulate, stiffness: float, damping: float, time_step: float, steps: int) -> np.ndarray:

@@ -19,10 +19,12 @@ from scalar_tests.oscillator import (
     traced,
 )
 from scalar_tests.oscillator_spring import verlet
+from scalar_tests.oscillator_stability import ROW_STUDY
 from scalar_tests.sweep import line
 
 FAST_STIFFNESS = 400.0 / TIME_STEP**2  # N/m: (h ω)² = 400, a hundred times beyond Verlet's bound
 LONG_STEPS = 100_000
+STIFF_STEPS = 50
 
 
 def _path(stiffness: float, steps: int) -> np.ndarray:
@@ -65,6 +67,14 @@ def fast_and_long(simulate: Simulate) -> dict[str, float]:
     _, x, _ = traced(simulate, row_scene(FAST_STIFFNESS, 0.0), steps=LONG_STEPS)
     bound = START * math.sqrt(1.0 + FAST_STIFFNESS / MASS * TIME_STEP**2 / 4.0)
     return {"amplitude": float(np.abs(x).max()) / bound}
+
+
+def stiff(simulate: Simulate) -> dict[str, float]:
+    """No compliance and no damping: −1 is a double eigenvalue and x grows as (−1)ⁿ (2n + 1)."""
+    scene = row_scene(math.inf, 0.0, start=1.0 / 64.0)
+    _, x, _ = traced(simulate, scene, steps=STIFF_STEPS)
+    n = np.arange(STIFF_STEPS + 1)
+    return {"linear_growth_error": float(np.abs(64.0 * x - (-1.0) ** n * (2 * n + 1)).max())}
 
 
 def draw_row(simulate: Simulate) -> Drawing:
@@ -207,6 +217,24 @@ TEST = ScalarTest(
             parameters={"(h w)^2": 400.0, "steps": LONG_STEPS},
             note="the same for 100 000 steps",
         ),
+        Measurement(
+            configuration="stiff",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="linear_growth_error",
+                    description="largest |x/x₀ − (−1)ⁿ (2n + 1)| in 50 steps",
+                    unit="1",
+                    role="companion",
+                    limit=1e-9,
+                    limit_source="exact; rounding grows with the square of the steps",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=stiff,
+            note="compliance 0 and damping 0: legal to ask for, never a default; what Fig 3.23 shows",
+        ),
     ),
     example=lambda: Example(scene=row_scene(STIFFNESS, 0.0), time_step=TIME_STEP),
     figures=(
@@ -219,4 +247,5 @@ TEST = ScalarTest(
         ),
         Figure(name="fast", title="Far beyond h ω = 2", draw=draw_fast, thesis="Fig 2.6"),
     ),
+    stability=(ROW_STUDY,),
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from scalar_tests.case import Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
 from scalar_tests.oscillator import MASS, START, STEPS, STIFFNESS, TIME_STEP, spring_scene, traced
+from scalar_tests.oscillator_stability import SPRING_STUDY
 from scalar_tests.sweep import line
 
 
@@ -95,4 +96,5 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=spring_scene(), time_step=TIME_STEP),
     figures=(Figure(name="position", title="Position against time", draw=draw, thesis="Fig 2.4"),),
+    stability=(SPRING_STUDY,),
 )

@@ -24,6 +24,7 @@ from scalar_tests.pendulum_scene import (
     swing,
     traced_angle,
 )
+from scalar_tests.pendulum_stability import STUDIES
 
 LADDER_DURATION = 10.0  # s
 HALF_STEP = Method(half_step_velocities=True)
@@ -292,4 +293,5 @@ TEST = ScalarTest(
             target_seconds=1e-3,
         ),
     ),
+    stability=STUDIES,
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from engine import (
@@ -19,7 +21,18 @@ from engine import (
     Trace,
 )
 from engine.observe import Observable
-from scalar_tests.case import Configuration, Example, Ladder, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.bracket import break_point
+from scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 from scalar_tests.planetarium_figures import FIGURES
 from scalar_tests.planetarium_scene import (
     DURATION,
@@ -111,6 +124,28 @@ def position_error(simulate: Simulate, time_step: float, method: Method) -> floa
 def run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same 1200 s with nothing observed."""
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
+
+
+def largest_step(simulate: Simulate) -> BreakPoint:
+    """Largest time step [s] with which ten rounds stay an orbit."""
+
+    def holds(time_step: float) -> bool:
+        result = simulate(
+            scene(),
+            time_step=time_step,
+            steps=math.ceil(10.0 * PERIOD / time_step),
+            observe={
+                "planet": Trace(quantity=Position("planet")),
+                "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
+            },
+        )
+        if not result.completed:
+            return False
+        distance = np.linalg.norm(result["planet"], axis=1)
+        swing = float(result["energy"]) / abs(START_ENERGY)
+        return float(distance.min()) >= 0.5 and float(distance.max()) <= 2.0 and swing <= 0.1
+
+    return break_point(holds, 0.5, 200.0, resolution=0.005)
 
 
 AS_PRINTED = Metric(
@@ -306,6 +341,16 @@ TEST = ScalarTest(
             run=run,
             target_error=1e-4,
             target_seconds=1e-4,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="largest-time-step",
+            title="Largest time step that keeps the orbit",
+            configuration="plain",
+            definition="the distance to the sun stays between ½ and 2 m for ten rounds, and the energy within 10 %",
+            study=largest_step,
+            unit="s",
         ),
     ),
 )

@@ -68,7 +68,7 @@ def measured_flip_time(simulate: Simulate, time_step: float = TIME_STEP) -> floa
     """Mean time [s] between zero crossings of the spin about the middle axis; NaN with fewer than two."""
     times, spin = body_spin(simulate, time_step)
     middle = spin[:, 1]
-    crossing = np.nonzero(np.sign(middle[:-1]) != np.sign(middle[1:]))[0]
+    crossing = np.nonzero((middle[:-1] > 0.0) != (middle[1:] > 0.0))[0]
     if len(crossing) < 2:
         return float("nan")
     zero = times[crossing] - middle[crossing] * time_step / (middle[crossing + 1] - middle[crossing])

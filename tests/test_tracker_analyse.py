@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import msgspec
 
 from tracker.accepted import Accepted
-from tracker.analyse import Night, judge_history, judge_run, run_time_histories
+from tracker.analyse import Night, judge_history, judge_run, telling
 from tracker.document import EngineVersion, Machine, MapData, Sample, SeriesDefinition, Timing, to_number
+from tracker.tonight import run_time_histories
 
 SERIES = SeriesDefinition(
     key="t/c/m",
@@ -231,6 +232,15 @@ def test_a_ladder_that_takes_longer_is_found_by_its_run_time():
     assert list(derived) == ["t/c/ladder:e:run-time"]
     assert (found.red, found.verdict.name) == (True, "slower")
     assert found.first_bad == f"{10:040d}"[:12]
+
+
+def test_nights_between_equal_nights_say_nothing():
+    nights = history(*([0.01] * 50), 0.02, *([0.01] * 50), releases=(0, 20))
+    told = telling(SERIES, nights)
+
+    assert [night.run.id for night in told] == [f"run-{i}" for i in (0, 20, 49, 50, 51, 100)]
+    whole, short = (judge_history("t/c/m", SERIES, n)[-1] for n in (nights, told))
+    assert (whole.verdict, whole.state) == (short.verdict, short.state)
 
 
 def test_maps_are_judged_cell_by_cell():

@@ -132,6 +132,7 @@ def test_the_table_fits_its_terminal(monkeypatch, columns):
     lines = shown.stdout.splitlines()
 
     assert max(len(line) for line in lines) <= columns
+    assert "map fall map [plain]: 1 settled, 1 bounded" in lines
     assert not Path("tracker.db").exists()
 
 
@@ -174,7 +175,7 @@ def test_compare_says_what_got_worse_since_which_commit_and_ends_with_1(two_vers
     line = next(line for line in shown.output.splitlines() if line.startswith("✗ fall position_error"))
 
     assert shown.exit_code == 1
-    for part in ("limit crossed", "-0.05 m → -0.25 m", "limit 0.1", f"first bad commit {BAD[:12]}", "fall"):
+    for part in ("limit crossed", "-0.05 → -0.25 m", "limit 0.1", f"first bad commit {BAD[:12]}", "fall"):
         assert part in line
 
 
@@ -301,6 +302,46 @@ def test_the_database_can_be_checked_copied_and_counted(two_versions):
     assert tracker("db", "copy", "sqlite:///tracker.db", "sqlite:///copy.db").exit_code == 0
     assert "2 runs of toy" in tracker("db", "stats", "--db", "sqlite:///copy.db").output
     assert tracker("db", "upgrade").exit_code == 0
+
+
+def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypatch):
+    first = tracker("nightly", "--workers", "1", "--out", "public")
+    monkeypatch.setenv("TOY_HASH", BAD)
+    monkeypatch.setenv("TOY_PARENT", GOOD)
+    monkeypatch.setenv("TOY_VERSION", "1.1.0")
+    monkeypatch.setenv("TOY_ERROR", "0.0005")  # inside limit and set point, but worse
+    second = tracker("nightly", "--quick", "--workers", "1", "--out", "public")
+
+    assert first.exit_code == 0
+    assert Path("public/index.html").is_file()
+    assert second.exit_code == 1
+    (red,) = [line for line in second.stdout.splitlines() if line.startswith("✗ stand/")]
+    assert "✓ green" in second.stdout  # every limit holds: only the history knows
+    for part in (
+        "worse",
+        "0.5 → 0.5005 m",
+        "limit 20",
+        f"first bad commit {BAD[:12]}",
+        "public/tests/stand.html",
+    ):
+        assert part in red
+
+
+def test_plain_letters_do_where_the_terminal_has_no_others(monkeypatch):
+    done = subprocess.run(
+        [sys.executable, "-m", "tracker", "run", "--no-record", "--workers", "1"],
+        capture_output=True,
+        check=False,
+        env={
+            "PYTHONIOENCODING": "ascii",
+            "PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}",
+            "TRACKER_ENGINE": "toy_engine",
+            "TRACKER_CATALOGUE": "toy_questions:CATALOGUE",
+        },
+    )
+
+    assert done.returncode == 0
+    assert b"+ PASS" in done.stdout
 
 
 def test_schema_prints_both_schemas():

@@ -15,6 +15,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from tests.run_documents import run, run_of
+from tracker.connection import file_system
 from tracker.database import open_database, shown
 from tracker.database_check import check
 from tracker.errors import DatabaseError, UnknownName
@@ -72,6 +73,22 @@ def test_every_connection_is_told_what_sqlite_forgets(sqlite_url):
         "trusted_schema": 0,
         "busy_timeout": 30_000,
     }
+
+
+def test_a_network_drive_gets_a_journal_that_works_there(sqlite_url, monkeypatch):
+    monkeypatch.setattr("tracker.connection.file_system", lambda path: "nfs4")
+    engine = open_database(sqlite_url)
+    with engine.connect() as connection:
+        assert connection.execute(text("PRAGMA journal_mode")).scalar_one() == "delete"
+    with Session(engine) as session:
+        assert record(session, run())
+    engine.dispose()
+
+
+@pytest.mark.skipif(not Path("/proc/self/mountinfo").exists(), reason="only Linux says what is mounted")
+def test_the_file_system_is_known():
+    assert file_system(Path("/proc/self/mountinfo")) == "proc"
+    assert file_system(Path("/proc/not there")) == "proc"
 
 
 def test_opening_twice_is_opening_once(url):
@@ -144,6 +161,15 @@ def test_a_database_of_another_program(tmp_path):
 
     for readonly in (True, False):
         refused(tmp_path / "x.db", readonly=readonly, words=r"holds something else \(a table 'recipes'\)")
+
+
+def test_a_trigger_from_elsewhere(file):
+    connection = sqlite3.connect(file)
+    connection.execute("CREATE TRIGGER mine AFTER INSERT ON run BEGIN DELETE FROM sample; END")
+    connection.close()
+
+    for readonly in (True, False):
+        refused(file, readonly=readonly, words="holds a trigger 'mine'.*; drop it")
 
 
 def test_a_truncated_file(file):
@@ -233,10 +259,11 @@ def test_an_unreachable_server_is_one_sentence(tmp_path):
 
 
 def test_a_password_is_never_shown(tmp_path):
-    with pytest.raises(DatabaseError) as caught:
-        open_database(f"postgresql://user:secret@/x?host={tmp_path}")
+    for url in ("postgresql://user:secret@/x?host=", "postgresql://user@/x?password=secret&host="):
+        with pytest.raises(DatabaseError) as caught:
+            open_database(f"{url}{tmp_path}")
 
-    assert "secret" not in str(caught.value)
+        assert "secret" not in str(caught.value)
 
 
 def test_opening_at_head_does_not_import_alembic(file):

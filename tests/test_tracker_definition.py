@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import itertools
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,23 @@ def test_another_scene_constant_or_method_is_another_version(version, function, 
 
 def test_another_limit_is_another_version(version):
     assert version(MODULE, facts=("m", 0.2)) != version(MODULE, facts=("m", 0.1))
+
+
+def test_an_option_the_engine_gains_is_not_another_version():
+    @dataclass(frozen=True)
+    class Method:
+        corrections: int = 0
+
+    @dataclass(frozen=True)
+    class Grown:
+        corrections: int = 0
+        sweeps: int = 50
+
+    Method.__module__ = Grown.__module__ = "engine.method"
+    Method.__qualname__ = Grown.__qualname__ = "Method"
+
+    assert definition_hash(abs, Grown(corrections=1)) == definition_hash(abs, Method(corrections=1))
+    assert definition_hash(abs, Grown(corrections=1, sweeps=9)) != definition_hash(abs, Method(corrections=1))
 
 
 def test_values_caught_in_a_closure_count():

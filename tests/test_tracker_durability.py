@@ -136,7 +136,7 @@ def test_a_full_disk_is_one_sentence_and_costs_nothing_stored(sqlite_url, tmp_pa
 
 
 def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
-    monkeypatch.setattr("tracker.database.LOCK_TIMEOUT", 0.2)
+    monkeypatch.setattr("tracker.connection.LOCK_TIMEOUT", 0.2)
     engine, other = open_database(sqlite_url), open_database(sqlite_url)
     with Session(engine) as holding, Session(other) as waiting:
         History(holding)  # a transaction of a writer, left open

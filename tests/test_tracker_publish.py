@@ -17,7 +17,7 @@ import plotly.graph_objects as go
 import plotly.offline
 import pytest
 
-from tests.synthetic_history import SEVEN, DocumentHistory, document, history
+from tests.synthetic_history import SEVEN, DocumentHistory, decade, document, history
 from tracker.document import to_number
 from tracker.folder import MARKER, FolderError, replacing
 from tracker.publish import publish
@@ -260,7 +260,7 @@ def test_other_engines_do_not_mix_into_the_nights_of_ours(tmp_path: Path) -> Non
 
 
 def test_ten_years_of_nights_are_published_in_seconds(tmp_path: Path) -> None:
-    long = history(3650)
+    long = decade()
     start = time.perf_counter()
     publish(long, tmp_path / "public")
     taken = time.perf_counter() - start

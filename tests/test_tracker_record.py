@@ -7,9 +7,11 @@ import struct
 
 import msgspec
 import pytest
+from sqlalchemy.orm import Session
 
 from tests.run_documents import KEY, definition, figure, run, run_of, sample, stability_map
 from tracker import document
+from tracker.database import open_database
 from tracker.document import from_number
 from tracker.errors import DatabaseError, DocumentError
 from tracker.record import record
@@ -39,6 +41,16 @@ def test_a_recorded_document_comes_back_equal(session):
     assert record(session, given)
 
     assert History(session).document(given.id) == given
+
+
+def test_a_recorded_run_is_there_for_everybody_at_once(session, url):
+    given = run()
+    record(session, given)
+
+    reader = open_database(url, readonly=True)
+    with Session(reader) as reading:
+        assert [info.id for info in History(reading).runs()] == [given.id]
+    reader.dispose()
 
 
 @pytest.mark.parametrize(

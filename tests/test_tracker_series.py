@@ -8,7 +8,6 @@ import pytest
 
 from tests.run_documents import KEY, definition, engine, run, run_of, sample
 from tracker.ancestry import commit_order
-from tracker.errors import UnknownName
 from tracker.record import record
 from tracker.series import History
 
@@ -64,9 +63,12 @@ def test_commit_time_decides_where_ancestry_is_silent(session, nowhere):
 
 
 def test_dirty_and_unversioned_builds_come_last(session, nowhere):
-    history = history_of(session, nowhere, commit(A, dirty=True), commit("", version="9"), commit(B, A))
+    history = history_of(
+        session, nowhere, commit(A, dirty=True), commit("", version="9"), commit(B, A), commit(A)
+    )
 
-    assert hashes(history) == [B, A, ""]
+    assert hashes(history) == [A, B, A, ""]
+    assert [run.ordered for run in history.runs()] == [True, True, False, False]
 
 
 def test_a_forged_circle_of_parents_does_not_hang(session, nowhere):
@@ -105,30 +107,6 @@ def test_order_of_a_merge_is_stable():
     assert order == list("abcd")
 
 
-@pytest.fixture
-def three(session, nowhere):
-    return history_of(session, nowhere, commit(A), commit(B, A), commit(C, B))
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("latest", C), ("previous", B), ("last-green", C),
-        ("1.0.dev2", B), ("1a1a", A), (A, A), ("2B2B2B", B),
-        ("spook@1.0.dev1", A), ("spook@latest", C),
-    ],
-)  # fmt: skip
-def test_names_of_a_version(three, name, expected):
-    assert three.resolve(name).engine.git_hash == expected
-
-
-def test_a_run_is_named_by_its_id_or_the_start_of_it(three):
-    first = three.runs()[0]
-
-    assert three.resolve(first.id) == first
-    assert three.resolve(first.id[:12]) == first
-
-
 def test_a_tag_is_named_where_git_knows_it(session, tmp_path):
     repository, (first, _, last) = repository_of_three(tmp_path)
     history = history_of(session, repository, commit(first), commit(last))
@@ -137,66 +115,12 @@ def test_a_tag_is_named_where_git_knows_it(session, tmp_path):
     assert history.resolve("HEAD").engine.git_hash == last
 
 
-@pytest.mark.parametrize(
-    "name", ["nothing", "", "1a", "--help", "a\0b", "deadbeef", "unreal@latest", "💥" * 500]
-)
-def test_an_unknown_name_says_so_and_names_what_there_is(three, name):
-    with pytest.raises(UnknownName, match="no run of a version") as caught:
-        three.resolve(name)
-
-    assert caught.value.exit_code == 2
-    assert caught.value.near
-    assert len(str(caught.value)) < 300
-
-
-def test_a_typing_error_is_answered_with_the_version_meant(three):
-    with pytest.raises(UnknownName, match=r"did you mean 1\.0\.dev"):
-        three.resolve("1.0.dev9")
-
-
-def test_an_ambiguous_hash_is_refused(session, nowhere):
-    history = history_of(session, nowhere, commit("abcd1" + "0" * 35), commit("abcd2" + "0" * 35))
-
-    with pytest.raises(UnknownName, match="could be abcd10000000, abcd20000000"):
-        history.resolve("abcd")
-
-
-def test_an_empty_database_is_explained(session):
-    with pytest.raises(UnknownName, match="no runs are stored yet"):
-        History(session).resolve("latest")
-
-
 def test_the_last_green_run_has_gates_and_all_of_them_passed(session, nowhere):
     record(session, run(engine=commit(A)))
     record(session, run(engine=commit(B, A), samples=(sample(passed=False, outcome="out_of_limit"),)))
     record(session, run(engine=commit(C, B), series=(), samples=()))
 
     assert History(session, nowhere).resolve("last-green").engine.git_hash == A
-
-
-def test_our_own_engine_is_meant_unless_another_is_named(session, nowhere):
-    history = history_of(
-        session,
-        nowhere,
-        commit(A, version="3.0"),
-        commit("", name="mujoco", version="3.0"),
-        commit("", name="rapier", version="0.3"),
-    )
-
-    assert history.resolve("latest").engine.name == "spook"
-    assert history.resolve("3.0").engine.name == "spook"
-    assert history.resolve("mujoco@3.0").engine.name == "mujoco"
-    assert history.resolve("0.3").engine.name == "rapier"
-
-
-def test_a_dirty_build_is_the_latest_until_something_else_has_run(session, nowhere):
-    history = history_of(session, nowhere, commit(A), commit(A, dirty=True))
-    assert history.resolve("latest").engine.dirty
-    assert not history.resolve("previous").engine.dirty
-
-    history = history_of(session, nowhere, commit(B, A))
-    assert history.resolve("latest").engine.git_hash == B
-    assert history.resolve("previous").engine.git_hash == A
 
 
 def test_a_series_over_versions(session, nowhere):

@@ -55,6 +55,14 @@ def test_long_runs_are_repeated_less_often_but_never_once():
     assert len(long.seconds) == 2
 
 
+def test_runs_that_were_disturbed_do_not_count():
+    times = iter([1e-4] + [1e-4, 9e-4] * 30)
+    engine = Clockwork()
+    (timing,) = interleaved([lambda s: s(SimpleNamespace(name="a", seconds=next(times)))], engine, 2)
+
+    assert timing.seconds == pytest.approx((1e-4, 1e-4))
+
+
 def test_a_run_that_fails_is_not_timed():
     good, bad = interleaved(runs(a=0.01, b=0.01), Clockwork(failing="b"), 3)
 

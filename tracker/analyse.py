@@ -8,14 +8,11 @@ exactly; run times by the robust statistics of tracker/noise.py.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal, Protocol
-
-import msgspec
 
 from tracker.accepted import Accepted, acceptance
 from tracker.document import EngineVersion, Machine, MapData, Sample, SeriesDefinition, from_number
@@ -23,6 +20,7 @@ from tracker.noise import judge_noisy
 from tracker.verdict import Verdict, judge, judge_map
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
+NOISY_NIGHTS = 400  # how far back run times are judged again
 State = Literal["green", "detected", "accepted", "recovered", "suspected"]
 
 
@@ -247,10 +245,11 @@ def judge_run(
     """What each series measured in `run` came to, judged against the nights before it; red first."""
     findings = []
     for key, (definition, history) in histories.items():
-        until = next((i for i, night in enumerate(history) if night.run.id == run.id), None)
+        until = next((i for i in reversed(range(len(history))) if history[i].run.id == run.id), None)
         if until is None:
             continue
-        judged = judge_history(key, definition, history[: until + 1], accepted)[-1]
+        told = telling(definition, history[: until + 1])
+        judged = judge_history(key, definition, told, accepted)[-1]
         findings.append(
             Finding(
                 series=key,
@@ -262,6 +261,28 @@ def judge_run(
             )
         )
     return sorted(findings, key=lambda finding: (not finding.red, finding.series))
+
+
+def telling(definition: SeriesDefinition, history: Sequence[Night]) -> Sequence[Night]:
+    """The nights that can change the last verdict: of a stretch of equal values its ends and its releases."""
+    if is_noisy(definition):
+        return history[-NOISY_NIGHTS:]
+    facts = [
+        (
+            repr(night.sample.value),
+            night.sample.outcome,
+            night.sample.state_hash,
+            night.test_version,
+            night.run.machine.float_environment,
+        )
+        for night in history
+    ]
+    last = len(history) - 1
+    return [
+        night
+        for i, night in enumerate(history)
+        if i in (0, last) or facts[i] != facts[i - 1] or facts[i] != facts[i + 1] or is_release(night.run)
+    ]
 
 
 def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Finding]:
@@ -278,62 +299,3 @@ def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Find
             Finding(series=key, definition=None, test=new.test, judged=None, verdict=verdict, red=verdict.red)
         )
     return findings
-
-
-def run_time_histories(
-    histories: Mapping[str, tuple[SeriesDefinition, Sequence[Night]]], run: Run
-) -> dict[str, tuple[SeriesDefinition, list[Night]]]:
-    """One series of run time for each ladder configuration: the geometric mean over the rungs timed in `run`.
-
-    Nights that did not time all of these rungs are left out: means over other rungs say nothing.
-    """
-    ladders: dict[str, list[tuple[SeriesDefinition, Sequence[Night]]]] = {}
-    for definition, history in histories.values():
-        if definition.kind == "ladder" and any(n.run.id == run.id and n.sample.timing for n in history):
-            key = f"{definition.test}/{definition.configuration}/{definition.metric}:run-time"
-            ladders.setdefault(key, []).append((definition, history))
-    return {key: _run_time(key, rungs) for key, rungs in ladders.items()}
-
-
-def _run_time(
-    key: str, rungs: Sequence[tuple[SeriesDefinition, Sequence[Night]]]
-) -> tuple[SeriesDefinition, list[Night]]:
-    by_run: dict[str, list[Night]] = {}
-    for _, history in rungs:
-        for night in history:
-            if night.sample.timing is not None:
-                by_run.setdefault(night.run.id, []).append(night)
-    definition = msgspec.structs.replace(
-        rungs[0][0],
-        key=key,
-        metric=f"{rungs[0][0].metric}:run-time",
-        unit="s",
-        kind="time",
-        better="smaller",
-        time_step=None,
-    )
-    order = [night.run.id for night in max((history for _, history in rungs), key=len)]
-    told = []
-    for run_id in order:
-        found = by_run.get(run_id, [])
-        if len(found) < len(rungs):
-            continue
-        logs = [math.log(min(n.sample.timing.seconds)) for n in found if n.sample.timing]
-        seconds = math.exp(sum(logs) / len(logs))
-        sample = Sample(series=key, value=seconds, outcome="value", passed=True, set_point_held=True)
-        told.append(Night(found[0].run, sample, found[0].test_version))
-    return definition, told
-
-
-def tonight(history: Any, run: Any, accepted: Sequence[Accepted] = ()) -> list[Finding]:
-    """Findings of one recorded run against its history (tracker.series.History); red first."""
-    stored = history.series(history.samples(run.id))
-    histories = {key: (found.definition, nights(found.points)) for key, found in stored.items()}
-    findings = judge_run(histories | run_time_histories(histories, run), run, accepted)
-    earlier = [other for other in history.runs(run.engine.name) if other.id != run.id]
-    place = [other.id for other in history.runs(run.engine.name)].index(run.id)
-    for other in reversed(earlier[:place]):
-        if other.machine.float_environment == run.machine.float_environment and history.maps(other.id):
-            findings += judge_maps(history.maps(other.id), history.maps(run.id))
-            break
-    return sorted(findings, key=lambda finding: (not finding.red, finding.series))

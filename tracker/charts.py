@@ -53,7 +53,15 @@ class Chart:
     x_ticks: tuple[tuple[float, str], ...] = ()  # where x is a place in a list
     note: str = ""
     thesis: str = ""
+    direct: bool = False  # horizontal lines carry their names, so no legend is needed
     rings: tuple[float, ...] = ()  # of a polar chart drawn flat: radii of its grid
+
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Ends of both axes that show every line and band, in decades where logarithmic."""
+        xs = [x for line in self.lines for x in line.x]
+        ys = [y for line in self.lines for y in line.y]
+        ys += [end for band in self.bands for end in (band.low, band.high)]
+        return range_of(xs, self.x_scale, 0.03), range_of(ys, self.y_scale)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +130,13 @@ def drawable(chart: Chart) -> Chart:
     if zeros:
         note = f"{note} Values of exactly 0 are drawn at the lower edge.".strip()
     return replace(chart, lines=tuple(lines), note=note)
+
+
+def names_on_lines(chart: Chart) -> list[tuple[float, str]]:
+    """Height and name of each horizontal line that carries its name."""
+    if not chart.direct:
+        return []
+    return [(line.y[0], line.name) for line in chart.lines if line.style in ("limit", "reference") and line.y]
 
 
 def flattened(chart: Chart) -> Chart:

@@ -217,14 +217,14 @@ def _exit_red_if(document: Any) -> None:
 
 def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
     """Whether tonight is worse than the history, having said so and published the site."""
-    from tracker.analyse import tonight
     from tracker.cli_history import accepted_levels, history_of
     from tracker.console import say
     from tracker.report_compare import finding_lines
+    from tracker.tonight import tonight
 
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())
-        say("\n".join(finding_lines(findings)))
+        say("\n".join(finding_lines(findings, f"{out}/")))
     _retain(database)
     with history_of(database) as history:
         _publish(history, out)
@@ -248,10 +248,11 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
+    from tracker.cli_history import accepted_levels
     from tracker.console import say
     from tracker.publish import publish as build
 
-    report = build(history, out)
+    report = build(history, out, accepted_levels())
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 

@@ -18,6 +18,7 @@ from tracker.compare_document import Change, CompareDocument, Side
 from tracker.compare_ladders import frontiers, run_times
 from tracker.document import MapData, Sample, SeriesDefinition, from_number
 from tracker.verdict import RED, Verdict, judge, judge_map
+from tracker.wording import slug
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 FAMILY = {
@@ -262,4 +263,4 @@ def _notes(before: Measured, after: Measured, changes: Sequence[Change]) -> list
 
 def page_of(test: str) -> str:
     """The page of the website about a test."""
-    return f"tests/{test}.html"
+    return f"tests/{slug(test)}.html"

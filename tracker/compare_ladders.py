@@ -12,6 +12,7 @@ from tracker.document import Sample, SeriesDefinition, Timing, from_number
 from tracker.order import error_in_time, time_at_error
 from tracker.timing_statistics import compare_times
 from tracker.verdict import Word
+from tracker.wording import slug
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 Rung = tuple[SeriesDefinition, Sample, Sample]
@@ -54,7 +55,7 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
                 after_outcome="value",
                 limit=None,
                 decades=math.log10(found.ratio),
-                page=f"tests/{definition.test}.html",
+                page=f"tests/{slug(definition.test)}.html",
             )
         )
     return changes

@@ -39,11 +39,12 @@ BARS = "▁▂▃▄▅▆▇█"
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table; the flexible one gives way when the terminal is narrow."""
+    """A column of a table; flexible ones give way when the terminal is narrow, the last one first."""
 
     title: str
     align: Literal["left", "right"] = "left"
     flexible: bool = False
+    least: int = 8  # columns below which a flexible one does not go
 
 
 Style = Callable[[int, str], str]  # row and padded text of a cell, to coloured text
@@ -106,9 +107,9 @@ def table(
         max([cells(column.title), *(cells(row[i]) for row in rows)]) for i, column in enumerate(columns)
     ]
     excess = sum(widths) + 2 * (len(columns) - 1) - room
-    for i in sorted(range(len(columns)), key=lambda i: -widths[i]):
+    for i in reversed(range(len(columns))):
         if excess > 0 and columns[i].flexible:
-            cut = min(excess, widths[i] - 8)
+            cut = min(excess, widths[i] - columns[i].least)
             if cut > 0:
                 widths[i] -= cut
                 excess -= cut

@@ -4,7 +4,8 @@ Hashed are the parsed source of a measuring function and of every function of th
 reaches, the values of the constants it reads (a Method, a mass, a table), and the facts of the metric: unit,
 direction, limit, reference, time step, parameters. Docstrings, comments, layout, names of tests and every
 text a reader sees are not reached, so rewording never makes two runs incomparable. The engine is not hashed
-either: it is what is being measured. Set points and tolerances judge a value and do not make another one.
+either: it is what is being measured, and of its options only those a test sets itself count. Set points and
+tolerances judge a value and do not make another one.
 """
 
 from __future__ import annotations
@@ -47,9 +48,19 @@ WORDING = {
 
 def definition_hash(measure: Callable[..., Any], facts: object) -> str:
     """Twelve hexadecimal digits over the function, all it reaches and the facts."""
+    described = _describe(facts, _Seen(home=""))
+    try:
+        digest = _digest(measure)
+    except TypeError:  # a callable that cannot be a key
+        digest = _digest.__wrapped__(measure)
+    return hashlib.sha256(f"{digest} {described!r}".encode()).hexdigest()[:12]
+
+
+@functools.lru_cache(maxsize=4096)
+def _digest(measure: Callable[..., Any]) -> str:
+    """Of a function and all it reaches; a measurement's metrics share it."""
     seen = _Seen(home=_package(getattr(measure, "__module__", "") or ""))
-    described = (_describe(measure, seen), _describe(facts, seen))
-    return hashlib.sha256(repr(described).encode()).hexdigest()[:12]
+    return hashlib.sha256(repr(_describe(measure, seen)).encode()).hexdigest()
 
 
 @dataclasses.dataclass
@@ -102,7 +113,8 @@ def _describe(thing: Any, seen: _Seen) -> Any:
     if isinstance(thing, types.ModuleType):
         return ("module", thing.__name__)
     if dataclasses.is_dataclass(thing):
-        named = [f.name for f in dataclasses.fields(thing) if not _is_wording(type(thing), f.name)]
+        chosen = dataclasses.fields(thing) if seen.owns(type(thing).__module__) else _chosen(thing)
+        named = [f.name for f in chosen if not _is_wording(type(thing), f.name)]
         fields = tuple((name, _describe(getattr(thing, name), seen)) for name in named)
         return (type(thing).__qualname__, _describe(type(thing), seen), fields)
     if hasattr(thing, "tobytes") and hasattr(thing, "shape"):
@@ -110,6 +122,15 @@ def _describe(thing: Any, seen: _Seen) -> Any:
     if hasattr(thing, "__wrapped__"):
         return ("wrapped", _describe(thing.__wrapped__, seen))
     return (type(thing).__qualname__, getattr(thing, "__name__", ""))
+
+
+def _chosen(thing: Any) -> list[dataclasses.Field[Any]]:
+    """Fields a test set itself: an option the engine gains later, or a default it changes, is the engine's."""
+    return [
+        f
+        for f in dataclasses.fields(thing)
+        if f.default is dataclasses.MISSING or repr(getattr(thing, f.name)) != repr(f.default)
+    ]
 
 
 def _is_wording(kind: type, field: str) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 
 from tracker.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
 from tracker.document import FigureData, MapData, Sample, from_number
+from tracker.events import Event
 from tracker.figures import figure, grid_figure
 from tracker.nights import Night, TestHistory, Trend
 from tracker.svg import Picture, grid_picture, picture
@@ -70,8 +71,10 @@ def grid_view(grid: Grid) -> View:
     )
 
 
-def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart:
-    """A series over versions, with its limit, set point and reference."""
+def trend_chart(
+    trend: Trend, nights: Sequence[Night], events: Sequence[Event] = (), title: str = ""
+) -> Chart:
+    """A series over versions, with its limit, set point, reference, and where it became worse."""
     definition = trend.definition
     values = trend.values[-MOST_NIGHTS * 4 :]
     at = trend.nights[-MOST_NIGHTS * 4 :]
@@ -91,6 +94,9 @@ def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart
                 notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
             )
         )  # fmt: skip
+    began = [e for e in events if e.trend is trend and e.first.index in at]
+    if began:
+        lines.append(_beginnings(began, trend))
     scale, bounds, note = _axis_of(trend)
     ends = (float(at[0]), float(at[-1])) if len(at) > 1 else (at[0] - 0.5, at[0] + 0.5)
     for bound in bounds:
@@ -123,9 +129,36 @@ def trend_chart(trend: Trend, nights: Sequence[Night], title: str = "") -> Chart
         lines=tuple(lines),
         y_scale=scale,
         bands=bands,
-        x_ticks=tuple((float(n), day(nights[n].started)[5:]) for n in dict.fromkeys(kept)),
+        direct=True,
+        x_ticks=_night_ticks(nights, list(dict.fromkeys(kept))),
         note=note,
     )
+
+
+def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
+    """A mark at each first bad commit."""
+    places = [trend.nights.index(event.first.index) for event in events]
+    notes = [
+        f"{event.name}: {event.sentence}\nfirst bad commit {short_hash(event.first.engine) or 'unknown'}, "
+        f"{day(event.first.started)}\nnow {event.standing}"
+        for event in events
+    ]
+    return Line(
+        name="became worse",
+        x=tuple(float(event.first.index) for event in events),
+        y=tuple(trend.values[place] for place in places),
+        style="points",
+        colour=3,
+        notes=tuple(notes),
+    )
+
+
+def _night_ticks(nights: Sequence[Night], shown: Sequence[int]) -> tuple[tuple[float, str], ...]:
+    """Days under the axis; where several nights share a day, their commits."""
+    days = [day(nights[n].started)[5:] for n in shown]
+    if len(set(days)) < len(days):
+        days = [short_hash(nights[n].engine)[:7] or version(nights[n].engine) for n in shown]
+    return tuple(zip(map(float, shown), days, strict=True))
 
 
 def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
@@ -192,12 +225,12 @@ def figure_chart(data: FigureData, prefix: str = "") -> Chart:
     )
 
 
-def map_grid(data: MapData, prefix: str = "") -> Grid:
+def map_grid(data: MapData, prefix: str = "", title: str = "") -> Grid:
     """A stability map of the document as a grid."""
     prediction = data.prediction
     return Grid(
         name=f"{prefix}m-{slug(data.name + '/' + data.configuration)}",
-        title=f"{data.title} ({data.configuration})",
+        title=(f"{title}: " if title else "") + f"{data.title} ({data.configuration})",
         x_label=data.x_label,
         y_label=data.y_label,
         x=data.x,
@@ -255,8 +288,11 @@ def ladders(test: TestHistory) -> dict[str, dict[str, list[Trend]]]:
     return found
 
 
-def ladder_charts(test: TestHistory, prefix: str = "") -> list[Chart]:
-    """Error against seconds and against work for every ladder of a test."""
+Peers = Sequence[tuple[str, TestHistory]]  # other engines on the same machine: name, the same test
+
+
+def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> list[Chart]:
+    """Error against seconds and against work for every ladder of a test; peers against seconds only."""
     charts = []
     orders = {
         (t.definition.metric.removeprefix("ladder:").rpartition(":")[0], t.definition.configuration): t.value
@@ -281,6 +317,8 @@ def ladder_charts(test: TestHistory, prefix: str = "") -> list[Chart]:
                         f"{configuration}, the night before", before, of, colour, definition.unit
                     )
                     lines.append(_ghost(line))
+            if axis == "seconds":
+                lines += _peer_lines(peers, name, definition.unit, len(points))
             if not any(line.x for line in lines):
                 continue
             lines.append(_front([r for found in points.values() for r in found], of))
@@ -298,6 +336,17 @@ def ladder_charts(test: TestHistory, prefix: str = "") -> list[Chart]:
                 )
             )
     return charts
+
+
+def _peer_lines(peers: Peers, ladder: str, unit: str, colour: int) -> list[Line]:
+    """The ladders of other engines, after ours."""
+    lines = []
+    for engine, test in peers:
+        for configuration, trends in ladders(test).get(ladder, {}).items():
+            found = rungs(trends, lambda t: t.latest)
+            lines.append(_ladder_line(f"{engine}: {configuration}", found, lambda r: r.seconds, colour, unit))
+            colour += 1
+    return lines
 
 
 def _ghost(line: Line) -> Line:

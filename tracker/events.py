@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 from tracker import analyse
 from tracker.accepted import Accepted
+from tracker.document import MapData
 from tracker.nights import Book, Night, State, TestHistory, Trend
-from tracker.verdict import same_bits
+from tracker.verdict import Verdict, same_bits
 
 NOISY_NIGHTS = 400  # how far back run times are judged again on every publication
 Standing = Literal["detected", "accepted", "recovered"]
@@ -81,7 +82,7 @@ def events_of(trend: Trend, nights: Sequence[Night], accepted: Sequence[Accepted
     found: list[Event] = []
     stretch: list[int] = []  # places in `verdicts`
     for at, verdict in enumerate(verdicts):
-        if verdict.state == "detected":
+        if verdict.state == "detected" and (verdict.verdict.word != "new" or judged(trend)):
             stretch.append(at)
         elif stretch and verdict.state != "suspected":
             standing: Standing = "accepted" if verdict.state == "accepted" else "recovered"
@@ -103,21 +104,20 @@ def _event(
     standing: Standing,
     end: int | None,
 ) -> Event:
-    place = {night.id: night.index for night in nights}
     worst = verdicts[stretch[-1]]
-    first = worst.first_bad.run.id if worst.first_bad else nights[trend.nights[places[stretch[0]]]].id
+    first = worst.first_bad or verdicts[stretch[0]].night
     good = worst.last_good or worst.against
-    at_good = place[good.run.id] if good else None
-    before = math.nan
-    if at_good is not None:
-        before = trend.values[trend.nights.index(at_good)]
+    level = cast(Night, good.run) if good else None  # the runs given to `analyse` are nights of ours
+    if level is not None and level.index >= cast(Night, first.run).index:
+        level = None  # red from its first night on: there was nothing good before
+    before = math.nan if level is None else trend.values[trend.nights.index(level.index)]
     return Event(
         trend=trend,
         name=worst.verdict.name or ("outside the limit" if not worst.night.sample.passed else "worse"),
         sentence=worst.verdict.sentence,
-        first=nights[place[first]],
+        first=cast(Night, first.run),
         last=nights[trend.nights[places[stretch[-1]]]],
-        good=None if at_good is None else nights[at_good],
+        good=level,
         before=before,
         value=trend.values[places[stretch[-1]]],
         standing=standing,
@@ -135,6 +135,17 @@ def all_events(book: Book, accepted: Sequence[Accepted] = ()) -> list[Event]:
         for event in events_of(trend, book.nights, accepted)
     ]
     return sorted(found, key=lambda e: (-e.first.index, e.trend.definition.key))
+
+
+def map_verdicts(test: TestHistory) -> dict[str, Verdict]:
+    """What became of the stability maps of a test since the night before that has them, by series key."""
+    found = analyse.judge_maps(test.earlier_maps, test.maps)
+    return {finding.series: finding.verdict for finding in found}
+
+
+def map_key(stability_map: MapData) -> str:
+    """The series key of a map."""
+    return f"{stability_map.test}/{stability_map.configuration}/map:{stability_map.name}"
 
 
 def of_test(events: Sequence[Event], test: TestHistory) -> list[Event]:

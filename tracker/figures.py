@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, range_of, thinned, ticks
+from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, names_on_lines, thinned, ticks
 from tracker.svg import CELL_WORDS, describe
 from tracker.wording import clean, number
 
@@ -35,10 +35,11 @@ def plain(text: str) -> str:
 def figure(chart: Chart) -> dict[str, Any]:
     """Traces and layout of a chart, colours as slots in `meta`."""
     chart = flattened(drawable(chart))
+    x_ends, y_ends = chart.ends()
     layout: dict[str, Any] = {
-        "xaxis": _axis(chart.x_label, chart.x_scale, [x for line in chart.lines for x in line.x]),
-        "yaxis": _axis(chart.y_label, chart.y_scale, [y for line in chart.lines for y in line.y]),
-        "showlegend": sum(not line.quiet for line in chart.lines) > 1,
+        "xaxis": _axis(chart.x_label, chart.x_scale, x_ends),
+        "yaxis": _axis(chart.y_label, chart.y_scale, y_ends),
+        "showlegend": not chart.direct and sum(not line.quiet for line in chart.lines) > 1,
         "shapes": [],
         "annotations": [],
     }
@@ -49,6 +50,9 @@ def figure(chart: Chart) -> dict[str, Any]:
         }
     if chart.polar:
         _polar(layout, chart)
+    for y, name in names_on_lines(chart):
+        at = math.log10(y) if chart.y_scale == "log" else y
+        layout["annotations"].append({"meta": "line", "y": at, "text": plain(name)})
     for band in chart.bands:
         low = band.low if chart.y_scale == "linear" or band.low > 0.0 else None
         layout["shapes"].append({"meta": "band", "low": low, "high": band.high, "name": plain(band.name)})
@@ -130,9 +134,9 @@ def _places(label: str, values: tuple[float, ...]) -> dict[str, Any]:
     }
 
 
-def _axis(label: str, scale: Scale, values: list[float]) -> dict[str, Any]:
-    axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "automargin": True}
-    low, high = range_of(values, scale)
+def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]:
+    low, high = ends
+    axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "range": [low, high]}
     if scale == "log":
         decades = ticks(low, high, scale)
         within = [e + math.log10(m) for e in range(math.floor(low), math.ceil(high)) for m in (1, 2, 5)]

@@ -85,6 +85,8 @@ def ask(question: Callable[[], Any]) -> Outcome:
     except SimulationFailed as failure:
         status = failure.result.status
         return Outcome(None, status if status != "completed" else "crashed", sentence(str(failure)))
+    except SystemExit:
+        return Outcome(None, "crashed", "the test tried to end the tracker")
     except RecursionError:
         return Outcome(None, "crashed", "the test called itself without end")
     except MemoryError:

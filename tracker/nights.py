@@ -22,9 +22,10 @@ from tracker.document import (
     TestCard,
     from_number,
 )
-from tracker.wording import instant
+from tracker.wording import instant, version
 
-NIGHTS_FOR_FIGURES = 30  # how far back figures, maps and cards are looked for
+NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
+MapKey = tuple[str, str, str]  # test, configuration, name
 EARLIEST = datetime.min.replace(tzinfo=UTC)
 State = Literal["pass", "watch", "fail", "none"]
 
@@ -87,6 +88,7 @@ class TestHistory:
     trends: list[Trend]
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
+    earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
 
     def gates(self) -> list[Trend]:
         """The series that decide green or red."""
@@ -121,6 +123,17 @@ class Book:
     nights: list[Night]
     tests: list[TestHistory]
     others: list[tuple[Night, list[TestHistory]]] = field(default_factory=list)  # other engines, newest night
+
+    def peers(self, test: str) -> list[tuple[str, TestHistory]]:
+        """The same test put to other engines, where it ran on the machine of tonight."""
+        machine = self.tonight.machine.fingerprint if self.nights else ""
+        return [
+            (f"{night.engine.name} {version(night.engine)}", found)
+            for night, tests in self.others
+            if night.machine.fingerprint == machine
+            for found in tests
+            if found.name == test
+        ]
 
     @property
     def tonight(self) -> Night:
@@ -183,7 +196,7 @@ def _chapter(
     last_with: dict[str, int] = {}  # the newest night of each test
     for key, found in series.items():
         trend = Trend(found.definition)
-        for run, sample, version in found.points:
+        for run, sample, test_version in found.points:
             at = place.get(run.id)
             if at is not None:
                 trend.nights.append(at)
@@ -191,7 +204,7 @@ def _chapter(
                 trend.outcomes.append(sample.outcome)
                 trend.held.append(sample.set_point_held)
                 trend.samples.append(sample)
-                trend.versions.append(version)
+                trend.versions.append(test_version)
         if trend.nights:
             trends[key] = trend
             test = trend.definition.test
@@ -200,19 +213,18 @@ def _chapter(
     _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
     figures: dict[str, list[FigureData]] = {}
-    maps: dict[str, list[MapData]] = {}
+    maps: dict[MapKey, MapData] = {}
+    earlier_maps: dict[MapKey, MapData] = {}
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
-        figures_found, maps_found = set(figures), set(maps)
+        figures_found = set(figures)
         for card in history.cards(night.id):
             cards.setdefault(card.name, card)
         for figure in history.figures(night.id):
             if figure.test not in figures_found:
                 figures.setdefault(figure.test, []).append(figure)
         for stability_map in history.maps(night.id):
-            if stability_map.test not in maps_found:
-                maps.setdefault(stability_map.test, []).append(stability_map)
-        if set(cards) >= set(last_with) and set(figures) >= set(cards) and set(maps) >= set(cards):
-            break
+            place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
+            (earlier_maps if place_of_map in maps else maps).setdefault(place_of_map, stability_map)
     by_test: dict[str, list[Trend]] = {}
     for trend in trends.values():
         by_test.setdefault(trend.definition.test, []).append(trend)
@@ -220,7 +232,12 @@ def _chapter(
         ordered.sort(key=lambda trend: trend.order)
     tests = [
         TestHistory(
-            test, card, by_test.get(test, []), tuple(figures.get(test, ())), tuple(maps.get(test, ()))
+            name=test,
+            card=card,
+            trends=by_test.get(test, []),
+            figures=tuple(figures.get(test, ())),
+            maps=tuple(m for m in maps.values() if m.test == test),
+            earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
         )
         for test, card in cards.items()
     ]

@@ -98,11 +98,10 @@ def summary(book: Book) -> str:
     kept = sum(trend.state != "fail" for trend in seven)
     parts = []
     if seven:
-        parts.append(
-            f"All {len(seven)} gates of the thesis’ seven tests hold."
-            if kept == len(seven)
-            else f"{kept} of {len(seven)} gates of the thesis’ seven tests hold."
-        )
+        tests = len({trend.definition.test for trend in seven})
+        of = "the thesis’ seven tests" if tests == 7 else f"{tests} of the thesis’ seven tests"
+        how_many = f"All {len(seven)}" if kept == len(seven) else f"{kept} of {len(seven)}"
+        parts.append(f"{how_many} gates of {of} hold.")
     tests = len({test.name for test, _ in fresh})
     parts.append(
         f"{tests} tests were put to {clean(book.tonight.engine.name)} {version(book.tonight.engine)}."
@@ -151,7 +150,7 @@ def heat(book: Book) -> dict[str, Any]:
         "columns": shown,
         "rows": rows,
         "ticks": ticks,
-        "width": round(left + step * max(len(shown), 1) + 20.0),
+        "width": round(left + max(700.0, step * len(shown)) + 20.0),
         "height": 26 + 22 * len(rows),
         "first": first,
         "description": f"{len(rows)} tests over {len(shown)} nights; "

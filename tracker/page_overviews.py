@@ -8,23 +8,24 @@ from typing import Any
 
 from tracker.comparisons import Comparisons, choice, page_data
 from tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, trend_chart, view
-from tracker.events import Event
+from tracker.events import Event, map_key, map_verdicts
 from tracker.feed import badge_words
 from tracker.nights import Book, TestHistory
 from tracker.page_index import gates_at, health, summary
 from tracker.page_rows import Page, address, event_row, row
+from tracker.scenery import scenery
 from tracker.svg import grid_picture, picture
 from tracker.wording import slug, web_address
 
-MOST_CLOSED = 200  # events on the page; the file has all
-MOST_NIGHTS = 400
+MOST_CLOSED = 100  # events on the page; the file has all
+MOST_NIGHTS = 120
 
 
 def error_time(book: Book) -> Page:
     """What accuracy costs, for all tests."""
     charts = []
     for test in book.tests:
-        for chart in ladder_charts(test, f"{slug(test.name)}-"):
+        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name)):
             shown = view(chart, table=False)
             axis = "work" if chart.name.endswith("-work") else "seconds"
             charts.append((axis, shown, address(test)))
@@ -44,17 +45,21 @@ def _row(trend: Any, test: TestHistory) -> Any:
     return row(trend, test.card.title, address(test))
 
 
-def stability(book: Book) -> Page:
+def stability(book: Book, events: Sequence[Event]) -> Page:
     """Break points and maps of all tests."""
     points = [(test, t) for test in book.tests for t in test.of_kind("break_point")]
     context = {
         "break_points": [_row(t, test) for test, t in points],
         "maps": [
-            (grid_view(map_grid(m, f"{slug(test.name)}-")), address(test))
+            (
+                grid_view(map_grid(m, f"{slug(test.name)}-", test.card.title)),
+                address(test),
+                map_verdicts(test).get(map_key(m)),
+            )
             for test in book.tests
             for m in test.maps
         ],
-        "trends": [view(trend_chart(t, book.nights, test.card.title)) for test, t in points],
+        "trends": [view(trend_chart(t, book.nights, events, test.card.title)) for test, t in points],
     }
     return Page(
         "stability.html", "stability.html", "Stability", "Break points and maps.", context, plotly=True
@@ -68,6 +73,12 @@ def regressions(book: Book, events: Sequence[Event]) -> Page:
         "open": [event_row(e, book) for e in events if e.lasting],
         "closed": [event_row(e, book) for e in closed[:MOST_CLOSED]],
         "left_out": max(0, len(closed) - MOST_CLOSED),
+        "maps": [
+            (test.card.title, address(test), m, verdict)
+            for test in book.tests
+            for m in test.maps
+            if (verdict := map_verdicts(test).get(map_key(m))) is not None and verdict.red
+        ],
     }
     return Page(
         "regressions.html", "regressions.html", "Regressions", "What became worse, and when.", context
@@ -153,6 +164,7 @@ def document(book: Book, events: Sequence[Event]) -> Page:
             {
                 "card": test.card,
                 "slug": name,
+                "scenery": scenery(test.card.scene) if test.card.scene else None,
                 "state": test.state,
                 "kept": [s.stage for s in test.card.stages if s.kept],
                 "left_out": sum(not s.kept for s in test.card.stages),

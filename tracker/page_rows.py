@@ -9,7 +9,7 @@ from typing import Any
 from tracker.events import Event, judged
 from tracker.nights import Book, State, TestHistory, Trend
 from tracker.svg import sparkline
-from tracker.wording import band, clean, limit, margin, number, opening, quantity, slug
+from tracker.wording import band, clean, limit, margin, number, opening, quantity, seconds, slug
 
 SPARK_NIGHTS = 40
 
@@ -73,7 +73,7 @@ def row(trend: Trend, title: str, address: str) -> Row:
         time_step=number(d.time_step, 4),
         time_step_value="" if d.time_step is None else d.time_step,
         parameters=", ".join(f"{key} {number(value)}" for key, value in sorted(d.parameters.items())),
-        value=quantity(trend.value, d.unit) if math.isfinite(trend.value) else word,
+        value=_shown(trend, word),
         exact=repr(trend.value),
         limit=limit(d),
         limit_source=d.limit_source,
@@ -86,6 +86,16 @@ def row(trend: Trend, title: str, address: str) -> Row:
         spark=sparkline(trend.values[ends], states),
         search=clean(f"{d.test} {title} {d.description} {d.configuration}").lower(),
     )
+
+
+def _shown(trend: Trend, word: str) -> str:
+    """The newest value in words; run times with a fitting prefix."""
+    d = trend.definition
+    if d.kind == "time" and math.isinf(trend.value):
+        return "never"
+    if not math.isfinite(trend.value):
+        return word
+    return seconds(trend.value) if d.kind == "time" and d.unit == "s" else quantity(trend.value, d.unit)
 
 
 def address(test: TestHistory, root: str = "") -> str:

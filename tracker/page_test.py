@@ -8,6 +8,7 @@ from tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, t
 from tracker.events import Event, of_test
 from tracker.nights import Book, TestHistory
 from tracker.page_rows import Page, address, event_row, row
+from tracker.scenery import scenery
 from tracker.wording import clean, day, slug
 
 
@@ -20,7 +21,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     break_points = test.of_kind("break_point")
     scalars = shown + test.reported()
     newest = max((t.nights[-1] for t in test.trends), default=book.tonight.index)
-    charts = ladder_charts(test)
+    charts = ladder_charts(test, peers=book.peers(test.name))
     contents = [("scene", "The question"), ("versions", "Over versions")]
     contents += [("figures", "Figures")] if test.figures else []
     contents += [("error-time", "Error against run time")] if charts else []
@@ -30,12 +31,15 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     context = {
         "card": test.card,
         "slug": slug(test.name),
+        "scenery": scenery(test.card.scene) if test.card.scene else None,
         "state": test.state,
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),
         "gates": gates,
         "contents": contents,
-        "trends": [view(trend_chart(t, book.nights)) for t in [*shown, *break_points]],
-        "more_trends": [view(trend_chart(t, book.nights)) for t in [*test.reported(), *test.of_kind("time")]],
+        "trends": [view(trend_chart(t, book.nights, events)) for t in [*shown, *break_points]],
+        "more_trends": [
+            view(trend_chart(t, book.nights, events)) for t in [*test.reported(), *test.of_kind("time")]
+        ],
         "figures": [view(figure_chart(f)) for f in test.figures],
         "ladders": [view(c) for c in charts],
         "orders": [every[id(t)] for t in [*test.of_kind("order"), *test.of_kind("time")]],

@@ -30,7 +30,7 @@ def pages(book: Book, events: Sequence[Event], compared: Comparisons) -> Iterato
         return
     yield index(book, events)
     yield page_overviews.error_time(book)
-    yield page_overviews.stability(book)
+    yield page_overviews.stability(book, events)
     yield page_overviews.compare(compared)
     yield page_overviews.regressions(book, events)
     yield page_overviews.versions(book)

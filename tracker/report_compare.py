@@ -36,26 +36,53 @@ def value(number: Number | None, unit: str = "") -> str:
     return f"{from_number(number):.9g} {unit if unit != '1' else ''}".rstrip()
 
 
+def both(change: Change) -> tuple[str, str]:
+    """Values before and after with as many digits as it takes to tell them apart, the later with its unit."""
+    if change.before is None or change.after is None:
+        return value(change.before), value(change.after, change.unit)
+    old, new = from_number(change.before), from_number(change.after)
+    digits = 6
+    while digits < 17 and old != new and f"{old:.{digits}g}" == f"{new:.{digits}g}":
+        digits += 1
+    unit = "" if change.unit in ("", "1") else f" {change.unit}"
+    return f"{old:.{digits}g}", f"{new:.{digits}g}{unit}"
+
+
 def name_of(side: Side) -> str:
     """Version and commit of a side."""
     commit = f" ({side.git_hash[:10]})" if side.git_hash else ""
     return clean(f"{side.engine} {side.version}{commit}" + (" with local changes" if side.dirty else ""))
 
 
-def limit_of(change: Change) -> str:
-    if change.limit is None:
+def _limit(limit: float | tuple[float, float] | None) -> str:
+    if limit is None:
         return "no limit"
-    if isinstance(change.limit, tuple):
-        return f"limit {change.limit[0]:g} … {change.limit[1]:g}"
-    return f"limit {change.limit:g}"
+    return f"limit {limit[0]:g} … {limit[1]:g}" if isinstance(limit, tuple) else f"limit {limit:g}"
+
+
+def red_lines(changes: Sequence[Change]) -> list[str]:
+    """A line for each red series; of a ladder its worst rung speaks for the others."""
+    lines: list[str] = []
+    rungs: dict[tuple[str, str, str], list[Change]] = {}
+    for change in changes:
+        if change.red and change.kind == "ladder":
+            rungs.setdefault((change.test, change.metric, change.configuration), []).append(change)
+        elif change.red:
+            lines.append(red_line(change))
+    for group in rungs.values():
+        worst = max(group, key=lambda change: change.decades or 0.0)
+        more = f"; and {len(group) - 1} more of its time steps" if len(group) > 1 else ""
+        lines.append(red_line(worst) + more)
+    return lines
 
 
 def red_line(change: Change) -> str:
     """All a reader needs to act: test, metric, both values, limit, first bad commit, page to open."""
+    place = ", ".join([change.configuration, *change.series.split("/")[3:]])
     parts = [
-        f"✗ {change.test} {change.metric} [{change.configuration}]: {change.name or change.word}",
-        f"{value(change.before, change.unit)} → {value(change.after, change.unit)}",
-        limit_of(change),
+        f"✗ {change.test} {change.metric} [{place}]: {change.name or change.word}",
+        " → ".join(both(change)),
+        _limit(change.limit),
         change.sentence,
     ]
     if change.first_bad:
@@ -74,26 +101,34 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
             (
                 _what(change),
                 change.series,
-                value(change.before),
-                value(change.after, change.unit),
-                change.sentence,
+                *both(change),
+                _how(change),
             )
             for change in shown
         ]
         columns = (
             Column("what"),
-            Column("series", flexible=True),
+            Column("series", flexible=True, least=30),
             Column("before", "right"),
             Column("after", "right"),
-            Column("how", flexible=True),
+            Column("how", flexible=True, least=12),
         )
         lines += [*table(columns, rows, room or width(), {0: _paint}), ""]
-    reds = [click.style(red_line(change), fg="red") for change in document.changes if change.red]
+    reds = [click.style(line, fg="red") for line in red_lines(document.changes)]
     lines += [*reds, ""] if reds else []
     lines += _frontier_lines(document.frontiers, room or width())
     lines += [f"note: {clean(note)}" for note in document.notes]
     lines.append(_verdict(document))
     return "\n".join(lines)
+
+
+def _how(change: Change) -> str:
+    """The size of the change in few letters: decades, or per cent; else the sentence."""
+    if change.kind == "run_time" or not change.decades:
+        return change.sentence
+    if abs(change.decades) >= 0.05:
+        return f"{change.decades:+.1f} decades"
+    return f"{100.0 * (10.0**change.decades - 1.0):+.2g} %"
 
 
 def _what(change: Change) -> str:
@@ -154,9 +189,8 @@ def compare_markdown(document: CompareDocument) -> str:
         cells = (
             _what(change),
             change.series,
-            value(change.before),
-            value(change.after, change.unit),
-            limit_of(change),
+            *both(change),
+            _limit(change.limit),
             change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
         )
         lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
@@ -174,15 +208,15 @@ def _escape(text: str) -> str:
     )
 
 
-def finding_lines(findings: Sequence[Finding]) -> list[str]:
+def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
     """What tonight came to against the history: a line for each red series, and one over all."""
-    lines = [click.style(_finding_line(finding), fg="red") for finding in findings if finding.red]
+    lines = [click.style(_finding_line(finding, site), fg="red") for finding in findings if finding.red]
     if lines:
         return [*lines, click.style(f"✗ {len(lines)} worse than the history", fg="red", bold=True)]
     return [click.style(f"✓ {len(findings)} series hold their level", fg="green")]
 
 
-def _finding_line(finding: Finding) -> str:
+def _finding_line(finding: Finding, site: str) -> str:
     from tracker.compare import page_of
 
     judged, definition = finding.judged, finding.definition
@@ -190,9 +224,9 @@ def _finding_line(finding: Finding) -> str:
     if judged is not None and definition is not None:
         before = judged.against.sample.value if judged.against else None
         parts.append(f"{value(before)} → {value(judged.night.sample.value, definition.unit)}")
-        parts.append(f"limit {definition.limit}" if definition.limit is not None else "no limit")
+        parts.append(_limit(definition.limit))
     parts.append(finding.verdict.sentence)
     if finding.first_bad:
         parts.append(f"first bad commit {finding.first_bad}, last good {finding.last_good or 'unknown'}")
-    parts.append(f"see {page_of(finding.test)}")
+    parts.append(f"see {site}{page_of(finding.test)}")
     return clean("; ".join(parts))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import click
 
 from tracker.console import Column, Style, clean, table, width
-from tracker.document import RunDocument, Sample, SeriesDefinition, from_number
+from tracker.document import MapData, RunDocument, Sample, SeriesDefinition, from_number
 from tracker.report_sweep import sweep_table
+from tracker.verdict import cell_rank
 
 NARROW = 100  # columns; below, time step and set point have no column of their own
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
@@ -116,10 +118,19 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
     if ladders:
         lines += ["", *sweep_table(ladders, room or width())]
     points = [pair for pair in pairs(run) if pair[0].kind == "break_point"]
-    if points:
-        lines += ["", click.style("Stability", bold=True), *_scalars(points, room or width())]
+    if points or run.maps:
+        lines += ["", click.style("Stability", bold=True)]
+        lines += _scalars(points, room or width()) if points else []
+        lines += [_map_line(found) for found in run.maps]
     lines += ["", *failures(run), verdict(run)]
     return "\n".join(lines)
+
+
+def _map_line(found: MapData) -> str:
+    """How many cells of a map are what."""
+    count = Counter(cell for row in found.cells for cell in row)
+    words = ", ".join(f"{count[cell]} {cell.replace('_', ' ')}" for cell in sorted(count, key=cell_rank))
+    return clean(f"map {found.test} {found.name} [{found.configuration}]: {words}")
 
 
 def title(run: RunDocument) -> str:

@@ -10,7 +10,9 @@ from __future__ import annotations
 import difflib
 import importlib
 import os
+import signal
 import uuid
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -235,7 +237,15 @@ def _answers(
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"))
+    return ProcessPoolExecutor(
+        max_workers=workers, mp_context=get_context("spawn"), initializer=_begin_quietly
+    )
+
+
+def _begin_quietly() -> None:
+    """A worker says what it has to say in samples: no warnings on the terminal, no trace when interrupted."""
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _gather(

@@ -160,35 +160,24 @@ class History:
         )
 
     def _read_runs(self) -> tuple[RunInfo, ...]:
-        query = (
-            select(models.Run, models.EngineVersion, models.Machine)
-            .join(models.EngineVersion, models.Run.engine_version_id == models.EngineVersion.id)
-            .join(models.Machine, models.Run.machine_id == models.Machine.id)
-        )
-        engines: dict[int, document.EngineVersion] = {}
-        machines: dict[int, document.Machine] = {}
-        runs = []
-        for run, engine, machine in self._session.execute(query):
-            if engine.id not in engines:
-                engines[engine.id] = rows.engine_of(vars(engine))
-            if machine.id not in machines:
-                machines[machine.id] = rows.machine_of(vars(machine))
-            runs.append(
-                RunInfo(
-                    id=run.id,
-                    started=run.started,
-                    finished=run.finished,
-                    trigger=run.trigger,
-                    engine=engines[engine.id],
-                    machine=machines[machine.id],
-                    tracker_version=run.tracker_version,
-                    ci_address=run.ci_address,
-                    key=run.key,
-                    started_at=run.started_at,
-                    gates=run.gates,
-                    gates_passed=run.gates_passed,
-                )
+        connection = self._session.connection()
+        found = connection.execute(select(models.EngineVersion.__table__)).mappings()
+        engines = {row["id"]: rows.engine_of(dict(row)) for row in found}
+        found = connection.execute(select(models.Machine.__table__)).mappings()
+        machines = {row["id"]: rows.machine_of(dict(row)) for row in found}
+        same = (
+            "id", "started", "finished", "trigger", "tracker_version", "ci_address", "key", "started_at",
+            "gates", "gates_passed",
+        )  # fmt: skip
+        columns = [getattr(models.Run, name) for name in (*same, "engine_version_id", "machine_id")]
+        runs = [
+            RunInfo(
+                engine=engines[row[-2]],
+                machine=machines[row[-1]],
+                **dict(zip(same, row[:-2], strict=True)),
             )
+            for row in connection.execute(select(*columns))
+        ]
         return self._in_commit_order(runs)
 
     def _in_commit_order(self, runs: list[RunInfo]) -> tuple[RunInfo, ...]:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, range_of, thinned, ticks
+from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, names_on_lines, thinned, ticks
 from tracker.wording import clean, number
 
 WIDTH, HEIGHT = 640.0, 360.0
@@ -51,19 +51,14 @@ class Picture:
     centre: tuple[str, str] = ("0", "0")
     legend: list[tuple[str, str, str, str]] = field(default_factory=list)  # x, y, classes, name
     cells: list[tuple[str, str, str, str, str, str]] = field(default_factory=list)
+    names: list[tuple[str, str]] = field(default_factory=list)  # height and name of a line
 
 
 def picture(chart: Chart) -> Picture:
     """The chart as a picture."""
     chart = flattened(drawable(chart))
-    xs = [x for line in chart.lines for x in line.x]
-    ys = [y for line in chart.lines for y in line.y if math.isfinite(y)]
-    ys += [
-        end for band in chart.bands for end in (band.low, band.high) if chart.y_scale == "linear" or end > 0.0
-    ]
-    x_low, x_high = range_of(xs, chart.x_scale, 0.03)
-    y_low, y_high = range_of(ys, chart.y_scale)
-    legend, rows = _legend(chart.lines)
+    (x_low, x_high), (y_low, y_high) = chart.ends()
+    legend, rows = ([], 0) if chart.direct else _legend(chart.lines)
     top = TOP + 18.0 * rows
     box = (LEFT, top, WIDTH - RIGHT, HEIGHT - BOTTOM + 18.0 * rows)
     height = HEIGHT + 18.0 * rows
@@ -105,6 +100,7 @@ def picture(chart: Chart) -> Picture:
         low = y_of(band.low) if chart.y_scale == "linear" or band.low > 0.0 else box[3]
         high = max(y_of(band.high), box[1])
         out.bands.append((_n(high), _n(max(low - high, 1.5)), clean(band.name)))
+    out.names = [(_n(y_of(y) - 5.0), clean(name)) for y, name in names_on_lines(chart)]
     out.marks = [_mark(line, x_of, y_of) for line in chart.lines]
     return out
 

@@ -92,8 +92,15 @@ def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list
             if lane is None or turn >= lane.repeats:
                 continue
             taken = [once(lane.run, simulate) for _ in range(lane.runs)]
-            lane.seconds.append(sum(s for s in taken if s is not None) / len(taken))
-    return [None if lane is None else _timing(lane, simulate) for lane in lanes]
+            whole = [s for s in taken if s is not None]
+            lane.seconds += [_undisturbed(whole)] if whole else []
+    return [_timing(lane, simulate) if lane and lane.seconds else None for lane in lanes]
+
+
+def _undisturbed(seconds: Sequence[float]) -> float:
+    """Mean of the faster half of the runs of one repeat: interference only ever makes a run slower."""
+    faster = sorted(seconds)[: (len(seconds) + 1) // 2]
+    return sum(faster) / len(faster)
 
 
 def _timing(lane: _Lane, simulate: Simulate) -> Timing:

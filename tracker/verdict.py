@@ -88,7 +88,7 @@ def judge(
         return Verdict(word="changed", sentence="the same value from another final state", ulps=0)
     if same_commit:
         return _unrepeatable(decades, ulps)
-    by_class = _by_class(before, after)
+    by_class = _by_class(definition, before, after)
     if by_class is not None:
         return by_class
     if not (math.isfinite(old) and math.isfinite(new)):
@@ -120,7 +120,7 @@ def _words(outcome: OutcomeClass) -> str:
     return outcome.replace("_", " ")
 
 
-def _by_class(before: Sample, after: Sample) -> Verdict | None:
+def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Verdict | None:
     old, new = RANK[before.outcome], RANK[after.outcome]
     if new > old:
         crossed = after.outcome == "out_of_limit"
@@ -128,7 +128,7 @@ def _by_class(before: Sample, after: Sample) -> Verdict | None:
         return Verdict(
             word="regressed",
             sentence=what + (f": {after.failure}" if after.failure else ""),
-            name="limit crossed" if crossed else _words(after.outcome),
+            name=_crossed(definition) if crossed else _words(after.outcome),
         )
     if new < old:
         word: Word = "fixed" if new == 0 else "improved"
@@ -136,6 +136,10 @@ def _by_class(before: Sample, after: Sample) -> Verdict | None:
     if before.outcome != after.outcome:
         return Verdict(word="changed", sentence=f"{_words(before.outcome)} became {_words(after.outcome)}")
     return None
+
+
+def _crossed(definition: SeriesDefinition) -> str:
+    return "wrong order" if definition.kind == "order" else "limit crossed"
 
 
 def _by_size(
@@ -259,6 +263,11 @@ def judge_map(before: MapData, after: MapData) -> Verdict:
     return Verdict(word="identical", sentence="the same cells")
 
 
+def cell_rank(cell: str) -> int:
+    """How bad a cell is; a word nobody knows is the worst."""
+    return CELL_RANK.get(cell, len(CELL_RANK))
+
+
 Cell = tuple[float, float, str, str]
 
 
@@ -266,7 +275,7 @@ def _moved(before: MapData, after: MapData) -> tuple[Sequence[Cell], Sequence[Ce
     worse, better = [], []
     for y, old_row, new_row in zip(after.y, before.cells, after.cells, strict=True):
         for x, old, new in zip(after.x, old_row, new_row, strict=True):
-            step = CELL_RANK.get(new, len(CELL_RANK)) - CELL_RANK.get(old, len(CELL_RANK))
+            step = cell_rank(new) - cell_rank(old)
             if step > 0:
                 worse.append((x, y, old, new))
             elif step < 0:

@@ -93,9 +93,13 @@ def _among(runs: list[RunInfo], name: str, commit_of: Callable[[str], str | None
 
 
 def _by_word(runs: list[RunInfo], word: str) -> RunInfo | None:
-    """A dirty or unversioned build is the latest only as long as nothing has run since."""
+    """A dirty or unversioned build is the latest only as long as nothing has run since.
+
+    Engines that come without commits have no better order than the time of their runs.
+    """
     newest = max(runs, key=lambda run: run.started_at)
-    line = [run for run in runs if run.ordered or run is newest]
+    versioned = any(run.ordered for run in runs)
+    line = [run for run in runs if run.ordered or run is newest or not versioned]
     if word == "latest":
         return line[-1]
     if word == "previous":

@@ -135,6 +135,8 @@ def margin(definition: SeriesDefinition, value: float) -> Margin:
 
 def clean(text: str) -> str:
     """Text from outside with what cannot be seen made visible: control and direction characters."""
+    if text.isprintable():
+        return text
     return "".join(
         "\N{REPLACEMENT CHARACTER}" if unicodedata.category(c) in INVISIBLE and c not in "\n\t" else c
         for c in text

@@ -53,7 +53,7 @@ function dressLayout(layout, title) {
   const ink = colour("--ink-2");
   const axis = (given) => ({
     gridcolor: grid, linecolor: colour("--line"), zerolinecolor: colour("--line"), tickcolor: colour("--line"),
-    automargin: true, ...given, title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
+    automargin: true, exponentformat: "power", ...given, title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
   });
   const shapes = (layout.shapes || []).map((shape) => {
     if (shape.meta === "ring") {
@@ -64,7 +64,8 @@ function dressLayout(layout, title) {
     const band = { type: "rect", xref: "paper", x0: 0, x1: 1, layer: "below", line: { width: 0 }, fillcolor: colour("--c2"), opacity: 0.16 };
     return { ...band, y0: shape.low === null ? (log ? 1e-300 : 0) : shape.low, y1: shape.high };
   });
-  const annotations = (layout.annotations || []).map((a) => ({ showarrow: false, font: { size: 11, color: ink }, yanchor: "bottom", ...a }));
+  const onLine = { xref: "paper", x: 1, xanchor: "right", borderpad: 1 };
+  const annotations = (layout.annotations || []).map((a) => ({ showarrow: false, ...(a.meta === "line" ? onLine : {}), font: { size: 11, color: ink }, yanchor: "bottom", ...a }));
   return {
     ...layout, shapes, annotations, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: ink },
@@ -74,6 +75,13 @@ function dressLayout(layout, title) {
     modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: colour("--ink-3"), activecolor: colour("--accent") },
     hovermode: "closest", dragmode: "zoom", colorway: ["#0072b2"],
   };
+}
+
+// Our own marks of a logarithmic axis fit the whole chart; a part of it is marked by the library.
+function freeTicks(layout) {
+  for (const axis of [layout.xaxis, layout.yaxis]) {
+    if (axis.type === "log") { axis.tickmode = "auto"; axis.minor = { showgrid: false }; axis.dtick = "D2"; }
+  }
 }
 
 function rangesOf(name) {
@@ -89,8 +97,7 @@ function drawChart(box) {
   if (zoom) {
     layout.xaxis.range = zoom.slice(0, 2);
     layout.yaxis.range = zoom.slice(2);
-  } else if (data.layout.shapes && data.layout.shapes.some((s) => s.meta === "band")) {
-    layout.yaxis.range = yRange(data);
+    freeTicks(layout);
   }
   plot.hidden = false;
   box.classList.add("drawn");
@@ -98,24 +105,14 @@ function drawChart(box) {
   if (!plot.dataset.live) {
     plot.dataset.live = "1";
     plot.on("plotly_relayout", () => {
-      const { xaxis, yaxis } = plot.layout;
-      const free = xaxis.autorange !== false && yaxis.autorange !== false;
-      state.set("z." + box.id, free ? "" : [...xaxis.range, ...yaxis.range].map((v) => Number(v.toPrecision(6))).join(","));
+      const words = (axes) => [...axes.xaxis.range, ...axes.yaxis.range].map((v) => Number(v.toPrecision(6))).join(",");
+      const now = words(plot.layout);
+      if (now === plot.dataset.shown) { return; }
+      plot.dataset.shown = now;
+      state.set("z." + box.id, data.layout.xaxis.range && data.layout.yaxis.range && now === words(data.layout) ? "" : now);
+      drawChart(box);
     });
   }
-}
-
-// The axis shows the values and the band; a band down to nothing on a logarithmic axis does not stretch it.
-function yRange(data) {
-  const log = data.layout.yaxis.type === "log";
-  let values = data.data.flatMap((t) => t.y || []).filter((v) => v !== null);
-  for (const band of data.layout.shapes) {
-    values = values.concat([band.low, band.high].filter((v) => v !== null && v !== undefined));
-  }
-  if (log) { values = values.filter((v) => v > 0).map(Math.log10); }
-  const low = Math.min(...values), high = Math.max(...values);
-  const pad = 0.06 * (high - low) || Math.abs(high) * 0.1 || 1;
-  return [low - pad, high + pad];
 }
 
 function charts() {

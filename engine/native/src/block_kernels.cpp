@@ -1,5 +1,6 @@
 #include "block_kernels.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #define SPOOK_ISA portable

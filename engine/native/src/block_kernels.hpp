@@ -14,22 +14,39 @@ struct Column {
     std::uint8_t size, is_constraint;
 };
 
+/// Where a block of the matrix goes in the factor. Blocks are taken when a column first needs them, so that the
+/// factor is written once while the matrix is read once.
+struct Load {
+    enum Kind : std::uint8_t { direct, transposed, diagonal, raw_diagonal, zero };
+    std::int64_t from, to;
+    std::int32_t offset;  // of the unknowns of a diagonal block
+    std::uint8_t rows, columns;
+    Kind kind;
+    bool constraint;  // a diagonal block of −Sig, which may get a shift in the factor
+};
+
 struct Factor {
     const Column* columns;
     std::int64_t column_count;
     const std::uint8_t* row_size;
     const std::int32_t* row_offset;
     const std::int64_t* targets;  // per column, for each pair of its rows r ≤ s: where the update goes
+    const double* matrix;
+    const Load* loads;
+    const std::int64_t* load_start;  // per column: loads[load_start[k]] … before loads[load_start[k + 1]]
     double* values;
     double* scale;    // per unknown: sum of magnitudes a pivot came from
     double* scratch;  // the widest column before division by D
+    double shift;     // taken from the diagonal of every constraint, in the factor only
 };
 
 /// What a sweep over the columns needs, for one instruction set.
 struct Kernels {
-    /// Factors in place; counts replaced pivots; −1 when a pivot is not finite (or vanishes with floor 0).
-    std::int64_t (*factor)(const Factor&, int uniform_size, double floor);
-    void (*solve)(const Factor&, int uniform_size, double* x);
+    /// Loads and factors; counts replaced pivots; −1 when a pivot is not finite (or vanishes with floor 0).
+    /// With x not null it is carried through the forward substitution on the way.
+    std::int64_t (*factor)(const Factor&, int uniform_size, double floor, double* x);
+    void (*forward)(const Factor&, int uniform_size, double* x);
+    void (*backward)(const Factor&, int uniform_size, double* x);
     /// y −= B x₂ and z −= Bᵀ x₁ for a row-major rows × columns block B.
     void (*subtract_product)(int rows, int columns, const double* b, const double* x2, double* y);
     void (*subtract_coupling)(int rows, int columns, const double* b, const double* x1, const double* x2, double* y,

@@ -249,11 +249,52 @@ constexpr void (*backward_row_table[6][6])(const double*, const double*, double*
     {SPOOK_U3(n, 1), SPOOK_U3(n, 2), SPOOK_U3(n, 3), SPOOK_U3(n, 4), SPOOK_U3(n, 5), SPOOK_U3(n, 6)}
 constexpr void (*update_table[6][6][6])(const double*, const double*, double*) = SPOOK_SIX(SPOOK_U);
 
+template <int U>
+SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
+    const int rows = U ? U : item.rows, columns = U ? U : item.columns;
+    const double* from = f.matrix + item.from;
+    double* to = f.values + item.to;
+    switch (item.kind) {
+        case Load::zero: std::fill_n(to, rows * columns, 0.0); return;
+        case Load::transposed:
+            for (int a = 0; a < rows; ++a)
+                for (int b = 0; b < columns; ++b) to[b * rows + a] = from[a * columns + b];
+            return;
+        case Load::diagonal:
+            for (int a = 0; a < rows; ++a) f.scale[item.offset + a] = std::abs(from[a * rows + a]);
+            break;
+        case Load::raw_diagonal:
+            for (int a = 0; a < rows; ++a) f.scale[item.offset + a] += std::abs(from[a * rows + a]);
+            break;
+        default: break;
+    }
+    std::copy_n(from, rows * columns, to);
+    if (item.constraint && f.shift != 0.0)
+        for (int a = 0; a < rows; ++a) to[a * rows + a] -= f.shift;
+}
+
+template <int U>
+SPOOK_INLINE void forward_column(const Factor& f, const Column& column, double* x) {
+    const int n = U ? U : column.size;
+    const double* u = f.values + column.at;
+    double* xk = x + column.offset;
+    if constexpr (U) forward_pivot<U>(u, xk);
+    else forward_pivot_table[n - 1](u, xk);
+    const double* z = u + n * n + n;
+    for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
+        const int m = U ? U : f.row_size[r];
+        if constexpr (U) forward_row<U, U>(z, xk, x + f.row_offset[r]);
+        else forward_row_table[n - 1][m - 1](z, xk, x + f.row_offset[r]);
+        z += n * m;
+    }
+}
+
 /// U is the size of all blocks, known to the compiler, or 0.
 template <int U>
-std::int64_t factor_columns(const Factor& f, double floor, double replacement) {
+std::int64_t factor_columns(const Factor& f, double floor, double replacement, double* x) {
     std::int64_t replaced = 0;
     for (std::int64_t k = 0; k < f.column_count; ++k) {
+        for (std::int64_t i = f.load_start[k]; i < f.load_start[k + 1]; ++i) load_block<U>(f, f.loads[i]);
         const Column& column = f.columns[k];
         const int n = U ? U : column.size;
         double* u = f.values + column.at;
@@ -295,27 +336,18 @@ std::int64_t factor_columns(const Factor& f, double floor, double replacement) {
             }
             y += n * m;
         }
+        if (x) forward_column<U>(f, column, x);
     }
     return replaced;
 }
 
 template <int U>
-void solve_columns(const Factor& f, double* x) {
-    for (std::int64_t k = 0; k < f.column_count; ++k) {
-        const Column& column = f.columns[k];
-        const int n = U ? U : column.size;
-        const double* u = f.values + column.at;
-        double* xk = x + column.offset;
-        if constexpr (U) forward_pivot<U>(u, xk);
-        else forward_pivot_table[n - 1](u, xk);
-        const double* z = u + n * n + n;
-        for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
-            const int m = U ? U : f.row_size[r];
-            if constexpr (U) forward_row<U, U>(z, xk, x + f.row_offset[r]);
-            else forward_row_table[n - 1][m - 1](z, xk, x + f.row_offset[r]);
-            z += n * m;
-        }
-    }
+void forward_columns(const Factor& f, double* x) {
+    for (std::int64_t k = 0; k < f.column_count; ++k) forward_column<U>(f, f.columns[k], x);
+}
+
+template <int U>
+void backward_columns(const Factor& f, double* x) {
     for (std::int64_t k = f.column_count - 1; k >= 0; --k) {
         const Column& column = f.columns[k];
         const int n = U ? U : column.size;
@@ -335,20 +367,28 @@ void solve_columns(const Factor& f, double* x) {
     }
 }
 
-std::int64_t factor_all(const Factor& f, int uniform_size, double floor) {
+std::int64_t factor_all(const Factor& f, int uniform_size, double floor, double* x) {
     const double replacement = std::sqrt(floor);
     switch (uniform_size) {
-        case 6: return factor_columns<6>(f, floor, replacement);
-        case 3: return factor_columns<3>(f, floor, replacement);
-        default: return factor_columns<0>(f, floor, replacement);
+        case 6: return factor_columns<6>(f, floor, replacement, x);
+        case 3: return factor_columns<3>(f, floor, replacement, x);
+        default: return factor_columns<0>(f, floor, replacement, x);
     }
 }
 
-void solve_all(const Factor& f, int uniform_size, double* x) {
+void forward_all(const Factor& f, int uniform_size, double* x) {
     switch (uniform_size) {
-        case 6: return solve_columns<6>(f, x);
-        case 3: return solve_columns<3>(f, x);
-        default: return solve_columns<0>(f, x);
+        case 6: return forward_columns<6>(f, x);
+        case 3: return forward_columns<3>(f, x);
+        default: return forward_columns<0>(f, x);
+    }
+}
+
+void backward_all(const Factor& f, int uniform_size, double* x) {
+    switch (uniform_size) {
+        case 6: return backward_columns<6>(f, x);
+        case 3: return backward_columns<3>(f, x);
+        default: return backward_columns<0>(f, x);
     }
 }
 
@@ -370,6 +410,6 @@ void subtract_coupling(int rows, int columns, const double* b, const double* x1,
 
 }  // namespace
 
-constexpr Kernels table = {factor_all, solve_all, subtract_product, subtract_coupling};
+constexpr Kernels table = {factor_all, forward_all, backward_all, subtract_product, subtract_coupling};
 
 }  // namespace spook::kernel::SPOOK_ISA

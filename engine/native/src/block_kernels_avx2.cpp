@@ -1,6 +1,7 @@
 // The same loops in vectors of four. Not fused multiply-add: that would round differently.
 #include "block_kernels.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)

@@ -82,40 +82,84 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     scratch_.assign(widest, 0.0);
 
     targets_.resize(target_count);
+    // The first column that needs each block, of the diagonal and then of the rows: its own, or one that updates it.
+    std::vector<std::int64_t> touched(count + ordering.column_rows.size());
+    for (int k = 0; k < count; ++k) {
+        touched[order_[k]] = k;
+        for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) touched[count + r] = k;
+    }
     std::int64_t next = 0;
     for (int k = 0; k < count; ++k) {
         const std::int64_t last = ordering.column_start[k + 1];
         for (std::int64_t r = ordering.column_start[k]; r < last; ++r) {
             const int row = ordering.column_rows[r], p = position[row];
             targets_[next++] = pivot_at_[row];
+            touched[row] = std::min<std::int64_t>(touched[row], k);
             // Both lists are in order of elimination, and the later one contains the rest of this one.
             std::int64_t q = ordering.column_start[p];
             for (std::int64_t s = r + 1; s < last; ++s) {
                 while (ordering.column_rows[q] != ordering.column_rows[s]) ++q;
                 targets_[next++] = block_at[q];
+                touched[count + q] = std::min<std::int64_t>(touched[count + q], k);
             }
         }
     }
 
-    loads_.resize(edges_.size());
+    place_loads(ordering, block_at, touched);
+}
+
+void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int64_t>& block_at,
+                            const std::vector<std::int64_t>& touched) {
+    const int count = block_count();
+    std::vector<int> position(count);
+    for (int k = 0; k < count; ++k) position[order_[k]] = k;
+    const std::size_t rows = ordering.column_rows.size();
+
+    // The edge that a block of the factor comes from; the rest is fill.
+    std::vector<std::int64_t> edge_of(rows, -1);
     for (std::size_t e = 0; e < edges_.size(); ++e) {
         const auto [i, j] = edges_[e];
-        const bool transposed = position[i] > position[j];
-        const int early = transposed ? j : i, late = transposed ? i : j;
+        const bool later = position[i] > position[j];
+        const int early = later ? j : i, late = later ? i : j;
         const auto first = ordering.column_rows.begin() + ordering.column_start[position[early]];
         const auto last = ordering.column_rows.begin() + ordering.column_start[position[early] + 1];
         const auto found = std::lower_bound(first, last, late,
                                             [&](int a, int b) { return position[a] < position[b]; });
-        loads_[e] = {coupling_at_[e], block_at[found - ordering.column_rows.begin()],
-                     static_cast<std::uint8_t>(size_[i]), static_cast<std::uint8_t>(size_[j]), transposed};
+        std::int64_t& edge = edge_of[found - ordering.column_rows.begin()];
+        if (edge >= 0) throw std::invalid_argument("block LDLT: two edges join the same pair of blocks");
+        edge = static_cast<std::int64_t>(e);
     }
-    std::vector<std::int64_t> seen(loads_.size());
-    for (std::size_t e = 0; e < loads_.size(); ++e) seen[e] = loads_[e].to;
-    std::sort(seen.begin(), seen.end());
-    if (std::adjacent_find(seen.begin(), seen.end()) != seen.end())
-        throw std::invalid_argument("block LDLT: two edges join the same pair of blocks");
+    find_raw(position);
+    std::vector<std::uint8_t> raw(count, 0);
+    for (int block : raw_blocks_) raw[block] = 1;
 
+    load_start_.assign(count + 1, 0);
+    for (std::int64_t column : touched) ++load_start_[column + 1];
+    for (int k = 0; k < count; ++k) load_start_[k + 1] += load_start_[k];
+    std::vector<std::int64_t> next(load_start_.begin(), load_start_.end() - 1);
+    loads_.resize(touched.size());
+    for (int block = 0; block < count; ++block) {
+        const auto n = static_cast<std::uint8_t>(size_[block]);
+        loads_[next[touched[block]]++] = {diagonal_at_[block], pivot_at_[block], offset_[block], n, n,
+                                          raw[block] ? kernel::Load::raw_diagonal : kernel::Load::diagonal,
+                                          is_constraint_[block] != 0};
+    }
+    for (int k = 0; k < count; ++k)
+        for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) {
+            const int early = order_[k], late = ordering.column_rows[r];
+            kernel::Load& item = loads_[next[touched[count + r]]++];
+            item = {0, block_at[r], 0, static_cast<std::uint8_t>(size_[early]),
+                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero, false};
+            if (edge_of[r] < 0) continue;
+            item.from = coupling_at_[edge_of[r]];
+            item.kind = early < late ? kernel::Load::direct : kernel::Load::transposed;
+            if (early > late) std::swap(item.rows, item.columns);
+        }
+}
+
+void BlockLdlt::find_raw(const std::vector<int>& position) {
     // A constraint eliminated before all its bodies has no Schur complement to measure its pivot by.
+    const int count = block_count();
     raw_blocks_.clear();
     raw_edges_.clear();
     raw_start_.assign(1, 0);
@@ -136,32 +180,11 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     }
 }
 
-void BlockLdlt::load() {
-    // Blocks of fill start at zero; all others are overwritten.
-    if (fill() > 0) std::fill(factor_.begin(), factor_.end(), 0.0);
-    for (int i = 0; i < block_count(); ++i) {
-        const int n = size_[i];
-        const double* from = values_.data() + diagonal_at_[i];
-        double* to = factor_.data() + pivot_at_[i];
-        std::copy_n(from, n * n, to);
-        for (int k = 0; k < n; ++k) scale_[offset_[i] + k] = std::abs(from[k * n + k]);
-    }
-    for (const Load& item : loads_) {
-        const double* from = values_.data() + item.from;
-        double* to = factor_.data() + item.to;
-        if (!item.transposed) {
-            std::copy_n(from, item.rows * item.columns, to);
-        } else {
-            for (int a = 0; a < item.rows; ++a)
-                for (int b = 0; b < item.columns; ++b) to[b * item.rows + a] = from[a * item.columns + b];
-        }
-    }
-}
-
 void BlockLdlt::raw_scales() {
     for (std::size_t k = 0; k < raw_blocks_.size(); ++k) {
         const int block = raw_blocks_[k], n = size_[block];
         double* scale = scale_.data() + offset_[block];
+        std::fill_n(scale, n, 0.0);
         for (int at = raw_start_[k]; at < raw_start_[k + 1]; ++at) {
             const auto [i, j] = edges_[raw_edges_[at]];
             const double* b = coupling(raw_edges_[at]);
@@ -176,14 +199,19 @@ void BlockLdlt::raw_scales() {
     }
 }
 
-bool BlockLdlt::factor(double floor) {
-    load();
+kernel::Factor BlockLdlt::view() const noexcept {
+    auto* self = const_cast<BlockLdlt*>(this);  // the sweeps of a solve only read
+    return {columns_.data(),      static_cast<std::int64_t>(columns_.size()),
+            row_size_.data(),     row_offset_.data(),
+            targets_.data(),      values_.data(),
+            loads_.data(),        load_start_.data(),
+            self->factor_.data(), self->scale_.data(),
+            self->scratch_.data(), shift_};
+}
+
+bool BlockLdlt::factor_with(double floor, double* x) {
     if (!raw_blocks_.empty()) raw_scales();
-    const kernel::Factor view = {columns_.data(),    static_cast<std::int64_t>(columns_.size()),
-                                 row_size_.data(),   row_offset_.data(),
-                                 targets_.data(),    factor_.data(),
-                                 scale_.data(),      scratch_.data()};
-    const std::int64_t replaced = kernel::kernels().factor(view, uniform_size_, floor);
+    const std::int64_t replaced = kernel::kernels().factor(view(), uniform_size_, floor, x);
     ++counters_.factorisations;
     counters_.block_operations += static_cast<std::uint64_t>(operations_per_factor_);
     if (replaced < 0) return false;
@@ -191,12 +219,19 @@ bool BlockLdlt::factor(double floor) {
     return true;
 }
 
+bool BlockLdlt::factor(double floor) { return factor_with(floor, nullptr); }
+
 void BlockLdlt::solve(double* x) const {
-    const kernel::Factor view = {columns_.data(),    static_cast<std::int64_t>(columns_.size()),
-                                 row_size_.data(),   row_offset_.data(),
-                                 targets_.data(),    const_cast<double*>(factor_.data()),
-                                 nullptr,            nullptr};
-    kernel::kernels().solve(view, uniform_size_, x);
+    kernel::kernels().forward(view(), uniform_size_, x);
+    kernel::kernels().backward(view(), uniform_size_, x);
+}
+
+double BlockLdlt::largest_constraint_scale() const noexcept {
+    double largest = 0.0;
+    for (int i = 0; i < block_count(); ++i)
+        if (is_constraint_[i])
+            for (int k = 0; k < size_[i]; ++k) largest = std::max(largest, scale_[offset_[i] + k]);
+    return largest;
 }
 
 void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
@@ -211,9 +246,7 @@ void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
     }
 }
 
-void BlockLdlt::solve_refined(const double* rhs, double* x, int refinements) {
-    std::copy_n(rhs, unknowns_, x);
-    solve(x);
+void BlockLdlt::refine(const double* rhs, double* x, int refinements) {
     ++counters_.solves;
     for (int round = 0; round < refinements; ++round) {
         residual(rhs, x, residual_.data());
@@ -221,6 +254,20 @@ void BlockLdlt::solve_refined(const double* rhs, double* x, int refinements) {
         ++counters_.solves;
         for (int i = 0; i < unknowns_; ++i) x[i] += residual_[i];
     }
+}
+
+void BlockLdlt::solve_refined(const double* rhs, double* x, int refinements) {
+    std::copy_n(rhs, unknowns_, x);
+    solve(x);
+    refine(rhs, x, refinements);
+}
+
+bool BlockLdlt::factor_and_solve(double floor, const double* rhs, double* x, int refinements) {
+    std::copy_n(rhs, unknowns_, x);
+    if (!factor_with(floor, x)) return false;
+    kernel::kernels().backward(view(), uniform_size_, x);
+    refine(rhs, x, refinements);
+    return true;
 }
 
 }  // namespace spook

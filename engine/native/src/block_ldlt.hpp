@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "block_kernels.hpp"
+#include "large_array.hpp"
 #include "ordering.hpp"
 
 namespace spook {
@@ -38,11 +39,20 @@ public:
     /// refinement removes the rest. False when a value was not finite, or a pivot vanished with floor 0.
     bool factor(double floor);
 
+    /// From the next factorisation on, every constraint counts as softer by so much, in the factor only. Solutions
+    /// refined from zero then tend to the one of least norm where constraints are redundant.
+    void shift_constraints(double shift) noexcept { shift_ = shift; }
+    /// The largest sum of magnitudes that a constraint's pivot came from in the last factorisation.
+    double largest_constraint_scale() const noexcept;
+
     /// x ← F⁻¹ x with the factor F as it is.
     void solve(double* x) const;
 
     /// x ← A⁻¹ rhs from zero, with so many residual corrections against the true A. rhs and x do not overlap.
     void solve_refined(const double* rhs, double* x, int refinements);
+
+    /// factor() and solve_refined() with one pass over the factor less.
+    bool factor_and_solve(double floor, const double* rhs, double* x, int refinements);
 
     /// r ← rhs − A x.
     void residual(const double* rhs, const double* x, double* r) const;
@@ -59,32 +69,34 @@ public:
     void clear_counters() noexcept { counters_ = {}; }
 
 private:
-    struct Load {  // where an edge's block goes in the factor
-        std::int64_t from, to;
-        std::uint8_t rows, columns, transposed;
-    };
-
     void place_columns(const Ordering& ordering);
-    void load();
+    void place_loads(const Ordering& ordering, const std::vector<std::int64_t>& block_at,
+                     const std::vector<std::int64_t>& touched);
+    void find_raw(const std::vector<int>& position);
     void raw_scales();
+    void refine(const double* rhs, double* x, int refinements);
+    bool factor_with(double floor, double* x);
+    kernel::Factor view() const noexcept;
 
     std::vector<int> size_, offset_, order_;
     std::vector<BlockEdge> edges_;
     std::vector<std::uint8_t> is_constraint_;
     int unknowns_ = 0, uniform_size_ = 0;
+    double shift_ = 0.0;
     std::int64_t operations_per_factor_ = 0;
 
     std::vector<std::int64_t> diagonal_at_, coupling_at_;
-    std::vector<double> values_;
+    LargeArray<double> values_;
 
-    std::vector<kernel::Column> columns_;
+    LargeArray<kernel::Column> columns_;
     std::vector<std::uint8_t> row_size_;
     std::vector<std::int32_t> row_offset_;
-    std::vector<std::int64_t> targets_;
+    LargeArray<std::int64_t> targets_;
     std::vector<std::int64_t> pivot_at_;  // of each block, in factor_
-    std::vector<Load> loads_;
+    LargeArray<kernel::Load> loads_;
+    LargeArray<std::int64_t> load_start_;
     std::vector<int> raw_start_, raw_blocks_, raw_edges_;
-    std::vector<double> factor_, scale_, scratch_, residual_;
+    LargeArray<double> factor_, scale_, scratch_, residual_;
     Counters counters_;
 };
 

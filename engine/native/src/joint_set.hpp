@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "joint_rows.hpp"
+#include "large_array.hpp"
 #include "regularisation.hpp"
 
 namespace spook {
@@ -56,7 +57,7 @@ public:
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept { joints_[joint].tracked = true; }
 
-    std::vector<State> states;
+    LargeArray<State> states;
 
 private:
     struct Joint {
@@ -78,8 +79,8 @@ private:
 
     double time_step_;
     BodyState world_;
-    std::vector<Joint> joints_;
-    std::vector<JointBlock> blocks_;
+    LargeArray<Joint> joints_;
+    LargeArray<JointBlock> blocks_;
 };
 
 }  // namespace spook

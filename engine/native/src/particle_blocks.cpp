@@ -119,7 +119,7 @@ void ParticleSystem::stiffen_strings() {
     }
 }
 
-void ParticleSystem::solve_blocks() {
+void ParticleSystem::substitute_blocks() {
     for (std::size_t k = 0; k < row_.size(); ++k) saddle_rhs_[ldlt_.offset(row_blocks_[k].row)] = link_[k].rhs;
     ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
     for (std::size_t k = 0; k < row_.size(); ++k)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "composition.hpp"
 #include "path_order.hpp"
 
 namespace spook {
@@ -39,7 +40,18 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
         w_[node] = 1.0 / scene.bodies[body].mass;
         steady_kick_[node] = h_ * (scene.gravity + w_[node] * scene.bodies[body].load);
     }
-    for (Row& row : row_) row.diagonal = w_[row.a] + w_[row.b] + row.softness;
+    for (Row& row : row_) {
+        row.stiff = w_[row.a] + w_[row.b];
+        row.diagonal = row.stiff + row.softness;
+    }
+    composed_ = scene.method.composition > 2;
+    if (composed_) {
+        history_.resize(3 * row_.size() * composition_stages(scene.method.composition).size());
+        for (int depth = 0; depth < MOST_HALVINGS; ++depth) {
+            step_x_[depth].reserve(x_.size());
+            step_v_[depth].reserve(x_.size());
+        }
+    }
     moving_forces_ = !scene.fields.empty() || !springs_.empty();
     v_.resize(x_.size());
     kick_ = steady_kick_;
@@ -73,8 +85,8 @@ void ParticleSystem::lay_out_paths(const std::vector<Path>& paths) {
             const Regularisation r = regularise(row.compliance, row.damping, h_);
             slot_of_row_[path.rows[k]] = static_cast<int>(row_.size());
             const int a = first + static_cast<int>(k);
-            row_.push_back({a, a + 1, row.rest_length, 0.0, r.violation_gain, r.velocity_gain, r.upsilon,
-                            r.relaxation, r.softness});
+            row_.push_back({a, a + 1, row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
+                            r.relaxation, r.softness, 1.0 / (row.rest_length * row.rest_length)});
         }
     }
     path_first_.push_back(static_cast<int>(row_.size()));
@@ -92,8 +104,8 @@ void ParticleSystem::lay_out_plain() {
             node[side] = end.body >= 0 ? node_of_body_[end.body] : anchor(end.point);
         }
         slot_of_row_[k] = static_cast<int>(k);
-        row_.push_back({node[0], node[1], row.rest_length, 0.0, r.violation_gain, r.velocity_gain, r.upsilon,
-                        r.relaxation, r.softness});
+        row_.push_back({node[0], node[1], row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
+                        r.relaxation, r.softness, 1.0 / (row.rest_length * row.rest_length)});
     }
 }
 
@@ -101,6 +113,7 @@ void ParticleSystem::reset(StageClock* clock) {
     clock_ = clock;
     velocity_ready_ = false;
     sweeps_ = 0;
+    newton_iterations_ = 0;
     residual_ = 0.0;
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
     for (int body = 0; body < bodies(); ++body) {
@@ -110,7 +123,8 @@ void ParticleSystem::reset(StageClock* clock) {
     for (Link& link : link_) link = {};
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
-    if (scene_.method.half_step_velocities) half_kick_back();
+    if (composed_) start_composition();
+    else if (scene_.method.half_step_velocities) half_kick_back();
     save();
 }
 
@@ -118,9 +132,15 @@ void ParticleSystem::reset(StageClock* clock) {
 
 void ParticleSystem::advance(std::int64_t steps) {
     steps *= scene_.method.substeps;
-    if (clock_) advance_by<true>(steps);
-    else if (solver_ == ParticleSolver::none && !moving_forces_ && !scene_.method.half_step_velocities)
-        fly_freely(steps);
+    if (composed_) return compose(steps);
+    if (clock_) return advance_by<true>(steps);
+    if (velocity_ready_ && steps > 0) {
+        position_stage();
+        velocity_ready_ = false;
+        --steps;
+    }
+    if (solver_ == ParticleSolver::none && springs_.empty() && scene_.fields.size() <= 1) fly(steps);
+    else if (solver_ == ParticleSolver::path && !moving_forces_) swing(steps);
     else advance_by<false>(steps);
 }
 
@@ -132,20 +152,6 @@ void ParticleSystem::advance_by(std::int64_t steps) {
         velocity_ready_ = false;
         position_stage();
         mark<Timed>(Stage::integrate_positions);
-    }
-}
-
-/// Constant acceleration and nothing else: the time loop innermost, state in registers.
-void ParticleSystem::fly_freely(std::int64_t steps) noexcept {
-    for (std::size_t node = 0; node < x_.size(); ++node) {
-        Vec3 x = x_[node], v = v_[node];
-        const Vec3 kick = steady_kick_[node];
-        for (std::int64_t step = 0; step < steps; ++step) {
-            v += kick;
-            x += h_ * v;
-        }
-        x_[node] = x;
-        v_[node] = v;
     }
 }
 
@@ -163,25 +169,23 @@ void ParticleSystem::velocity_stage() {
             mark<Timed>(Stage::apply_springs);
         }
     }
-    if (solver_ != ParticleSolver::none) {
-        assemble_rows();
-        if (scene_.method.corrections > 0) bend_rows_back();
-        mark<Timed>(Stage::assemble_rows);
-        if (solver_ == ParticleSolver::iterative) {
-            solve_iterative();
-            mark<Timed>(Stage::solve_iterative);
-        } else {
-            factor();
-            back_substitute();
-            mark<Timed>(solver_ == ParticleSolver::path ? Stage::solve_path : Stage::solve_block);
-        }
-        if (scene_.method.corrections > 0) {
-            correct_curvature();
-            mark<Timed>(Stage::correct_curvature);
-        }
-        add_impulses(v_);
+    if (solver_ == ParticleSolver::none) {
+        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += kick_[node];
+        mark<Timed>(Stage::apply_gravity);
+        return;
     }
-    for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += kick_[node];
+    assemble_rows();
+    if (scene_.method.corrections > 0) bend_rows_back();
+    mark<Timed>(Stage::assemble_rows);
+    solve_rows();
+    mark<Timed>(solver_ == ParticleSolver::path    ? Stage::solve_path
+                : solver_ == ParticleSolver::block ? Stage::solve_block
+                                                   : Stage::solve_iterative);
+    if (scene_.method.corrections > 0) {
+        correct_curvature();
+        mark<Timed>(Stage::correct_curvature);
+    }
+    kick_nodes(v_);
     mark<Timed>(Stage::apply_gravity);
 }
 
@@ -195,7 +199,7 @@ void ParticleSystem::apply_central_gravity() noexcept {
             if (w_[node] == 0.0) continue;
             const Vec3 d = x_[node] - field.centre;
             const double r2 = dot(d, d), r = std::sqrt(r2);
-            kick_[node] -= (h_ * field.strength / (r2 * r)) * d;
+            kick_[node] = kick_[node] - (h_ * field.strength / (r2 * r)) * d;
         }
 }
 
@@ -229,42 +233,21 @@ void ParticleSystem::assemble_rows() noexcept {
     }
 }
 
-void ParticleSystem::factor() {
-    if (solver_ == ParticleSolver::path) return factor_path();
-    factor_blocks();
-}
-
-void ParticleSystem::factor_path() noexcept {
-    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
-        const int first = path_first_[path], end = path_first_[path + 1];
-        double pivot_inverse = 1.0 / row_[first].diagonal;
-        link_[first].pivot_inverse = pivot_inverse;
-        link_[first].lower = 0.0;
-        for (int k = first + 1; k < end; ++k) {
-            const double off = -w_[row_[k].a] * dot(link_[k - 1].u, link_[k].u);
-            const double lower = off * pivot_inverse;
-            pivot_inverse = 1.0 / (row_[k].diagonal - lower * off);
-            link_[k].lower = lower;
-            link_[k].pivot_inverse = pivot_inverse;
-        }
+void ParticleSystem::solve_rows() {
+    if (solver_ == ParticleSolver::iterative) return solve_iterative();
+    if (solver_ == ParticleSolver::path) {
+        factor_paths();
+        substitute_paths();
+    } else {
+        factor_blocks();
+        substitute_blocks();
     }
 }
 
-void ParticleSystem::back_substitute() {
-    if (solver_ == ParticleSolver::path) return solve_path();
-    solve_blocks();
-}
-
-void ParticleSystem::solve_path() noexcept {
-    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
-        const int first = path_first_[path], end = path_first_[path + 1];
-        double y = link_[first].rhs;
-        link_[first].lambda = y;
-        for (int k = first + 1; k < end; ++k) link_[k].lambda = y = link_[k].rhs - link_[k].lower * y;
-        double lambda = link_[end - 1].lambda *= link_[end - 1].pivot_inverse;
-        for (int k = end - 2; k >= first; --k)
-            link_[k].lambda = lambda = link_[k].lambda * link_[k].pivot_inverse - link_[k + 1].lower * lambda;
-    }
+void ParticleSystem::solve_rows_again() {
+    if (solver_ == ParticleSolver::iterative) solve_iterative();
+    else if (solver_ == ParticleSolver::path) substitute_paths();
+    else substitute_blocks();
 }
 
 /// Projected Gauss–Seidel on the Schur form, warm started with the last step's impulses.
@@ -293,16 +276,6 @@ void ParticleSystem::solve_iterative() noexcept {
     }
 }
 
-namespace {
-
-/// |d + s| − |d| − u·s without cancellation: (s² − (u·s)²) / (|d + s| + |d| + u·s), never negative.
-double curvature(Vec3 u, double length, Vec3 s) noexcept {
-    const double along = dot(u, s), across = std::max(0.0, dot(s, s) - along * along), moved = length + along;
-    return across == 0.0 ? 0.0 : across / (std::sqrt(moved * moved + across) + moved);
-}
-
-}  // namespace
-
 /// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊]. c₋, from where the row
 /// came, is known before the first solve; c₊ is where that solve, then the corrected one, would take it. Each is
 /// capped at a fraction of the rest length.
@@ -319,8 +292,8 @@ void ParticleSystem::bend_rows_back() noexcept {
 
 void ParticleSystem::correct_curvature() {
     for (int round = 0; round < scene_.method.corrections; ++round) {
-        for (std::size_t node = 0; node < v_.size(); ++node) trial_[node] = v_[node] + kick_[node];
-        add_impulses(trial_);
+        trial_ = v_;
+        kick_nodes(trial_);
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
@@ -328,12 +301,14 @@ void ParticleSystem::correct_curvature() {
             const double ahead = std::min(cap, curvature(link.u, link.length, h_ * (trial_[row.b] - trial_[row.a])));
             link.rhs = first_rhs_[k] - row.violation_gain * (0.25 + row.relaxation) * ahead;
         }
-        if (solver_ == ParticleSolver::iterative) solve_iterative();
-        else back_substitute();
+        solve_rows_again();
     }
 }
 
-void ParticleSystem::add_impulses(std::vector<Vec3>& v) const noexcept {
+/// v += kick + M⁻¹ Gᵀ λ
+void ParticleSystem::kick_nodes(std::vector<Vec3>& v) const noexcept {
+    if (solver_ == ParticleSolver::path) return kick_paths(v);
+    for (std::size_t node = 0; node < v.size(); ++node) v[node] += kick_[node];
     if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) {
         for (std::size_t node = 0; node < v.size(); ++node)
             if (block_of_node_[node] >= 0) v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
@@ -356,21 +331,19 @@ void ParticleSystem::half_kick_back() {
     const std::vector<Vec3> start = v_;
     if (solver_ != ParticleSolver::none) {
         assemble_rows();
-        if (solver_ != ParticleSolver::iterative) factor();
         for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
         for (int round = 0; round <= 3 * scene_.method.corrections; ++round) {
             for (std::size_t k = 0; k < row_.size(); ++k) {
                 const Row& row = row_[k];
-                const double back =
-                    curvature(link_[k].u, link_[k].length, -h_ * (v_[row.b] - v_[row.a]));
+                const double back = curvature(link_[k].u, link_[k].length, -h_ * (v_[row.b] - v_[row.a]));
                 link_[k].rhs = first_rhs_[k] - (2.0 / h_) * back;
             }
-            if (solver_ == ParticleSolver::iterative) solve_iterative();
-            else back_substitute();
+            if (round == 0) solve_rows();
+            else solve_rows_again();
             v_ = start;
-            add_impulses(v_);
+            kick_nodes(v_);
             for (std::size_t node = 0; node < v_.size(); ++node)
-                v_[node] = start[node] - 0.5 * (v_[node] + kick_[node] - start[node]);
+                v_[node] = start[node] - 0.5 * (v_[node] - start[node]);
         }
     } else {
         for (std::size_t node = 0; node < v_.size(); ++node) v_[node] -= 0.5 * kick_[node];
@@ -386,7 +359,9 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->start();
     for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = link_[k].lambda;
     seen_v_ = v_;
-    if (scene_.method.half_step_velocities) {
+    if (composed_) {
+        if (sample > 0) read_composition();
+    } else if (scene_.method.half_step_velocities) {
         velocity_stage<false>();
         velocity_ready_ = true;
         for (std::size_t node = 0; node < v_.size(); ++node) seen_v_[node] = 0.5 * (seen_v_[node] + v_[node]);
@@ -416,6 +391,11 @@ void ParticleSystem::save() {
     for (std::size_t k = 0; k < link_.size(); ++k) saved_.lambda[k] = link_[k].lambda;
     saved_.velocity_ready = velocity_ready_;
     saved_.sweeps = sweeps_;
+    saved_.pending = pending_;
+    saved_.stage_steps = stage_steps_;
+    saved_.newton_iterations = newton_iterations_;
+    saved_.halved_steps = halved_steps_;
+    saved_.history = history_;
     saved_.residual = residual_;
 }
 
@@ -425,6 +405,11 @@ void ParticleSystem::restore() {
     for (std::size_t k = 0; k < link_.size(); ++k) link_[k].lambda = saved_.lambda[k];
     velocity_ready_ = saved_.velocity_ready;
     sweeps_ = saved_.sweeps;
+    pending_ = saved_.pending;
+    stage_steps_ = saved_.stage_steps;
+    newton_iterations_ = saved_.newton_iterations;
+    halved_steps_ = saved_.halved_steps;
+    history_ = saved_.history;
     residual_ = saved_.residual;
 }
 
@@ -447,13 +432,26 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
     if (solver_ == ParticleSolver::block)
         report.counters["block_operations"] =
             static_cast<std::int64_t>(ldlt_.counters().block_operations) - operations_at_start_;
+    if (composed_) {
+        const auto stages = static_cast<std::int64_t>(composition_stages(scene_.method.composition).size());
+        report.counters["composition_stages"] = inner * stages;
+        report.counters["halved_steps"] = halved_steps_;
+        report.counters["newton_iterations"] = newton_iterations_;
+        report.counters["force_evaluations"] *= stages;
+        report.counters["rows_assembled"] *= stages;
+        report.counters["back_substitutions"] = rows > 0 ? newton_iterations_ : 0;
+        report.counters["block_operations"] = newton_iterations_ * blocks;
+    }
     report.residual = residual_;
 }
 
 std::vector<double> ParticleSystem::final_state() {
     std::vector<double> state;
     std::vector<Vec3> reported = v_;
-    if (scene_.method.half_step_velocities) {
+    if (composed_) {
+        read_composition();
+        reported = seen_v_;
+    } else if (scene_.method.half_step_velocities) {
         if (velocity_ready_) reported = seen_v_;
         else {
             velocity_stage<false>();

@@ -5,6 +5,8 @@
 // the Schur matrix G M⁻¹ Gᵀ + Sig is then tridiagonal and one pass up and down solves it.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -20,6 +22,12 @@
 namespace spook {
 
 inline Vec3 vec_at(const double* p) noexcept { return {p[0], p[1], p[2]}; }
+
+/// |d + s| − |d| − u·s without cancellation: (s² − (u·s)²) / (|d + s| + |d| + u·s), never negative; u = d/|d|.
+inline double curvature(Vec3 u, double length, Vec3 s) noexcept {
+    const double along = dot(u, s), across = std::max(0.0, dot(s, s) - along * along), moved = length + along;
+    return across == 0.0 ? 0.0 : across / (std::sqrt(moved * moved + across) + moved);
+}
 
 class ParticleSystem {
 public:
@@ -55,8 +63,8 @@ public:
 private:
     struct Row {  // one distance: constants
         int a, b;  // nodes
-        double rest, diagonal;
-        double violation_gain, velocity_gain, upsilon, relaxation, softness;
+        double rest, stiff, diagonal;  // m; w_a + w_b; the same + softness, 1/kg
+        double violation_gain, velocity_gain, relaxation, softness, rest_inverse_square;
     };
     struct Link {  // what this step found out about it
         Vec3 u;
@@ -77,24 +85,49 @@ private:
         if constexpr (Timed) clock_->mark(stage);
     }
     void position_stage() noexcept;
-    void fly_freely(std::int64_t steps) noexcept;
     void half_kick_back();
 
     void apply_central_gravity() noexcept;
     void apply_springs() noexcept;
     void assemble_rows() noexcept;
-    void factor();
-    void back_substitute();
-    void factor_path() noexcept;
-    void analyse_blocks();
-    void factor_blocks();
-    void stiffen_strings();
-    void solve_blocks();
-    void solve_path() noexcept;
+    void solve_rows();
+    void solve_rows_again();  // new right sides, same matrix
     void solve_iterative() noexcept;
     void bend_rows_back() noexcept;
     void correct_curvature();
-    void add_impulses(std::vector<Vec3>& v) const noexcept;
+    void kick_nodes(std::vector<Vec3>& v) const noexcept;
+
+    // particle_paths.cpp: rows in open paths, tridiagonal
+    void factor_paths(bool rigid = false) noexcept;
+    void substitute_paths() noexcept;
+    void kick_paths(std::vector<Vec3>& v) const noexcept;
+
+    // particle_blocks.cpp: rows that branch or close loops, and stiff strings
+    void analyse_blocks();
+    void factor_blocks();
+    void stiffen_strings();
+    void substitute_blocks();
+
+    // particle_composition.cpp: symmetric compositions of higher order
+    void start_composition();
+    void compose(std::int64_t steps);
+    void drift_kick(double tau) noexcept;
+    void find_kicks() noexcept;
+    void constrained_step(double h, int depth);
+    bool constrained_stage(double tau, double* history);
+    void push(std::vector<Vec3>& v) const noexcept;
+    double lengthen_paths(double tau, bool fresh) noexcept;
+    void shorten_paths() noexcept;
+    double lengthen_blocks(double tau, bool fresh);
+    void shorten_blocks();
+    void factor_rigid_blocks();
+    void solve_rigidly();
+    void read_composition();
+
+    // particle_kernels.cpp: the same arithmetic with the time loop inside, for scenes that need no more
+    void fly(std::int64_t steps) noexcept;
+    void swing(std::int64_t steps) noexcept;
+    template <bool Curved> void swing_by(std::int64_t steps) noexcept;
 
     ParticleScene scene_;
     double h_;  // s, of a substep
@@ -127,9 +160,20 @@ private:
     double residual_ = 0.0;
     std::int64_t sweeps_ = 0;
 
+    // compositions
+    bool composed_ = false;
+    double pending_ = 0.0;             // s: half a stage still to be kicked (with rows) or drifted (without)
+    std::int64_t stage_steps_ = 0;     // steps the history has seen
+    std::int64_t newton_iterations_ = 0, halved_steps_ = 0;
+    static constexpr int MOST_HALVINGS = 12;
+    std::vector<Vec3> step_x_[MOST_HALVINGS], step_v_[MOST_HALVINGS];  // where each step began
+    std::vector<double> history_;      // stages × three steps × rows, N
+
     struct Snapshot {
         std::vector<Vec3> x, v;
-        std::vector<double> lambda;
+        std::vector<double> lambda, history;
+        double pending = 0.0;
+        std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         bool velocity_ready = false;
         std::int64_t sweeps = 0;
         double residual = 0.0;

@@ -1,0 +1,92 @@
+"""What a locked chain, a door on many hinges and a stack cost per step: proportional to their size, or not.
+
+    python bench/bench_rigid.py [--largest 100000]
+
+Each time is the shortest of many short runs, because other work on the machine only ever adds. The chain is the
+peers' scene: n boxes locked in a row to the wall, full inertia, rows, one factorisation and one refinement.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from engine import WORLD, Box, Hinge, Lock, Plane, Program, RigidBody, Scene, compile
+
+TIME_STEP = 1.0 / 60.0  # s
+EDGE = (0.125, 0.1, 0.1)  # m
+
+
+def chain(count: int) -> Scene:
+    """`count` boxes locked in a row, the first to the wall."""
+    boxes = [
+        RigidBody(name=f"box {i}", mass=2.5, shape=Box(EDGE), position=((i + 0.5) * EDGE[0], 0.0, 0.0))
+        for i in range(count)
+    ]
+    locks = [
+        Lock(
+            name=f"lock {i}",
+            between=(f"box {i - 1}" if i else WORLD, f"box {i}"),
+            at=(i * EDGE[0], 0.0, 0.0),
+            compliance=1e-13,
+        )
+        for i in range(count)
+    ]
+    return Scene(bodies=tuple(boxes), constraints=tuple(locks), gravity=(0.0, 0.0, -9.81), contacts=False)
+
+
+def door(count: int) -> Scene:
+    """One box on `count` hinges."""
+    panel = RigidBody(name="door", mass=45.0, shape=Box((1.0, 0.06, 2.0)), position=(0.0, 0.0, 0.0))
+    hinges = [
+        Hinge(
+            name=f"hinge {i}",
+            between=(WORLD, "door"),
+            at=(-0.5, 0.0, 2.0 * (i + 0.5) / count - 1.0),
+            compliance=1e-13,
+        )
+        for i in range(count)
+    ]
+    return Scene(bodies=(panel,), constraints=tuple(hinges), gravity=(0.0, 0.0, -10.0), contacts=False)
+
+
+def stack(count: int) -> Scene:
+    """`count` boxes on each other on the ground."""
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    boxes = [
+        RigidBody(name=f"box {i}", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, i + 0.5))
+        for i in range(count)
+    ]
+    return Scene(bodies=(ground, *boxes), gravity=(0.0, 0.0, -9.81))
+
+
+def seconds_per_step(program: Program, size: int) -> float:
+    """The shortest mean step [s] of many runs of a few milliseconds each."""
+    steps = max(1, 3000 // size)
+    rounds = 40 if size < 20_000 else 8
+    return min(program.run(steps).seconds / steps for _ in range(rounds))
+
+
+def report(title: str, unit: str, make: object, sizes: tuple[int, ...]) -> None:
+    """One line per size: time and block operations per step and element, and growth against the smallest."""
+    assert callable(make)
+    print(f"{title}: ns per {unit} and step, × the smallest, block operations per {unit}")
+    smallest = None
+    for size in sizes:
+        program = compile(make(size), time_step=TIME_STEP)
+        each = seconds_per_step(program, size) / size * 1e9
+        smallest = smallest or each
+        work = program.run(10).counters["block_operations"] / 10 / size
+        print(f"  n = {size:6d}  {each:8.0f}  {each / smallest:6.2f}  {work:8.2f}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--largest", type=int, default=10_000, help="longest chain (default 10000)")
+    largest = parser.parse_known_args()[0].largest
+    report("chain of locked boxes", "body", chain, tuple(10**k for k in range(1, 6) if 10**k <= largest))
+    report("door", "hinge", door, (1, 2, 10, 50, 200))
+    report("stack of boxes", "box", stack, (1, 5, 20))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+// Symmetric compositions: a symmetric second-order step Φ done with h γ_1, …, h γ_s is of higher order.
+#pragma once
+
+#include <span>
+
+namespace spook {
+
+/// Stage lengths γ of an order, in time steps; they sum to 1 and read the same backwards.
+/// Order 4: Suzuki, Phys. Lett. A 146 (1990) 319. Orders 6 and 8: Kahan and Li, Math. Comp. 66 (1997) 1089,
+/// nine and seventeen stages; their largest |γ| is about half that of the schemes with fewest stages.
+inline std::span<const double> composition_stages(int order) noexcept {
+    static constexpr double FOUR[] = {0.41449077179437573714, 0.41449077179437573714, -0.65796308717750294857,
+                                      0.41449077179437573714, 0.41449077179437573714};
+    static constexpr double SIX[] = {0.39216144400731413928,  0.33259913678935943860, -0.70624617255763935981,
+                                     0.08221359629355080023,  0.79854399093482996340, 0.08221359629355080023,
+                                     -0.70624617255763935981, 0.33259913678935943860, 0.39216144400731413928};
+    static constexpr double EIGHT[] = {
+        0.13020248308889008088,  0.56116298177510838456,  -0.38947496264484728641, 0.15884190655515560090,
+        -0.39590389413323757734, 0.18453964097831570709,  0.25837438768632204729,  0.29501172360931029887,
+        -0.60550853383003451170, 0.29501172360931029887,  0.25837438768632204729,  0.18453964097831570709,
+        -0.39590389413323757734, 0.15884190655515560090,  -0.38947496264484728641, 0.56116298177510838456,
+        0.13020248308889008088};
+    switch (order) {
+        case 4: return FOUR;
+        case 6: return SIX;
+        case 8: return EIGHT;
+        default: return {};
+    }
+}
+
+}  // namespace spook

@@ -1,0 +1,144 @@
+"""Where the pendulum stops being stable: time step, damping, compliance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine import PLAIN, Energy, Method, Result, Trace, Violation
+from engine.observe import Observable
+from engine.theory import one_row_matrix
+from scalar_tests.bracket import break_point, cell, is_stable, table
+from scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
+from scalar_tests.oscillator import growth
+from scalar_tests.pendulum_scene import (
+    COMPLIANCE,
+    CURVED,
+    CURVED_TWICE,
+    GRAVITY,
+    LENGTH,
+    MASS,
+    TIME_STEP,
+    swing,
+)
+
+BOUND = 0.1  # of the length, and of m g l
+RELATIVE_DAMPINGS = tuple(float(value) for value in np.geomspace(1e-5, 10.0, 13))  # τ/h
+COMPLIANCES = tuple(float(value) for value in np.geomspace(1e-14, 1e-2, 13))  # m/N
+OBSERVE: dict[str, Observable] = {
+    "violation": Trace(quantity=Violation("rod")),
+    "energy": Trace(quantity=Energy(), from_start=True),
+}
+HOLDS = (
+    "22 s without the length off by more than 10 % beyond what its compliance yields, or the energy above its start by "
+    "more than 10 % of m g l beyond what a velocity half a step old reads, and neither doubling in the last third"
+)
+
+
+def _excess(result: Result, compliance: float) -> Any:
+    """Violation and energy gain over their bounds; below a tenth of them nothing is growing, only swinging."""
+    yielded = 4.5 * MASS * GRAVITY * compliance / LENGTH
+    lag = 1.5 * result.time_step * np.sqrt(GRAVITY / LENGTH)
+    stretch = np.abs(result.partial["violation"]) / LENGTH / (BOUND + yielded)
+    gain = result.partial["energy"] / (MASS * GRAVITY * LENGTH) / (BOUND + lag)
+    return np.maximum(0.1, np.maximum(stretch, gain))
+
+
+def _kind(
+    simulate: Simulate,
+    time_step: float = TIME_STEP,
+    method: Method = PLAIN,
+    *,
+    relative_damping: float = 1.0,
+    compliance: float = COMPLIANCE,
+) -> str:
+    result = swing(
+        simulate,
+        time_step,
+        method,
+        observe=OBSERVE,
+        damping=relative_damping * time_step,
+        compliance=compliance,
+    )
+    return cell(result, _excess(result, compliance), bound=1.0)
+
+
+def _largest_step(method: Method) -> Any:
+    def study(simulate: Simulate) -> BreakPoint:
+        return break_point(lambda h: is_stable(_kind(simulate, h, method)), 0.002, 2.0, resolution=0.005)
+
+    return study
+
+
+def smallest_damping(simulate: Simulate) -> BreakPoint:
+    """Smallest τ/h at compliance 1e-13 m/N and h = 1/60 s."""
+    return break_point(lambda theta: is_stable(_kind(simulate, relative_damping=theta)), 1.0, 1e-8, walk=9)
+
+
+def smallest_compliance(simulate: Simulate) -> BreakPoint:
+    """Smallest compliance [m/N] without any damping, at h = 1/60 s."""
+    return break_point(
+        lambda c: is_stable(_kind(simulate, relative_damping=0.0, compliance=c)), 1e-3, 1e-13, walk=11
+    )
+
+
+def damping_map(simulate: Simulate) -> StabilityMap:
+    """(τ/h, compliance) at h = 1/60 s beside the eigenvalue of the rod's own motion."""
+
+    def eigenvalue(theta: float, compliance: float) -> float:
+        return growth(one_row_matrix(MASS, compliance, theta * TIME_STEP, TIME_STEP))
+
+    def kind(theta: float, compliance: float) -> str:
+        return _kind(simulate, relative_damping=theta, compliance=compliance)
+
+    return StabilityMap(
+        x=RELATIVE_DAMPINGS,
+        y=COMPLIANCES,
+        cells=table(COMPLIANCES, RELATIVE_DAMPINGS, kind),
+        x_label="damping, τ/h",
+        y_label="compliance [m/N]",
+        prediction=table(COMPLIANCES, RELATIVE_DAMPINGS, eigenvalue),
+        note="The linear rod is stable everywhere, but the swing feeds it: where the eigenvalue comes within about "
+        "1e-3 of the unit circle and compliance is next to nothing, the pendulum explodes. This is Fig 3.23.",
+    )
+
+
+STUDIES = (
+    *(
+        StabilityStudy(
+            name=f"largest-time-step-{name.replace(' ', '-')}",
+            title="Largest stable time step",
+            configuration=name,
+            definition=HOLDS,
+            study=_largest_step(method),
+            unit="s",
+        )
+        for name, method in (("plain", PLAIN), ("curved", CURVED), ("curved twice", CURVED_TWICE))
+    ),
+    StabilityStudy(
+        name="smallest-damping",
+        title="Smallest τ/h that holds at compliance 1e-13 m/N",
+        configuration="plain",
+        definition=HOLDS,
+        study=smallest_damping,
+        unit="1",
+        better="smaller",
+    ),
+    StabilityStudy(
+        name="smallest-compliance",
+        title="Smallest compliance that holds without damping",
+        configuration="plain",
+        definition=HOLDS,
+        study=smallest_compliance,
+        unit="m/N",
+        better="smaller",
+    ),
+    StabilityStudy(
+        name="damping-compliance-map",
+        title="Damping and compliance",
+        configuration="plain",
+        definition=HOLDS,
+        study=damping_map,
+    ),
+)

@@ -1,0 +1,77 @@
+"""A real browser for the tests of the website: headless Chromium, without a network.
+
+The picture in the README comes from here, after `make nightly`:
+
+    python -m tests.browser public/index.html docs/dashboard.png
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+MISSING = "no Chromium with its driver here; .ci/install-system installs both"
+CHROMES = ("chromium", "chromium-browser", "google-chrome")
+
+
+def programs() -> tuple[str, str] | None:
+    """Paths of the browser and of its driver, if both are installed."""
+    chrome = next(filter(None, map(shutil.which, CHROMES)), None)
+    driver = shutil.which("chromedriver")
+    return (chrome, driver) if chrome and driver else None
+
+
+@contextmanager
+def browser(chrome: str, driver: str) -> Iterator[Any]:
+    """A driver of a browser that cannot reach anything but files, and dies with the test."""
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = chrome
+    for argument in ("--headless=new", "--disable-gpu", "--hide-scrollbars", "--disable-dev-shm-usage"):
+        options.add_argument(argument)
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        options.add_argument("--no-sandbox")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    opened = webdriver.Chrome(options=options, service=Service(driver))
+    try:
+        opened.execute_cdp_cmd("Network.enable", {})
+        nothing = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
+        opened.execute_cdp_cmd("Network.emulateNetworkConditions", nothing)
+        yield opened
+    finally:
+        opened.quit()
+
+
+def look(driver: Any, *, width: int = 1280, height: int = 900, dark: bool = False) -> None:
+    """Set the window's size and the system's theme."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
+
+
+def photograph(page: Path, picture: Path, *, width: int = 1280, most: int = 1500) -> None:
+    """A picture of a page of the website, from its top down to `most` pixels."""
+    found = programs()
+    if found is None:
+        raise SystemExit(MISSING)
+    with browser(*found) as driver:
+        look(driver, width=width)
+        driver.get(page.resolve().as_uri())
+        tall = driver.execute_script("return document.documentElement.scrollHeight")
+        look(driver, width=width, height=min(most, tall))
+        time.sleep(1.0)  # charts are drawn as they come into view
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        driver.save_screenshot(str(picture))
+
+
+if __name__ == "__main__":
+    photograph(Path(sys.argv[1]), Path(sys.argv[2]))

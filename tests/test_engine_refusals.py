@@ -1,0 +1,213 @@
+"""What cannot be simulated is refused with one sentence that names the culprit, before anything runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from engine import (
+    WORLD,
+    Ball,
+    Box,
+    Capsule,
+    CentralGravity,
+    Compound,
+    Distance,
+    EngineError,
+    Final,
+    Hinge,
+    JointCoordinate,
+    JointSpring,
+    Limit,
+    Load,
+    Lock,
+    Material,
+    Method,
+    MethodError,
+    Motor,
+    Orientation,
+    Part,
+    Particle,
+    Plane,
+    Position,
+    Prismatic,
+    RigidBody,
+    Scene,
+    SceneError,
+    Sphere,
+    Spring,
+    Trace,
+    Universal,
+    Violation,
+    compile,
+)
+
+ORIGIN = (0.0, 0.0, 0.0)
+A = Particle(name="a", mass=1.0, position=(1.0, 0.0, 0.0))
+B = Particle(name="b", mass=1.0, position=(2.0, 0.0, 0.0))
+STONE = RigidBody(name="stone", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 1.0))
+WALL = RigidBody(name="wall", motion="static", shape=Box((1.0, 1.0, 1.0)), position=(0.0, 9.0, 0.0))
+
+
+def particle(**changes: Any) -> Particle:
+    return Particle(**{"name": "a", "mass": 1.0, "position": ORIGIN} | changes)
+
+
+def rigid(**changes: Any) -> RigidBody:
+    return RigidBody(**{"name": "stone", "mass": 1.0, "shape": Sphere(0.1), "position": ORIGIN} | changes)
+
+
+def distance(**changes: Any) -> Distance:
+    return Distance(**{"name": "rod", "between": ("a", "b")} | changes)
+
+
+def hinge(**changes: Any) -> Hinge:
+    return Hinge(**{"name": "pin", "between": (WORLD, "stone")} | changes)
+
+
+def particles(*constraints: Any, forces: Any = (), bodies: Any = (A, B)) -> Scene:
+    return Scene(bodies=bodies, constraints=constraints, forces=forces)
+
+
+def stones(*constraints: Any, **changes: Any) -> Scene:
+    return Scene(bodies=(STONE, WALL), constraints=constraints, **changes)
+
+
+BAD = (math.nan, math.inf, -math.inf, "heavy", None)
+SCENES: list[tuple[Callable[[], object], tuple[str, ...]]] = [
+    *((lambda m=m: particle(mass=m), ("'a'", "mass")) for m in (*BAD, 0.0, -1.0)),
+    *((lambda x=x: particle(position=(x, 0.0, 0.0)), ("'a'", "position")) for x in BAD),
+    *((lambda x=x: particle(velocity=x), ("'a'", "velocity")) for x in ((1.0, 2.0), 3.0, (0.0, math.nan, 0.0))),
+    *((lambda n=n: particle(name=n), ("name",)) for n in ("", " ", None, 3)),
+    (lambda: particle(name=WORLD), ("'world'", "taken")),
+    *((lambda m=m: rigid(mass=m), ("'stone'", "mass")) for m in (math.nan, 0.0, -2.0, None)),
+    (lambda: rigid(shape="ball"), ("'stone'", "shape")),
+    (lambda: rigid(shape=None), ("'stone'", "inertia")),
+    (lambda: rigid(inertia=(1.0, 1.0, 3.0)), ("'stone'", "triangle")),
+    *((lambda i=i: rigid(inertia=i), ("'stone'", "inertia")) for i in ((0.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (math.nan,) * 3)),
+    (lambda: rigid(orientation=(0.0,) * 4), ("'stone'", "orientation")),
+    (lambda: rigid(orientation=(1.0, 0.0, 0.0)), ("'stone'", "orientation")),
+    (lambda: rigid(angular_velocity=(0.0, math.inf, 0.0)), ("'stone'", "angular_velocity")),
+    (lambda: rigid(motion="flying"), ("'stone'", "motion")),
+    (lambda: rigid(motion="static", velocity=(1.0, 0.0, 0.0)), ("'stone'", "static")),
+    (lambda: rigid(shape=Plane()), ("'stone'", "plane")),
+    (lambda: rigid(material="ice"), ("'stone'", "material")),
+    (lambda: Sphere(0.0), ("sphere", "radius")),
+    (lambda: Box((1.0, -1.0, 1.0)), ("box", "size")),
+    (lambda: Capsule(0.1, math.nan), ("capsule", "length")),
+    (lambda: Plane(ORIGIN), ("plane", "normal")),
+    (lambda: Compound(()), ("compound",)),
+    (lambda: Part(shape=Plane()), ("compound", "part")),
+    (lambda: rigid(shape=Compound((Part(shape=Sphere(1.0)),))), ("compound", "inertia")),
+    (lambda: Material(friction=-0.1), ("material", "friction")),
+    (lambda: Material(restitution=1.1), ("material", "restitution")),
+    (lambda: Material(damping=math.nan), ("material", "damping")),
+    *((lambda c=c: distance(compliance=c), ("'rod'", "compliance")) for c in (*BAD, -1e-9)),
+    *((lambda d=d: distance(damping=d), ("'rod'", "damping")) for d in (math.nan, -1.0)),
+    *((lambda r=r: distance(rest_length=r), ("'rod'", "rest_length")) for r in (0.0, -1.0, math.inf)),
+    (lambda: distance(between=("a", "a")), ("'rod'", "itself")),
+    (lambda: distance(between="ab"), ("'rod'", "two ends")),
+    (lambda: distance(between=(ORIGIN, (1.0, 0.0, 0.0))), ("'rod'", "body")),
+    (lambda: particles(distance(between=("a", "ghost"))), ("'rod'", "'ghost'")),
+    (lambda: particles(distance(between=(A.position, "a"))), ("'rod'", "coincide")),
+    (lambda: particles(distance(anchors=((0.1, 0.0, 0.0), ORIGIN))), ("'rod'", "'a'", "centre")),
+    (lambda: particles(distance(), distance()), ("'rod'", "two constraints")),
+    (lambda: particles(bodies=(A, A)), ("'a'", "two bodies")),
+    (lambda: particles(bodies=()), ("at least one body",)),
+    (lambda: particles(bodies=("a",)), ("'a'", "neither")),
+    (lambda: particles("rod"), ("'rod'", "not a constraint")),
+    (lambda: particles(forces=("wind",)), ("'wind'", "not a force")),
+    (lambda: Scene(bodies=(A,), gravity=(0.0, 0.0, math.nan)), ("gravity",)),
+    (lambda: Spring(name="s", between=("a", "b"), stiffness=-1.0), ("'s'", "stiffness")),
+    (lambda: Spring(name="s", between=("a", "b"), stiffness=1.0, viscosity=math.nan), ("'s'", "viscosity")),
+    (lambda: particles(forces=(Spring(name="s", between=("a", "ghost"), stiffness=1.0),)), ("'s'", "'ghost'")),
+    (
+        lambda: particles(forces=(Spring(name="s", between=(A.position, "a"), stiffness=1.0, rest_length=1.0),)),
+        ("'s'", "coincide"),
+    ),
+    (lambda: CentralGravity(name="sun", strength=math.nan), ("'sun'", "strength")),
+    (lambda: particles(forces=(CentralGravity(name="sun", strength=1.0, centre=A.position),)), ("'sun'", "'a'")),
+    (lambda: Load(name="push", body="a", force=(math.inf, 0.0, 0.0)), ("'push'", "force")),
+    (lambda: particles(forces=(Load(name="push", body="ghost"),)), ("'push'", "'ghost'")),
+    (lambda: particles(forces=(Load(name="twist", body="a", torque=(1.0, 0.0, 0.0)),)), ("'twist'", "torque")),
+    (lambda: particles(Ball(name="ball", between=("a", "b"))), ("'ball'", "'a'", "particle")),
+    (lambda: stones(Lock(name="bolt", between=(WORLD, "ghost"))), ("'bolt'", "'ghost'")),
+    (lambda: stones(Lock(name="bolt", between=(WORLD, "wall"))), ("'bolt'", "neither end can move")),
+    (lambda: Lock(name="bolt", between=(ORIGIN, "stone")), ("'bolt'", "names")),
+    (lambda: Lock(name="bolt", between=("stone", "stone")), ("'bolt'", "itself")),
+    (lambda: Lock(name="bolt", between=(WORLD, "stone"), compliance=(1e-8, 1e-8)), ("'bolt'", "compliance", "6")),
+    (lambda: Lock(name="bolt", between=(WORLD, "stone"), damping=-1.0), ("'bolt'", "damping")),
+    (lambda: Lock(name="bolt", between=(WORLD, "stone"), at=(0.0, 0.0)), ("'bolt'", "at")),
+    (lambda: hinge(axis=ORIGIN), ("'pin'", "axis")),
+    (lambda: hinge(motor=3.0), ("'pin'", "motor")),
+    (lambda: Prismatic(name="rail", between=(WORLD, "stone"), limit="end"), ("'rail'", "limit")),
+    (lambda: Universal(name="cross", between=(WORLD, "stone"), axis=(1.0, 0.0, 0.0), cross_axis=(1.0, 1.0, 0.0)), ("'cross'", "normal")),
+    (lambda: Motor(speed=math.nan), ("motor", "speed")),
+    (lambda: Motor(speed=1.0, max_force=-1.0), ("motor", "max_force")),
+    (lambda: Limit(lower=1.0, upper=0.0), ("limit", "lower")),
+    (lambda: Limit(lower=math.nan, upper=0.0), ("limit", "lower")),
+    (lambda: JointSpring(stiffness=0.0), ("spring", "stiffness")),
+    (lambda: JointSpring(stiffness=1.0, rest=math.inf), ("spring", "rest")),
+    (lambda: stones(no_contact=(("stone", "ghost"),)), ("no_contact", "'ghost'")),
+    (lambda: stones(no_contact=("stone",)), ("no_contact", "pair")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("build", "words"), SCENES, ids=[" ".join(words) for _, words in SCENES])
+def test_a_senseless_scene_is_refused_in_one_sentence(
+    build: Callable[[], object], words: tuple[str, ...]
+) -> None:
+    with pytest.raises(SceneError) as refused:
+        build()
+    sentence = str(refused.value)
+
+    assert all(word in sentence for word in words), sentence
+    assert "\n" not in sentence and len(sentence) < 160
+    assert isinstance(refused.value, EngineError) and isinstance(refused.value, ValueError)
+
+
+METHODS: list[dict[str, Any]] = [
+    {"corrections": 3},
+    {"correction_cap": 0.0},
+    {"correction_cap": math.nan},
+    {"substeps": 0},
+    {"substeps": 1.5},
+    {"composition": "order5"},
+    {"solver": "magic"},
+    {"iterations": 0},
+    {"residual_tolerance": math.nan},
+    {"friction": "pyramid"},
+    {"refinements": -1},
+    {"floor": 1.0},
+    {"floor": math.nan},
+    {"force_stages": ("observe",)},
+]
+
+
+@pytest.mark.parametrize("options", METHODS, ids=str)
+def test_a_senseless_method_is_refused_by_name(options: dict[str, Any]) -> None:
+    with pytest.raises(MethodError, match=r"|".join([*options, "observe"])):
+        Method(**options)
+
+
+@pytest.mark.parametrize("scene", [particles(), stones()], ids=["particles", "rigid"])
+@pytest.mark.parametrize(
+    "quantity", [Position("ghost"), Violation("ghost"), JointCoordinate("ghost")], ids=str
+)
+def test_observing_what_is_not_there_is_refused_by_name(scene: Scene, quantity: Any) -> None:
+    with pytest.raises(MethodError, match=r"ghost|JointCoordinate"):
+        compile(scene, time_step=0.01, observe={"x": Final(quantity=quantity)})
+
+
+def test_a_range_of_samples_must_be_one() -> None:
+    for make in (
+        lambda: Final(quantity=Orientation(), first=-1),
+        lambda: Final(quantity=Orientation(), first=3, last=2),
+        lambda: Trace(quantity=Orientation(), every=0),
+        lambda: Final(quantity="position"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(MethodError, match="observe"):
+            make()

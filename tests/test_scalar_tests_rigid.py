@@ -1,0 +1,199 @@
+"""What the rigid scenes measure, against numbers known from elsewhere; and that a broken engine is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from engine import Load, RigidBody, Scene, simulate
+from engine.joints import Joint
+from scalar_tests import beam, cantilever
+from scalar_tests.case import Measurement, Simulate
+from scalar_tests.catalogue import CATALOGUE
+
+RIGID_TESTS = [
+    name
+    for name in CATALOGUE
+    if name
+    in (
+        "beam",
+        "door",
+        "friction",
+        "cantilever",
+        "slip_angle",
+        "force_ratio",
+        "bouncing_ball",
+        "rotating_box",
+        "swinging_door",
+        "lock_ring",
+        "resting_stack",
+        "rolling_sphere",
+    )
+]
+SLOW = {("beam", 2000.0)}  # a beam of 250 m takes seconds; every night runs it
+# test, configuration, metric, value known from a closed form or an independent prototype, |difference| allowed
+KNOWN = (
+    ("beam", "plain", "height_deviation", 0.0, 1e-12),
+    ("beam", "compliant", "sag", 2.134e-7, 2.134e-10),
+    ("door", "damped", "weight_error", -4.3e-7, 5e-9),
+    ("door", "damped", "weight_error_settled", 0.0, 1e-9),
+    ("door", "printed", "weight_error_at_20_s", 0.0090, 5e-5),
+    ("door", "damped", "split_error", 0.0, 1e-9),
+    ("friction", "cone", "force_ratio", 0.5, 1e-9),
+    ("friction", "cone", "sliding_error", 0.0, 1e-9),
+    ("friction", "cone", "direction_error", 0.0, 1e-6),
+    ("friction", "box", "anisotropy", 0.1, 1e-3),
+    ("cantilever", "dynamic", "tip_against_statics", 0.0, 1e-7),
+    ("cantilever", "self-weight", "self_weight_ratio", 0.9925, 1e-4),
+    ("resting_stack", "direct", "load_error", 0.0, 1e-9),
+)
+
+
+def measurements(test: str) -> list[Measurement]:
+    return [m for m in CATALOGUE[test].measurements if (test, m.parameters.get("N")) not in SLOW]
+
+
+@pytest.mark.parametrize(("test", "configuration", "metric", "value", "allowed"), KNOWN)
+def test_values_agree_with_what_is_known(
+    test: str, configuration: str, metric: str, value: float, allowed: float
+) -> None:
+    for measurement in measurements(test):
+        if measurement.configuration == configuration and metric in {m.name for m in measurement.metrics}:
+            assert abs(measurement.measure(simulate)[metric] - value) <= allowed
+            return
+    raise LookupError((test, configuration, metric))
+
+
+def test_the_ringing_of_the_printed_door_is_the_known_one() -> None:
+    printed = next(m for m in CATALOGUE["door"].measurements if m.configuration == "printed")
+
+    assert abs(abs(printed.measure(simulate)["weight_error_to_65_s"]) - 0.0193) < 5e-5
+
+
+@pytest.mark.parametrize("test", RIGID_TESTS)
+def test_everything_is_green_and_at_its_set_point(test: str) -> None:
+    for measurement in measurements(test):
+        values = measurement.measure(simulate)
+        assert set(values) >= {metric.name for metric in measurement.metrics}
+        for metric in measurement.metrics:
+            value = float(values[metric.name])
+            assert metric.passes(value), (metric.name, value)
+            assert metric.holds_set_point(value), (metric.name, value)
+
+
+# --- a broken engine ------------------------------------------------------------------------------------
+
+
+def with_scene(change: Callable[[Scene], Scene]) -> Simulate:
+    """An engine that simulates another scene than it was given."""
+    return lambda scene, **options: simulate(change(scene), **options)
+
+
+def with_joints(**fields: Any) -> Simulate:
+    """An engine whose joints have other numbers than it was given."""
+    return with_scene(
+        lambda scene: replace(
+            scene,
+            constraints=tuple(replace(c, **fields) if isinstance(c, Joint) else c for c in scene.constraints),
+        )
+    )
+
+
+def slippery(scene: Scene) -> Scene:
+    bodies = [
+        replace(b, material=replace(b.material, friction=b.material.friction * 0.99))
+        if isinstance(b, RigidBody)
+        else b
+        for b in scene.bodies
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+def dull(scene: Scene) -> Scene:
+    bodies = [
+        replace(b, material=replace(b.material, restitution=b.material.restitution * 0.97))
+        for b in scene.bodies
+        if isinstance(b, RigidBody)
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+def overloaded(scene: Scene) -> Scene:
+    forces = [
+        replace(f, force=tuple(1.0001 * part for part in f.force)) if isinstance(f, Load) else f  # type: ignore[arg-type]
+        for f in scene.forces
+    ]
+    return replace(scene, forces=tuple(forces))
+
+
+def lighter(scene: Scene) -> Scene:
+    x, y, z = scene.gravity
+    return replace(scene, gravity=(0.999 * x, 0.999 * y, 0.999 * z))
+
+
+def much_lighter(scene: Scene) -> Scene:
+    x, y, z = scene.gravity
+    return replace(scene, gravity=(0.97 * x, 0.97 * y, 0.97 * z))
+
+
+def lopsided(scene: Scene) -> Scene:
+    """Every inertia 1 % off along x."""
+    bodies = [
+        replace(b, inertia=(1.01 * b.inertia[0], *b.inertia[1:]))
+        if isinstance(b, RigidBody) and b.inertia
+        else b
+        for b in scene.bodies
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+BROKEN: dict[str, Simulate] = {
+    "beam": with_joints(compliance=1e-13),  # hidden softness in the locks
+    "door": with_scene(lighter),
+    "friction": with_scene(slippery),
+    "cantilever": with_scene(overloaded),
+    "force_ratio": with_scene(slippery),
+    "slip_angle": with_scene(slippery),
+    "bouncing_ball": with_scene(dull),
+    "rotating_box": with_scene(lopsided),
+    "swinging_door": with_scene(much_lighter),
+    "lock_ring": with_joints(compliance=1e-6),
+    "resting_stack": with_scene(lighter),
+    "rolling_sphere": with_scene(lighter),
+}
+
+
+@pytest.mark.parametrize("test", BROKEN)
+def test_a_broken_engine_turns_a_gate_red(test: str) -> None:
+    found = []
+    for measurement in measurements(test):
+        gates = [metric for metric in measurement.metrics if metric.role == "gate"]
+        if gates:
+            values = measurement.measure(BROKEN[test])
+            found += [metric.passes(values[metric.name]) for metric in gates]
+
+    assert found and not all(found)
+
+
+# --- the references themselves --------------------------------------------------------------------------
+
+
+def test_the_statics_of_the_beam_bends_as_known() -> None:
+    assert abs(beam.sag_of_compliant_beam() - 2.134e-7) < 2.134e-10
+
+
+def test_the_elastica_is_right_to_leading_order_and_the_pieces_approach_it() -> None:
+    exact = cantilever.elastica_tip() / cantilever.TIP - 1.0
+
+    assert abs(exact - cantilever.LARGE_DEFLECTION) < 5e-8
+    assert abs(cantilever.chain_tip(320) / cantilever.elastica_tip() - 1.0) < 5e-7
+
+
+def test_statics_of_a_small_load_is_the_linear_beam() -> None:
+    tip = cantilever.chain_tip(20, load=1e-3 * cantilever.LOAD)
+    ends_free = 1.0 / (4.0 * 20.0**2)  # a rigid last half piece: the tip lies below the curve's tangent
+
+    assert abs(tip / (1e-3 * cantilever.TIP) - 1.0) < ends_free

@@ -1,0 +1,285 @@
+"""The website in a real browser, opened from a file with the network off."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.browser import MISSING, browser, look, programs
+from tests.synthetic_history import SEVEN, history
+from tracker.analyse import commit_of
+from tracker.compare import Measured, compare, side_of
+from tracker.publish import publish
+
+PAGES = (
+    "index.html", "tests/pendulum.html", "tests/friction.html", "error-time.html", "stability.html",
+    "compare.html", "regressions.html", "versions.html", "data.html", "document.html",
+)  # fmt: skip
+CONTRAST = """
+const shades = [];
+function parse(text) {
+  const n = (text.match(/[\\d.]+/g) || []).map(Number);
+  return text.startsWith('color(srgb') ? [n[0] * 255, n[1] * 255, n[2] * 255, n[3] ?? 1] : [n[0], n[1], n[2], n[3] ?? 1];
+}
+function over(top, bottom) { return top.slice(0, 3).map((v, i) => v * top[3] + bottom[i] * (1 - top[3])).concat(1); }
+function ground(element) {
+  const layers = [];
+  for (let e = element; e; e = e.parentElement) { layers.push(parse(getComputedStyle(e).backgroundColor)); }
+  return layers.reverse().reduce((below, layer) => over(layer, below), [255, 255, 255, 1]);
+}
+function light(c) {
+  const [r, g, b] = c.slice(0, 3).map((v) => { v /= 255; return v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; });
+  return .2126 * r + .7152 * g + .0722 * b;
+}
+const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (walker.nextNode()) {
+  const node = walker.currentNode, element = node.parentElement;
+  if (!node.textContent.trim() || !element.checkVisibility() || element.closest('script,.plot,.skip,template')) continue;
+  const style = getComputedStyle(element), svg = element.closest('svg');
+  const ink = parse(svg ? style.fill : style.color), paper = ground(svg ? svg.parentElement : element);
+  const [a, b] = [light(over(ink, paper)), light(paper)];
+  const ratio = (Math.max(a, b) + .05) / (Math.min(a, b) + .05);
+  const large = parseFloat(style.fontSize) >= 24 || (parseFloat(style.fontSize) >= 18.66 && style.fontWeight >= 700);
+  if (ratio < (large ? 3 : 4.5) && !element.closest('.letter')) shades.push(node.textContent.trim().slice(0, 40) + ' ' + ratio.toFixed(2));
+}
+return [...new Set(shades)];
+"""
+DRAWN = """
+const [done] = arguments;
+const boxes = [...document.querySelectorAll('figure.chart')].filter((b) => b.checkVisibility());
+let i = 0;
+(function next() {
+  if (i === boxes.length) { done(boxes.map((b) => b.querySelectorAll('.main-svg .trace, .main-svg .heatmaplayer image').length)); return; }
+  boxes[i].scrollIntoView();
+  const from = Date.now();
+  (function wait() {
+    if (boxes[i].querySelector('.main-svg') || Date.now() - from > 8000) { i += 1; next(); } else { setTimeout(wait, 20); }
+  })();
+})();
+"""
+
+
+@pytest.fixture(scope="module")
+def nights() -> Any:
+    return history(24, broken=20, hostile=True)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory, nights: Any) -> Path:
+    out = tmp_path_factory.mktemp("browsed") / "public"
+    publish(nights, out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def driver() -> Iterator[Any]:
+    found = programs()
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail(MISSING)
+        pytest.skip(MISSING)
+    with browser(*found) as opened:
+        opened.set_script_timeout(90)
+        yield opened
+
+
+def visit(driver: Any, site: Path, page: str, **how: Any) -> None:
+    """Open a page afresh, with a clean log."""
+    look(driver, **how)
+    driver.get("about:blank")
+    driver.get_log("browser")
+    driver.get((site / page.partition("#")[0]).as_uri() + page[len(page.partition("#")[0]) :])
+
+
+def complaints(driver: Any) -> list[str]:
+    return [entry["message"] for entry in driver.get_log("browser")]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_opens_from_a_file_without_complaint_and_draws_every_chart(
+    driver: Any, site: Path, page: str
+) -> None:
+    visit(driver, site, page)
+
+    drawn = driver.execute_async_script(DRAWN) if page != "document.html" else []
+
+    assert [place for place, traces in enumerate(drawn) if traces == 0] == []
+    assert complaints(driver) == []
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("page", PAGES)
+def test_text_stands_out_from_its_ground(driver: Any, site: Path, page: str, dark: bool) -> None:
+    visit(driver, site, page, dark=dark)
+
+    assert driver.execute_script("return document.documentElement.dataset.theme") == (
+        "dark" if dark else "light"
+    )
+    assert driver.execute_script(CONTRAST) == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_nothing_is_wider_than_a_narrow_screen(driver: Any, site: Path, page: str) -> None:
+    visit(driver, site, page, width=360, height=740)
+
+    wide = driver.execute_script(
+        "return [...document.querySelectorAll('body *')].filter((e) => e.getBoundingClientRect().right > 361 &&"
+        " !e.closest('.scroll, .bar nav, svg, .plot, .visually-hidden, .skip')).map((e) => e.tagName + '.' + e.className)"
+    )
+    assert wide == []
+    assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
+
+
+def test_hostile_names_and_versions_show_as_text(driver: Any, site: Path) -> None:
+    hostile = next(path.name for path in (site / "tests").iterdir() if path.stem not in SEVEN)
+    for page in ("index.html", f"tests/{hostile}", "compare.html", "versions.html", "document.html"):
+        visit(driver, site, page)
+        if page.startswith("tests/"):
+            driver.execute_async_script(DRAWN)
+        assert (
+            driver.execute_script(
+                "return document.querySelectorAll('main img:not([src=\"badge.svg\"]), main b').length"
+            )
+            == 0
+        )
+        assert "<img src=x onerror=alert(1)>" in driver.execute_script("return document.body.innerText")
+        assert complaints(driver) == []  # an alert that was opened would have failed the script
+
+
+def test_compare_shows_the_verdicts_of_the_command(driver: Any, site: Path, nights: Any) -> None:
+    runs = nights.runs()
+    for before, after in ((15, 23), (23, 15), (22, 23)):
+        sides = [
+            Measured(side=side_of(runs[i]), samples=nights.samples(runs[i].id), maps=nights.maps(runs[i].id))
+            for i in (before, after)
+        ]
+        told = compare(*sides)
+        visit(driver, site, f"compare.html#before={runs[before].id}&after={runs[after].id}")
+
+        text = driver.execute_script("return document.getElementById('told').innerText")
+        words = driver.execute_script(
+            "return [...document.querySelectorAll('#told tr[data-word]')].map((r) => r.dataset.word)"
+        )
+        assert f"EXIT CODE {told.exit_code}" in text
+        assert sorted(words) == sorted(
+            c.word for c in told.changes if c.word not in ("identical", "same", "not_measured")
+        )
+    assert commit_of(runs[0])
+
+
+def test_choosing_versions_changes_the_address_and_the_address_restores_the_choice(
+    driver: Any, site: Path
+) -> None:
+    visit(driver, site, "compare.html")
+    driver.execute_script(
+        "const s = document.getElementById('before'); s.value = 'run-spook-0015'; s.dispatchEvent(new Event('change'));"
+    )
+    address = driver.current_url
+    text = driver.execute_script("return document.getElementById('told').innerText")
+
+    driver.get("about:blank")
+    driver.get(address)
+
+    assert "before=run-spook-0015" in address
+    assert "REGRESSED" in text.upper()
+    assert driver.execute_script("return document.getElementById('told').innerText") == text
+
+
+def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
+    visit(driver, site, "tests/pendulum.html")
+    driver.execute_async_script(DRAWN)
+    name = "f-deviation-against-time"
+    driver.execute_async_script(
+        f"const done = arguments[0]; Plotly.relayout(document.querySelector('#{name} .plot'),"
+        " {'xaxis.range': [1, 2], 'yaxis.range': [0, 0.3]}).then(() => done());"
+    )
+    address = driver.current_url
+
+    driver.get("about:blank")
+    driver.get(address)
+    driver.execute_async_script(DRAWN)
+
+    assert f"z.{name}=1" in address
+    ranges = driver.execute_script(
+        f"const l = document.querySelector('#{name} .plot').layout; return [l.xaxis.range, l.yaxis.range];"
+    )
+    assert ranges == [[1, 2], [0, 0.3]]
+
+
+def test_the_filter_of_the_index_is_kept_in_the_address(driver: Any, site: Path) -> None:
+    visit(driver, site, "index.html#show=fail")
+    hidden = "return [...document.querySelectorAll('#filter ~ div tbody tr')].map((r) => r.hidden)"
+
+    assert driver.execute_script(hidden) == [True]
+    driver.execute_script("location.hash = '#q=img'")
+    driver.execute_async_script("setTimeout(arguments[0], 50)")
+    assert driver.execute_script(hidden) == [False]
+
+
+def test_error_and_run_time_can_be_seen_against_work(driver: Any, site: Path) -> None:
+    visit(driver, site, "error-time.html#cost=work")
+    driver.execute_async_script(DRAWN)
+
+    labels = driver.execute_script(
+        "return [...document.querySelectorAll('figure.chart')].filter((b) => b.checkVisibility())"
+        ".map((b) => b.querySelector('.plot').layout.xaxis.title.text)"
+    )
+    assert len(labels) == len(SEVEN)
+    assert set(labels) == {"work [operations counted]"}
+
+
+def test_the_reader_chooses_light_or_dark_and_keeps_it(driver: Any, site: Path) -> None:
+    visit(driver, site, "tests/pendulum.html")
+    driver.execute_async_script(DRAWN)
+    driver.execute_script("document.getElementById('theme').click()")
+    driver.get((site / "index.html").as_uri())
+
+    assert driver.execute_script("return document.documentElement.dataset.theme") == "dark"
+    driver.execute_script("localStorage.clear()")
+
+
+def test_the_keyboard_reaches_content_links_and_buttons(driver: Any, site: Path) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    visit(driver, site, "index.html")
+    body = driver.find_element("tag name", "body")
+    body.send_keys(Keys.TAB)
+    skip = driver.switch_to.active_element
+    assert skip.text == "Skip to the content"
+    skip.send_keys(Keys.ENTER)
+    assert driver.switch_to.active_element.get_attribute("id") == "content"
+    reached = set()
+    for _ in range(30):
+        driver.switch_to.active_element.send_keys(Keys.TAB)
+        reached.add(driver.switch_to.active_element.accessible_name)
+    assert {"Beam on two piles", "Friction", "Planetarium"} <= reached
+
+
+def test_without_scripts_tables_and_pictures_remain(driver: Any, site: Path) -> None:
+    driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        visit(driver, site, "tests/pendulum.html")
+        pictures = driver.find_elements("css selector", "main figure.chart .static svg")
+        assert len(pictures) > 6
+        assert all(picture.is_displayed() for picture in pictures[:3])
+        visit(driver, site, "compare.html")
+        assert "→" in driver.find_element("id", "told").text
+    finally:
+        driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def test_the_printed_report_hides_what_cannot_be_printed(driver: Any, site: Path) -> None:
+    visit(driver, site, "tests/pendulum.html")
+    driver.execute_async_script(DRAWN)
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        shown = driver.execute_script(
+            "return ['.bar', '.plot', '.static'].map((s) => document.querySelector(s).checkVisibility())"
+        )
+    finally:
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert shown == [False, False, True]

@@ -1,0 +1,149 @@
+"""Charts lose nothing on the way to a picture: zeros, failures, logarithms, angles."""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tracker import charts
+from tracker.charts import Band, Chart, Grid, Line
+from tracker.figures import figure, grid_figure
+from tracker.svg import grid_picture, picture, sparkline
+from tracker.templates import environment
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def chart(y: tuple[float, ...], **changes: Any) -> Chart:
+    line = Line(name="a", x=tuple(float(i + 1) for i in range(len(y))), y=y)
+    return Chart(**({"name": "c", "title": "t", "x_label": "x", "y_label": "y", "lines": (line,)} | changes))
+
+
+def test_a_failed_point_stays_a_point() -> None:
+    drawn = charts.drawable(chart((1.0, math.nan, 3.0, math.inf)))
+
+    failed = next(line for line in drawn.lines if line.style == "failed")
+    assert failed.x == (2.0, 4.0)
+    assert min(failed.y) >= 3.0
+    assert drawn.lines[0].y == (1.0, 3.0)
+
+
+def test_an_exact_zero_on_a_logarithmic_axis_sits_under_every_other_value() -> None:
+    drawn = charts.drawable(chart((1e-3, 0.0, -1e-5), y_scale="log"))
+
+    assert drawn.lines[0].y == (1e-3, 1e-6, 1e-5)
+    assert "exactly 0" in drawn.note
+
+
+def test_a_polar_chart_is_drawn_in_the_plane() -> None:
+    flat = charts.flattened(
+        chart((2.0, 2.0), polar=True, lines=(Line(name="a", x=(0.0, 90.0), y=(2.0, 2.0)),))
+    )
+
+    assert flat.lines[0].x == pytest.approx((2.0, 0.0), abs=1e-15)
+    assert flat.lines[0].y == pytest.approx((0.0, 2.0))
+    assert max(flat.rings) >= 2.0
+
+
+@given(st.lists(NUMBERS, min_size=1, max_size=60))
+def test_dropping_what_stands_still_loses_nothing(values: list[float]) -> None:
+    kept = charts.turning(values)
+
+    restored = []
+    for i in range(len(values)):
+        before = max(k for k in kept if k <= i)
+        restored.append(values[before])
+    assert all(a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(values, restored, strict=True))
+    assert charts.turning([1.0] * 3650) == [0, 3649]
+
+
+@given(st.floats(-1e9, 1e9), st.floats(1e-6, 1e9))
+def test_ticks_are_few_round_and_inside(low: float, width: float) -> None:
+    found = charts.ticks(low, low + width, "linear")
+
+    assert len(found) <= 9
+    assert all(
+        low - 1e-6 * width - 1e-9 * abs(low) <= t <= low + width * (1 + 1e-6) + 1e-9 * abs(low) for t in found
+    )
+
+
+@given(
+    st.lists(NUMBERS, max_size=12),
+    st.sampled_from(["linear", "log"]),
+    st.sampled_from(["linear", "log"]),
+    st.booleans(),
+)
+def test_any_numbers_make_a_picture_without_a_number_that_is_none(
+    y: list[float], x_scale: Any, y_scale: Any, polar: bool
+) -> None:
+    """Whatever was measured, the geometry is finite and the figure is strict JSON."""
+    bounded = tuple(v if not math.isfinite(v) else math.copysign(min(abs(v), 1e300), v) for v in y)
+    made = chart(
+        bounded, x_scale=x_scale, y_scale=y_scale, polar=polar, bands=(Band(low=-1.0, high=2.0, name="b"),)
+    )
+
+    drawn = picture(made)
+    numbers = re.findall(
+        r"nan|inf", " ".join(m.path for m in drawn.marks) + repr(drawn.bands) + repr(drawn.y_ticks)
+    )
+    assert numbers == []
+    for trace in figure(made)["data"]:
+        assert all(v is None or math.isfinite(v) for v in trace["y"])
+
+
+def test_a_map_shows_its_cells_with_sign_and_colour() -> None:
+    grid = Grid(
+        name="m", title="t", x_label="x", y_label="y", x=(1.0, 2.0), y=(1.0, 10.0),
+        cells=(("settled", "growing"), ("diverged", "not_finite")), prediction=((0.9, 1.1), (1.2, math.inf)),
+    )  # fmt: skip
+
+    drawn, told = grid_picture(grid), grid_figure(grid)
+
+    assert [cell[4] for cell in drawn.cells] == [
+        "cell-settled",
+        "cell-growing",
+        "cell-diverged",
+        "cell-not-finite",
+    ]
+    assert [letter for *_, letter in drawn.legend] == ["↗", "×", "∞"]
+    assert told["data"][0]["z"] == [[0, 2], [3, 4]]
+    assert told["data"][1]["z"][1][1] is None
+
+
+def test_a_picture_is_valid_svg_with_title_and_description() -> None:
+    pieces = environment().get_template("pieces.html").module
+    drawn = picture(
+        chart((1.0, 2.0), title="<b>&", lines=(Line(name="<i>", x=(0.0, 1.0), y=(1.0, 2.0)),) * 2)
+    )
+
+    root = ElementTree.fromstring(str(pieces.picture(drawn)))  # type: ignore[attr-defined]
+    space = {"s": "http://www.w3.org/2000/svg"}
+    assert root.findtext("s:title", namespaces=space) == "<b>&"
+    assert "<i>" in (root.findtext("s:desc", namespaces=space) or "")
+
+
+def test_a_sparkline_marks_its_failures() -> None:
+    drawn = sparkline([1.0, math.nan, 2.0], ["pass", "fail", "fail"])
+
+    assert len(drawn["failed"]) == 2  # type: ignore[arg-type]
+    assert drawn["last"] is None
+    assert sparkline([math.nan], ["fail"])["path"] == ""
+
+
+def test_the_hover_text_of_plotly_is_inert() -> None:
+    hostile = "<a href='https://x'>%{y}</a>"
+    made = figure(
+        chart((1.0, 2.0), lines=(Line(name=hostile, x=(1.0, 2.0), y=(1.0, 2.0), notes=(hostile, "b")),))
+    )
+
+    trace = made["data"][0]
+    assert "<" not in trace["name"]
+    assert trace["hoverinfo"] == "text"
+    assert "hovertemplate" not in trace
+    assert "<a" not in trace["text"][0]

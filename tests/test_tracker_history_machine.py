@@ -1,0 +1,132 @@
+"""Any sequence of recording, exporting, importing, copying, upgrading and dropping figures keeps what a
+dictionary keeps.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import msgspec
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from sqlalchemy.orm import Session
+
+from tests.run_documents import engine, run_of
+from tracker.database import open_database, upgrade
+from tracker.database_check import check
+from tracker.database_copy import copy_database
+from tracker.document import to_number
+from tracker.record import record
+from tracker.retention import drop_old_figures
+from tracker.revisions import revert
+from tracker.series import History
+from tracker.transfer import export_runs, import_files
+
+COMMITS = [f"{number:x}" * 40 for number in range(1, 7)]  # each the parent of the next
+KEYS = ["a", "b", "c"]
+
+
+class Storage(RuleBasedStateMachine):
+    """The database beside a dictionary of run id → document."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.folder = Path(tempfile.mkdtemp())
+        self.copies = 0
+        self.expected = {}
+        self.open(self.folder / "first.db")
+
+    def open(self, path):
+        self.path = path
+        self.engine = open_database(str(path))
+        self.session = Session(self.engine)
+
+    def close(self):
+        self.session.close()
+        self.engine.dispose()
+
+    def teardown(self):
+        self.session.close()
+        faults = check(self.engine)
+        self.close()
+        shutil.rmtree(self.folder)
+        assert faults == ()
+
+    def history(self):
+        return History(self.session, self.folder)
+
+    @rule(
+        commit=st.sampled_from(range(len(COMMITS))),
+        values=st.dictionaries(st.sampled_from(KEYS), st.floats().map(to_number), min_size=1),
+        dirty=st.booleans(),
+    )
+    def records_a_run(self, commit, values, dirty):
+        parents = (COMMITS[commit - 1],) if commit else ()
+        time = f"2026-01-{commit + 1:02}T00:00:00Z"
+        given = run_of(values, engine=engine(COMMITS[commit], parents=parents, dirty=dirty, commit_time=time))
+        assert record(self.session, given)
+        self.expected[given.id] = given
+
+    @precondition(lambda self: self.expected)
+    @rule(number=st.integers(0, 1000))
+    def records_a_run_again(self, number):
+        again = list(self.expected.values())[number % len(self.expected)]
+        assert not record(self.session, again)
+
+    @precondition(lambda self: self.expected)
+    @rule()
+    def moves_by_files(self):
+        files = export_runs(self.history(), self.folder / f"files {self.copies}")
+        self.close()
+        self.copies += 1
+        self.open(self.folder / f"imported {self.copies}.db")
+        assert len(import_files(self.session, reversed(files)).stored) == len(self.expected)
+
+    @rule()
+    def moves_by_copy(self):
+        self.close()
+        self.copies += 1
+        target = self.folder / f"copied {self.copies}.db"
+        copy_database(str(self.path), str(target))
+        self.open(target)
+
+    @precondition(lambda self: self.expected)
+    @rule()
+    def drops_old_figures(self):
+        drop_old_figures(self.session, self.history())
+        for run_id in self.expected:
+            stored = self.history().document(run_id)
+            kept = msgspec.structs.replace(self.expected[run_id], figures=stored.figures, maps=stored.maps)
+            assert stored == kept
+            assert set(stored.figures) <= set(self.expected[run_id].figures)
+            self.expected[run_id] = kept
+        assert any(run.figures for run in self.expected.values())
+
+    @precondition(lambda self: not self.expected)
+    @rule()
+    def goes_down_and_up(self):
+        self.session.rollback()
+        with self.engine.begin() as connection:
+            revert(connection, "base")
+        upgrade(self.engine)
+
+    @invariant()
+    def holds_what_was_given(self):
+        history = self.history()
+        assert {run.id: history.document(run.id) for run in history.runs()} == self.expected
+        self.session.rollback()
+
+    @invariant()
+    def keeps_commits_in_order(self):
+        hashes = [run.engine.git_hash for run in self.history().runs() if run.ordered]
+        assert hashes == sorted(hashes)
+        self.session.rollback()
+
+
+TestStorage = Storage.TestCase
+TestStorage.settings = settings(
+    max_examples=8, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck)
+)

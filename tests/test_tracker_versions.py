@@ -1,0 +1,143 @@
+"""Names that stand for runs, and what is said about a name that stands for none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from tests.run_documents import engine, machine
+from tracker.errors import UnknownName
+from tracker.versions import RunInfo, resolve
+
+A, B, C = "1a" * 20, "2b" * 20, "3c" * 20
+
+
+def commit(git_hash, **changes):
+    return engine(git_hash, **{"version": f"1.0.dev{git_hash[:1]}"} | changes)
+
+
+def runs_of(*versions) -> list[RunInfo]:
+    """A run of each version, in this order in time and in the order of commits."""
+    return [
+        RunInfo(
+            id=f"{number:08x}-0000-7000-8000-000000000000",
+            started="",
+            finished="",
+            trigger="test",
+            engine=version,
+            machine=machine(),
+            tracker_version="",
+            ci_address="",
+            key=number,
+            started_at=datetime(2026, 11, 21, tzinfo=UTC) + timedelta(days=number),
+            gates=1,
+            gates_passed=1,
+        )
+        for number, version in enumerate(versions, start=1)
+    ]
+
+
+def found(runs: Sequence[RunInfo], name: str, **commits: str) -> RunInfo:
+    """What `name` stands for where git knows `commits` by name."""
+    return resolve(runs, name, commits.get)
+
+
+@pytest.fixture
+def three() -> list[RunInfo]:
+    return runs_of(commit(A), commit(B), commit(C))
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("latest", C), ("previous", B), ("last-green", C),
+        ("1.0.dev2", B), ("1a1a", A), (A, A), ("2B2B2B", B),
+        ("spook@1.0.dev1", A), ("spook@latest", C),
+    ],
+)  # fmt: skip
+def test_names_of_a_version(three, name, expected):
+    assert found(three, name).engine.git_hash == expected
+
+
+def test_a_run_is_named_by_its_id_or_the_start_of_it(three):
+    first = three[0]
+
+    assert found(three, first.id) == first
+    assert found(three, first.id[:12]) == first
+
+
+@pytest.mark.parametrize(
+    "name", ["nothing", "", "1a", "--help", "a\0b", "deadbeef", "unreal@latest", "💥" * 500]
+)
+def test_an_unknown_name_says_so_and_names_what_there_is(three, name):
+    with pytest.raises(UnknownName, match="no run of a version") as caught:
+        found(three, name)
+
+    assert caught.value.exit_code == 2
+    assert caught.value.near
+    assert len(str(caught.value)) < 300
+
+
+def test_a_typing_error_is_answered_with_the_version_meant(three):
+    with pytest.raises(UnknownName, match=r"did you mean 1\.0\.dev"):
+        found(three, "1.0.dev9")
+
+
+def test_an_ambiguous_hash_is_refused():
+    runs = runs_of(commit("abcd1" + "0" * 35), commit("abcd2" + "0" * 35))
+
+    with pytest.raises(UnknownName, match="could be abcd10000000, abcd20000000"):
+        found(runs, "abcd")
+
+
+def test_our_own_engine_is_meant_unless_another_is_named():
+    runs = runs_of(
+        commit(A, version="3.0"),
+        commit("", name="mujoco", version="3.0"),
+        commit("", name="rapier", version="0.3"),
+    )
+
+    assert found(runs, "latest").engine.name == "spook"
+    assert found(runs, "3.0").engine.name == "spook"
+    assert found(runs, "mujoco@3.0").engine.name == "mujoco"
+    assert found(runs, "0.3").engine.name == "rapier"
+
+
+def test_a_dirty_build_is_the_latest_until_something_else_has_run():
+    runs = runs_of(commit(A), commit(A, dirty=True))
+    assert found(runs, "latest").engine.dirty
+    assert not found(runs, "previous").engine.dirty
+
+    first, dirty, last = runs_of(commit(A), commit(A, dirty=True), commit(B))
+    assert found([first, last, dirty], "latest") == last  # dirty builds come last in the commit order
+    assert found([first, last, dirty], "previous") == first
+
+
+def test_an_engine_without_commits_has_a_latest_and_a_previous_run():
+    runs = runs_of(*(commit("", name="mujoco", version=version) for version in ("3.1", "3.2", "3.3")))
+
+    assert found(runs, "mujoco@latest").engine.version == "3.3"
+    assert found(runs, "mujoco@previous").engine.version == "3.2"
+
+
+def test_no_runs_at_all_are_explained():
+    with pytest.raises(UnknownName, match="no runs are stored yet; record one with: tracker run"):
+        found([], "latest")
+
+
+def test_one_run_has_no_previous_one():
+    with pytest.raises(UnknownName, match="there is only one run, and so no previous one"):
+        found(runs_of(commit(A)), "previous")
+
+
+def test_git_is_asked_last(three):
+    assert found(three, "release", release=B).engine.git_hash == B
+    assert found(three, "1.0.dev1", **{"1.0.dev1": C}).engine.git_hash == A
+
+
+def test_of_several_runs_of_a_version_the_last_clean_one_is_meant():
+    runs = runs_of(commit(A), commit(A), commit(A, dirty=True))
+
+    assert found(runs, A) == runs[1]
