@@ -173,7 +173,7 @@ class Program:
 
 def _failure(status: str, body: str | None, step: int, time_limit: float | None, reason: str) -> str:
     if reason:
-        return f"body {body!r} {reason} in step {step}; try a smaller time step"
+        return f"in step {step} body {body!r} {reason}"
     if status == "diverged":
         return f"body {body!r} ran away (beyond 1e100 m or m/s) in step {step}; try a smaller time step"
     if status == "not_finite":
