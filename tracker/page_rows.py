@@ -9,7 +9,7 @@ from typing import Any
 from tracker.events import Event, judged
 from tracker.nights import Book, State, TestHistory, Trend
 from tracker.svg import sparkline
-from tracker.wording import band, clean, limit, margin, number, opening, quantity, seconds, slug
+from tracker.wording import band, clean, conditions, limit, margin, named, number, quantity, seconds, slug
 
 SPARK_NIGHTS = 40
 
@@ -34,6 +34,7 @@ class Row:
     title: str
     address: str
     what: str
+    definition: str  # of stable, for a break point
     configuration: str
     time_step: str
     time_step_value: float | str
@@ -68,7 +69,8 @@ def row(trend: Trend, title: str, address: str) -> Row:
         test=d.test,
         title=title,
         address=address,
-        what=opening(d.description),
+        what=named(d)[0],
+        definition=named(d)[1],
         configuration=d.configuration,
         time_step=number(d.time_step, 4),
         time_step_value="" if d.time_step is None else d.time_step,
@@ -109,7 +111,7 @@ def event_row(event: Event, book: Book) -> dict[str, Any]:
     test = next(t for t in book.tests if t.name == d.test)
     return {
         "test": test.card.title,
-        "what": opening(f"{d.description} ({d.configuration})"),
+        "what": f"{named(d)[0]} ({conditions(d)})",
         "address": address(test),
         "anchor": f"e-{slug(d.key + '/' + event.first.id)}",
         "state": event.state,
