@@ -93,9 +93,10 @@ def night(number: int, series: tuple[SeriesDefinition, ...], chance: random.Rand
 
 @contextmanager
 def timed(what: str) -> Iterator[None]:
-    start = time.perf_counter()
+    wall, processor = time.perf_counter(), time.process_time()
     yield
-    print(f"{what:<58} {time.perf_counter() - start:8.3f} s", flush=True)
+    wall, processor = time.perf_counter() - wall, time.process_time() - processor
+    print(f"{what:<58} {wall:8.3f} s wall {processor:8.3f} s processor", flush=True)
 
 
 def main() -> None:

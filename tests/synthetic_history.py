@@ -13,12 +13,15 @@ import msgspec
 
 from tracker.document import (
     Curve,
+    DrawnLink,
+    DrawnSolid,
     EngineVersion,
     FigureData,
     Machine,
     MapData,
     RunDocument,
     Sample,
+    SceneDrawing,
     SeriesDefinition,
     StageChoice,
     TestCard,
@@ -198,6 +201,15 @@ def _cards(hostile: bool) -> Iterable[TestCard]:
                 StageChoice(stage="apply_gravity", kept=True, reason="gravity is not zero"),
                 StageChoice(stage="solve_path", kept=True, reason="the constraints form a path"),
                 StageChoice(stage="integrate_positions", kept=True, reason="bodies move"),
+            ),
+            scene=SceneDrawing(
+                solids=(
+                    DrawnSolid(kind="plane", position=(0.0, 0.0, -1.2), size=(0.0, 0.0, 1.0), fixed=True),
+                    DrawnSolid(kind="box", position=(0.0, 0.0, 0.0), size=(1.0, 0.4, 0.3)),
+                    DrawnSolid(kind="sphere", position=(1.0, 0.0, 0.0), size=(0.2,), velocity=(0.0, 0.0, 1.0)),
+                ),
+                links=(DrawnLink(kind="distance", ends=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))),),
+                gravity=(0.0, 0.0, -9.81),
             ),
         )  # fmt: skip
     if hostile:

@@ -8,6 +8,7 @@ from typing import Any
 from scalar_tests.case import ScalarTest
 from tracker.document import EngineVersion, StageChoice, TestCard
 from tracker.measure import ask, sentence
+from tracker.scene_drawing import drawing
 
 
 def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> TestCard:
@@ -26,6 +27,7 @@ def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, floa
         misprints=test.misprints,
         seven=test.seven,
         stages=stages(test, engine, saved),
+        scene=ask(lambda: drawing(test.example().scene)).value,
     )
 
 

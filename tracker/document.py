@@ -146,6 +146,33 @@ class StageChoice(Struct, frozen=True, kw_only=True):
     saved_seconds_per_step: float | None = None  # measured by forcing the stage in
 
 
+class DrawnSolid(Struct, frozen=True, kw_only=True):
+    """One body of a drawing. Size: sphere radius; box edges; capsule radius, length; plane normal; m."""
+
+    kind: Literal["particle", "sphere", "box", "capsule", "plane"]
+    position: tuple[float, float, float]  # m
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    size: tuple[float, ...] = ()
+    fixed: bool = False
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s
+
+
+class DrawnLink(Struct, frozen=True, kw_only=True):
+    """What ties two places of a drawing; both ends are one place for a joint with a point of its own."""
+
+    kind: Literal["distance", "spring", "joint"]
+    ends: tuple[tuple[float, float, float], tuple[float, float, float]]  # m
+
+
+class SceneDrawing(Struct, frozen=True, kw_only=True):
+    """What a reader sees of a test's scene at its start."""
+
+    solids: tuple[DrawnSolid, ...]
+    links: tuple[DrawnLink, ...] = ()
+    attractors: tuple[tuple[float, float, float], ...] = ()  # centres of gravity, m
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s²
+
+
 class TestCard(Struct, frozen=True, kw_only=True):
     """What a page says about a test, as it was worded in this run."""
 
@@ -162,6 +189,7 @@ class TestCard(Struct, frozen=True, kw_only=True):
     misprints: tuple[Text, ...]
     seven: bool
     stages: tuple[StageChoice, ...]
+    scene: SceneDrawing | None = None
 
 
 class RunDocument(Struct, frozen=True, kw_only=True):

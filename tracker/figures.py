@@ -151,7 +151,7 @@ def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]
 
 def _polar(layout: dict[str, Any], chart: Chart) -> None:
     """Rings and equal axes instead of a frame."""
-    reach = max(chart.rings, default=1.0) * 1.15
+    reach = chart.reach
     layout["xaxis"] = {"visible": False, "range": [-reach, reach], "scaleanchor": "y"}
     layout["yaxis"] = {"visible": False, "range": [-reach, reach]}
     for radius in chart.rings:

@@ -13,6 +13,7 @@ from tracker.feed import badge_words
 from tracker.nights import Book, TestHistory
 from tracker.page_index import gates_at, health, summary
 from tracker.page_rows import Page, address, event_row, row
+from tracker.scenery import scenery
 from tracker.svg import grid_picture, picture
 from tracker.wording import slug, web_address
 
@@ -163,6 +164,7 @@ def document(book: Book, events: Sequence[Event]) -> Page:
             {
                 "card": test.card,
                 "slug": name,
+                "scenery": scenery(test.card.scene) if test.card.scene else None,
                 "state": test.state,
                 "kept": [s.stage for s in test.card.stages if s.kept],
                 "left_out": sum(not s.kept for s in test.card.stages),

@@ -8,6 +8,7 @@ from tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, t
 from tracker.events import Event, of_test
 from tracker.nights import Book, TestHistory
 from tracker.page_rows import Page, address, event_row, row
+from tracker.scenery import scenery
 from tracker.wording import clean, day, slug
 
 
@@ -30,6 +31,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     context = {
         "card": test.card,
         "slug": slug(test.name),
+        "scenery": scenery(test.card.scene) if test.card.scene else None,
         "state": test.state,
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),
         "gates": gates,

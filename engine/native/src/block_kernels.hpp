@@ -22,6 +22,7 @@ struct Load {
     std::int32_t offset;  // of the unknowns of a diagonal block
     std::uint8_t rows, columns;
     Kind kind;
+    bool constraint;  // a diagonal block of −Sig, which may get a shift in the factor
 };
 
 struct Factor {
@@ -36,6 +37,7 @@ struct Factor {
     double* values;
     double* scale;    // per unknown: sum of magnitudes a pivot came from
     double* scratch;  // the widest column before division by D
+    double shift;     // taken from the diagonal of every constraint, in the factor only
 };
 
 /// What a sweep over the columns needs, for one instruction set.

@@ -269,6 +269,8 @@ SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
         default: break;
     }
     std::copy_n(from, rows * columns, to);
+    if (item.constraint && f.shift != 0.0)
+        for (int a = 0; a < rows; ++a) to[a * rows + a] -= f.shift;
 }
 
 template <int U>

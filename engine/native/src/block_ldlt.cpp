@@ -141,14 +141,15 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
     for (int block = 0; block < count; ++block) {
         const auto n = static_cast<std::uint8_t>(size_[block]);
         loads_[next[touched[block]]++] = {diagonal_at_[block], pivot_at_[block], offset_[block], n, n,
-                                          raw[block] ? kernel::Load::raw_diagonal : kernel::Load::diagonal};
+                                          raw[block] ? kernel::Load::raw_diagonal : kernel::Load::diagonal,
+                                          is_constraint_[block] != 0};
     }
     for (int k = 0; k < count; ++k)
         for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) {
             const int early = order_[k], late = ordering.column_rows[r];
             kernel::Load& item = loads_[next[touched[count + r]]++];
             item = {0, block_at[r], 0, static_cast<std::uint8_t>(size_[early]),
-                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero};
+                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero, false};
             if (edge_of[r] < 0) continue;
             item.from = coupling_at_[edge_of[r]];
             item.kind = early < late ? kernel::Load::direct : kernel::Load::transposed;
@@ -205,7 +206,7 @@ kernel::Factor BlockLdlt::view() const noexcept {
             targets_.data(),      values_.data(),
             loads_.data(),        load_start_.data(),
             self->factor_.data(), self->scale_.data(),
-            self->scratch_.data()};
+            self->scratch_.data(), shift_};
 }
 
 bool BlockLdlt::factor_with(double floor, double* x) {
@@ -223,6 +224,14 @@ bool BlockLdlt::factor(double floor) { return factor_with(floor, nullptr); }
 void BlockLdlt::solve(double* x) const {
     kernel::kernels().forward(view(), uniform_size_, x);
     kernel::kernels().backward(view(), uniform_size_, x);
+}
+
+double BlockLdlt::largest_constraint_scale() const noexcept {
+    double largest = 0.0;
+    for (int i = 0; i < block_count(); ++i)
+        if (is_constraint_[i])
+            for (int k = 0; k < size_[i]; ++k) largest = std::max(largest, scale_[offset_[i] + k]);
+    return largest;
 }
 
 void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {

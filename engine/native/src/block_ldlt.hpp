@@ -39,6 +39,12 @@ public:
     /// refinement removes the rest. False when a value was not finite, or a pivot vanished with floor 0.
     bool factor(double floor);
 
+    /// From the next factorisation on, every constraint counts as softer by so much, in the factor only. Solutions
+    /// refined from zero then tend to the one of least norm where constraints are redundant.
+    void shift_constraints(double shift) noexcept { shift_ = shift; }
+    /// The largest sum of magnitudes that a constraint's pivot came from in the last factorisation.
+    double largest_constraint_scale() const noexcept;
+
     /// x ← F⁻¹ x with the factor F as it is.
     void solve(double* x) const;
 
@@ -76,6 +82,7 @@ private:
     std::vector<BlockEdge> edges_;
     std::vector<std::uint8_t> is_constraint_;
     int unknowns_ = 0, uniform_size_ = 0;
+    double shift_ = 0.0;
     std::int64_t operations_per_factor_ = 0;
 
     std::vector<std::int64_t> diagonal_at_, coupling_at_;

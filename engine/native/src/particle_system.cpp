@@ -140,7 +140,7 @@ void ParticleSystem::advance(std::int64_t steps) {
         --steps;
     }
     if (solver_ == ParticleSolver::none && springs_.empty() && scene_.fields.size() <= 1) fly(steps);
-    else if (solver_ == ParticleSolver::path && !moving_forces_ && scene_.method.corrections == 0) swing(steps);
+    else if (solver_ == ParticleSolver::path && !moving_forces_) swing(steps);
     else advance_by<false>(steps);
 }
 
@@ -275,16 +275,6 @@ void ParticleSystem::solve_iterative() noexcept {
         if (worst <= scene_.method.residual_tolerance) break;
     }
 }
-
-namespace {
-
-/// |d + s| − |d| − u·s without cancellation: (s² − (u·s)²) / (|d + s| + |d| + u·s), never negative.
-double curvature(Vec3 u, double length, Vec3 s) noexcept {
-    const double along = dot(u, s), across = std::max(0.0, dot(s, s) - along * along), moved = length + along;
-    return across == 0.0 ? 0.0 : across / (std::sqrt(moved * moved + across) + moved);
-}
-
-}  // namespace
 
 /// Keep the curvature of |d| in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊]. c₋, from where the row
 /// came, is known before the first solve; c₊ is where that solve, then the corrected one, would take it. Each is

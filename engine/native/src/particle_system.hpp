@@ -5,6 +5,8 @@
 // the Schur matrix G M⁻¹ Gᵀ + Sig is then tridiagonal and one pass up and down solves it.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -20,6 +22,12 @@
 namespace spook {
 
 inline Vec3 vec_at(const double* p) noexcept { return {p[0], p[1], p[2]}; }
+
+/// |d + s| − |d| − u·s without cancellation: (s² − (u·s)²) / (|d + s| + |d| + u·s), never negative; u = d/|d|.
+inline double curvature(Vec3 u, double length, Vec3 s) noexcept {
+    const double along = dot(u, s), across = std::max(0.0, dot(s, s) - along * along), moved = length + along;
+    return across == 0.0 ? 0.0 : across / (std::sqrt(moved * moved + across) + moved);
+}
 
 class ParticleSystem {
 public:
@@ -119,6 +127,7 @@ private:
     // particle_kernels.cpp: the same arithmetic with the time loop inside, for scenes that need no more
     void fly(std::int64_t steps) noexcept;
     void swing(std::int64_t steps) noexcept;
+    template <bool Curved> void swing_by(std::int64_t steps) noexcept;
 
     ParticleScene scene_;
     double h_;  // s, of a substep

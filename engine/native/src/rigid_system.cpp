@@ -54,7 +54,9 @@ RigidSystem::RigidSystem(const RigidScene& scene)
 }
 
 void RigidSystem::reset(StageClock* clock) {
-    live_ = {start_, -1, -1};
+    live_ = {};
+    live_.bodies = start_;
+    matrix_.shift_constraints(0.0);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
     clock_ = clock;
     rounds_ = sweeps_ = 0;
@@ -91,7 +93,10 @@ void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
 
 Health RigidSystem::health() const {
     if (live_.too_fast >= 0)
-        return {Status::diverged, live_.too_fast, "turns too fast for the time step (h |w| reaches 2)"};
+        return {Status::diverged, live_.too_fast, "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+    if (live_.contradicted >= 0)
+        return {Status::diverged, live_.contradicted,
+                "is held by rows that contradict each other; give one of them a compliance"};
     for (int body = 0; body < bodies(); ++body) {
         const BodyState& s = live_.bodies[body];
         if (!finite(s.displacement) || !finite(s.velocity) || !finite(s.angular_momentum) ||
@@ -102,7 +107,7 @@ Health RigidSystem::health() const {
                 return {Status::diverged, body};
     }
     if (live_.not_solved >= 0)
-        return {Status::not_finite, live_.not_solved, "belongs to a system of rows that could not be solved"};
+        return {Status::not_finite, live_.not_solved, "belongs to a system of rows that cannot be solved; give its joints a compliance or the method a floor"};
     return {};
 }
 

@@ -1,7 +1,9 @@
 // The rigid-body stepper: what a step needs, in the order of the step, and nothing else.
 #pragma once
 
+#include <algorithm>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "block_ldlt.hpp"
@@ -33,7 +35,8 @@ public:
     void restore() {
         live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_, contacts_ = saved_contacts_;
     }
-    std::int64_t block() const noexcept { return 64; }
+    /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
+    std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
 
     void reset(StageClock* clock);
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
@@ -69,7 +72,9 @@ private:
     struct Live {
         LargeArray<BodyState> bodies;
         int too_fast = -1;   // the first body that turned too fast
-        int not_solved = -1;  // the first body of a system that could not be factored
+        int not_solved = -1;  // a body of a system that could not be factored
+        double share = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
+        int contradicted = -1;  // a body held by rows that cannot hold together
     };
 
     void step();
@@ -83,6 +88,10 @@ private:
     void impact();
     void take_velocities(bool angular_too);
     void solve_block();
+    bool solve_once();
+    bool solve_shared();
+    std::pair<double, int> row_residual(double& speed);
+    void find_contradiction();
     void solve_mixed(bool touching);
     void integrate_all();
     void analyse_block();
@@ -114,7 +123,7 @@ private:
     std::vector<int> tied_;             // dynamic bodies that have rows
     std::vector<int> slot_;             // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
-    LargeArray<double> right_, solution_;
+    LargeArray<double> right_, solution_, left_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
         bool first_particle = false, second_particle = false;

@@ -64,18 +64,42 @@ void a_compliant_chain_sags_by_the_unit_load_theorem() {
     EXPECT_NEAR(wrench[4] / (-weight * n * n * a / 2), 1.0, 1e-10);
 }
 
-void every_hinge_of_a_door_carries_its_share() {
-    RigidScene s = scene();
-    s.bodies.push_back(box({0, 0, 0}));
-    const int n = 40;
-    for (int i = 0; i < n; ++i) s.joints.push_back(joint(JointKind::ball, -1, 0, {0, 0, 0}, 1e-13));
-    RigidSystem system(s);
-    system.advance(200);
-    for (int i = 0; i < n; ++i) {
-        double wrench[6];
-        system.wrench(i, wrench);
-        EXPECT_NEAR(wrench[2], 25.0 / n, 1e-9);
+void every_joint_of_an_overdetermined_body_carries_its_share() {
+    for (const double compliance : {1e-13, 0.0}) {
+        RigidScene s = scene();
+        s.bodies.push_back(box({0, 0, 0}));
+        const int n = 40;
+        for (int i = 0; i < n; ++i) s.joints.push_back(joint(JointKind::ball, -1, 0, {0, 0, 0}, compliance));
+        RigidSystem system(s);
+        system.advance(200);
+        for (int i = 0; i < n; ++i) {
+            double wrench[6];
+            system.wrench(i, wrench);
+            EXPECT_NEAR(wrench[2], 25.0 / n, 1e-9);
+        }
     }
+}
+
+void contradictory_rows_are_named() {
+    RigidScene s = scene();
+    s.gravity = {};
+    s.bodies = {box({5, 0, 0}), box({0, 0, 0})};
+    for (double speed : {1.0, 2.0}) {
+        JointSpec hinge = joint(JointKind::hinge, -1, 1, {0, 0, 0}, 0.0);
+        hinge.has_motor = true;
+        hinge.motor_speed = speed;
+        hinge.motor_force = std::numeric_limits<double>::infinity();
+        s.joints.push_back(hinge);
+    }
+    RigidSystem contradictory(s);
+    contradictory.advance(1);
+    EXPECT(contradictory.health().status == Status::diverged);
+    EXPECT(contradictory.health().body == 1);
+    s.joints[1].motor_speed = 1.0;
+    RigidSystem redundant(s);
+    redundant.advance(10);
+    EXPECT(redundant.health().status == Status::completed);
+    EXPECT_NEAR(redundant.state(1).angular_velocity.x, 1.0, 1e-12);
 }
 
 void a_free_pair_keeps_its_momenta() {
@@ -189,7 +213,8 @@ void the_work_grows_with_the_chain_and_no_faster() {
 
 int main() {
     a_compliant_chain_sags_by_the_unit_load_theorem();
-    every_hinge_of_a_door_carries_its_share();
+    every_joint_of_an_overdetermined_body_carries_its_share();
+    contradictory_rows_are_named();
     a_free_pair_keeps_its_momenta();
     a_kinematic_body_drives_what_is_locked_to_it();
     a_particle_hangs_on_a_distance();

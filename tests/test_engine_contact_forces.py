@@ -1,0 +1,177 @@
+"""Resting contacts: depth by compliance, forces that sum to the weight, stacks, overlaps; and what may touch what."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from engine import (
+    Box,
+    Capsule,
+    Compound,
+    ContactCount,
+    ContactForce,
+    Energy,
+    Final,
+    Material,
+    MaximumAbsolute,
+    Method,
+    Part,
+    Penetration,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Shape,
+    Sphere,
+    Trace,
+    Velocity,
+    compile,
+    simulate,
+)
+
+GRAVITY = 9.81  # m/s²
+DOWN = (0.0, 0.0, -GRAVITY)
+H = 1 / 60  # s
+
+
+def ground(material: Material | None = None) -> RigidBody:
+    return RigidBody(
+        name="ground",
+        motion="static",
+        shape=Plane(),
+        position=(0.0, 0.0, 0.0),
+        material=material or Material(),
+    )
+
+
+def body(shape: Shape, height: float, name: str = "body", mass: float = 2.0, **extra: object) -> RigidBody:
+    return RigidBody(name=name, mass=mass, shape=shape, position=(0.0, 0.0, height), **extra)  # type: ignore[arg-type]
+
+
+LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+CROSS = Compound((Part(shape=Box((1.0, 0.2, 0.1))), Part(shape=Box((0.2, 1.0, 0.1)))))
+RESTING = [
+    ("sphere", body(Sphere(0.3), 0.3), 1),
+    ("box", body(Box((1.0, 0.6, 0.4)), 0.2), 4),
+    ("standing capsule", body(Capsule(0.2, 0.5), 0.45), 1),
+    ("lying capsule", body(Capsule(0.2, 0.5), 0.2, orientation=LYING), 2),
+    ("compound cross", body(CROSS, 0.05, inertia=(0.2, 0.2, 0.3)), 8),
+]
+
+
+@pytest.mark.parametrize("h", [1e-3, 1 / 60])
+@pytest.mark.parametrize("eps", [1e-7, 1e-4])
+@pytest.mark.parametrize(("resting", "points"), [r[1:] for r in RESTING], ids=[r[0] for r in RESTING])
+def test_t8_a_body_rests_at_the_depth_its_compliance_gives(
+    resting: RigidBody, points: int, eps: float, h: float
+) -> None:
+    """eps m g over the number of contact points, whatever the step; the forces sum to the weight."""
+    scene = Scene(bodies=(ground(Material(compliance=eps)), resting), gravity=DOWN)
+    observe = {
+        "f": Final(quantity=ContactForce("body")),
+        "n": Final(quantity=ContactCount()),
+        "depth": Final(quantity=Penetration()),
+        "v": Final(quantity=Velocity("body")),
+    }
+    result = simulate(scene, time_step=h, duration=600.0 * h if eps < 1e-5 else 5.0, observe=observe)
+
+    assert int(result["n"]) == points
+    assert float(result["depth"]) == pytest.approx(eps * 2.0 * GRAVITY / points, rel=1e-6)
+    np.testing.assert_allclose(result["f"], [0.0, 0.0, 2.0 * GRAVITY], rtol=0.0, atol=1e-7)
+    assert np.abs(result["v"]).max() < 1e-9
+
+
+def stack(count: int, **method: object) -> tuple[Scene, Method]:
+    boxes = tuple(body(Box((1.0, 1.0, 1.0)), 0.5 + i, f"box {i}", mass=1.0) for i in range(count))
+    return Scene(bodies=(ground(), *boxes), gravity=DOWN), Method(**method)  # type: ignore[arg-type]
+
+
+def test_each_contact_of_a_stack_carries_what_stands_on_it() -> None:
+    """20 boxes: contact i carries (N − i) m g to 1e-9, and no energy is gained in 10 s."""
+    scene, method = stack(20)
+    observe = {
+        str(i): Final(quantity=ContactForce(f"box {i}", "ground" if i == 0 else f"box {i - 1}"))
+        for i in range(20)
+    }
+    observe["energy"] = MaximumAbsolute(quantity=Energy(), from_start=True)
+    observe["moved"] = MaximumAbsolute(quantity=Position(), from_start=True)
+    result = simulate(scene, time_step=H, duration=10.0, observe=observe, method=method)
+
+    for i in range(20):
+        np.testing.assert_allclose(result[str(i)], [0.0, 0.0, (20 - i) * GRAVITY], rtol=0.0, atol=2e-8)
+    assert result["moved"].max() < 1e-9
+    assert float(result["energy"]) < 1e-6
+
+
+def test_action_and_reaction() -> None:
+    scene, _ = stack(3)
+    names = [("box 0", "box 1"), ("box 1", "box 0"), ("box 1", None), ("box 2", None), ("ground", None)]
+    observe = {f"{a} {b}": Final(quantity=ContactForce(a, b)) for a, b in names}
+    result = simulate(scene, time_step=H, steps=60, observe=observe)
+
+    np.testing.assert_allclose(result["box 0 box 1"], -result["box 1 box 0"], atol=1e-12)
+    np.testing.assert_allclose(result["box 1 None"], [0.0, 0.0, GRAVITY], atol=1e-8)
+    np.testing.assert_allclose(result["ground None"], [0.0, 0.0, -3.0 * GRAVITY], atol=1e-8)
+
+
+def test_an_overlapping_start_settles_without_being_launched() -> None:
+    box = body(Box((1.0, 1.0, 1.0)), 0.4)  # 10 cm inside the ground
+    observe = {"x": Trace(quantity=Position("body")), "v": Trace(quantity=Velocity("body"))}
+    result = simulate(Scene(bodies=(ground(), box), gravity=DOWN), time_step=H, duration=5.0, observe=observe)
+
+    assert result["x"][:, 2].max() < 0.5 + 0.01
+    assert result["x"][-1, 2] == pytest.approx(0.5, abs=1e-3)
+    assert np.abs(result["v"][-1]).max() < 1e-6
+    assert result["v"][:, 2].max() < 2.0
+
+
+@pytest.mark.parametrize("speed", [10.0, 100.0, 1000.0])
+def test_a_fast_body_does_not_pass_through_the_ground(speed: float) -> None:
+    for shape, half in ((Sphere(0.1), 0.1), (Box((0.2, 0.2, 0.2)), 0.1)):
+        falling = RigidBody(
+            name="body", mass=1.0, shape=shape, position=(0.0, 0.0, 5.0), velocity=(0.0, 0.0, -speed)
+        )
+        observe = {"x": Trace(quantity=Position("body"))}
+        z = simulate(Scene(bodies=(ground(), falling)), time_step=H, duration=2.0, observe=observe)["x"][:, 2]
+        assert z.min() > half - 1e-6
+        assert z[-1] < half + 1e-3  # and does not come back: restitution is zero
+
+
+def test_contacts_are_left_out_where_they_are_not_possible() -> None:
+    ghost = RigidBody(name="ghost", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 1.0))
+    box = body(Box((1.0, 1.0, 1.0)), 3.0)
+    alone = Scene(bodies=(ground(), ghost), gravity=DOWN)
+    off = Scene(bodies=(ground(), box), gravity=DOWN, contacts=False)
+    listed = Scene(bodies=(ground(), box), gravity=DOWN, no_contact=(("body", "ground"),))
+    on = Scene(bodies=(ground(), box), gravity=DOWN)
+
+    for scene in (alone, off, listed):
+        assert not {"collision", "impact", "pivot", "friction"} & set(compile(scene, time_step=H).stages)
+        result = simulate(scene, time_step=H, duration=2.0)
+        assert result.counters.get("contacts", 0) == 0
+        assert result.final_state[scene.bodies[1].name][2] < -5.0
+    assert "collision" in compile(on, time_step=H).stages
+    assert simulate(on, time_step=H, duration=2.0).final_state["body"][2] == pytest.approx(0.5, abs=1e-6)
+
+
+def test_contacts_repeat_to_the_bit() -> None:
+    rng = np.random.default_rng(1)
+    shapes: tuple[Shape, ...] = (Sphere(0.2), Box((0.4, 0.3, 0.2)), Capsule(0.1, 0.3))
+    bodies = tuple(
+        RigidBody(
+            name=f"b{i}",
+            mass=1.0,
+            shape=shapes[i % 3],
+            position=(*rng.uniform(-0.4, 0.4, 2), 0.5 + 0.35 * i),
+            material=Material(friction=0.4, restitution=0.2),
+        )
+        for i in range(12)
+    )
+    program = compile(Scene(bodies=(ground(Material(friction=0.4)), *bodies), gravity=DOWN), time_step=H)
+    first, second = program.run(60), program.run(60)
+
+    assert first.completed and first.counters["contacts"] > 100
+    assert first.state_hash == second.state_hash and first.counters == second.counters

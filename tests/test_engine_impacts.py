@@ -1,0 +1,143 @@
+"""T12: impacts. v₊ = −psi v₋ for one contact, momentum kept, energy never gained, joints taking part."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from engine import (
+    WORLD,
+    AngularMomentum,
+    AngularVelocity,
+    Box,
+    Final,
+    Hinge,
+    KineticEnergy,
+    Material,
+    Momentum,
+    Plane,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+
+H = 1 / 60
+
+
+def ball(name: str, x: float, speed: float, mass: float, psi: float, y: float = 0.0) -> RigidBody:
+    return RigidBody(
+        name=name,
+        mass=mass,
+        shape=Sphere(0.1),
+        position=(x, y, 0.0),
+        velocity=(speed, 0.0, 0.0),
+        material=Material(restitution=psi),
+    )
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.3, 0.8, 1.0])
+@pytest.mark.parametrize("speed", [0.5, 7.0, 60.0])
+@pytest.mark.parametrize("h", [1 / 60, 1e-3])
+def test_t12_a_ball_leaves_a_wall_with_its_restitution(psi: float, speed: float, h: float) -> None:
+    wall = RigidBody(name="wall", motion="static", shape=Plane((-1.0, 0.0, 0.0)), position=(1.0, 0.0, 0.0))
+    steps = 5 + math.ceil(1.8 / speed / h)
+    v = simulate(
+        Scene(bodies=(wall, ball("ball", 0.0, speed, 2.0, psi))),
+        time_step=h,
+        steps=steps,
+        observe={"v": Final(quantity=Velocity("ball"))},
+    )["v"]
+
+    assert v == pytest.approx([-psi * speed, 0.0, 0.0], abs=1e-9 * speed)
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("ratio", [0.1, 1.0, 1e6])
+def test_t12_two_balls_part_with_their_restitution(ratio: float, psi: float) -> None:
+    """Head on: relative speed −psi times that before, momentum kept."""
+    first, second = ball("first", -0.5, 3.0, 1.0, psi), ball("second", 0.5, -1.0, ratio, 0.0)
+    observe = {"v": Final(quantity=Velocity()), "p": Trace(quantity=Momentum())}
+    result = simulate(Scene(bodies=(first, second)), time_step=H, steps=40, observe=observe)
+    centre = (3.0 - ratio) / (1.0 + ratio)
+    exact = [centre - psi * 4.0 * ratio / (1.0 + ratio), centre + psi * 4.0 / (1.0 + ratio)]
+
+    np.testing.assert_allclose(result["v"][:, 0], exact, rtol=0.0, atol=1e-9)
+    assert np.abs(result["p"] - result["p"][0]).max() < 1e-12 * (3.0 + ratio)
+
+
+def test_t12_an_oblique_hit_without_friction_leaves_the_tangent_alone() -> None:
+    offset = 0.1
+    first, second = ball("first", -0.5, 2.0, 1.0, 1.0, y=offset), ball("second", 0.0, 0.0, 1.0, 1.0)
+    observe = {"v": Trace(quantity=Velocity()), "l": Trace(quantity=AngularMomentum())}
+    result = simulate(Scene(bodies=(first, second)), time_step=1e-4, steps=5000, observe=observe)
+    v = result["v"][-1]
+    before = np.array([2.0, 0.0, 0.0])
+    normal = -v[1] / np.linalg.norm(v[1])  # the second ball leaves along the line of centres
+
+    assert normal[1] == pytest.approx(offset / 0.2, abs=1e-3)
+    np.testing.assert_allclose(v[1], (before @ normal) * normal, atol=1e-9)
+    np.testing.assert_allclose(v[0], before - (before @ normal) * normal, atol=1e-9)
+    assert np.abs(result["l"] - result["l"][0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("psi", [0.05, 0.6, 1.0])
+def test_t12_joints_take_part_in_an_impact(psi: float) -> None:
+    """A ball hits a hinged plank: the impulse is (1 + psi) V/(1/m + d²/I), I about the hinge."""
+    speed, mass, arm = 4.0, 0.5, 0.8
+    plank = RigidBody(
+        name="plank",
+        mass=3.0,
+        shape=Box((0.1, 1.0, 0.2)),
+        position=(0.0, 0.5, 0.0),
+        material=Material(restitution=psi),
+    )
+    moment = 3.0 * (1.0 + 0.01) / 12.0 + 3.0 * 0.25
+    hinge = Hinge(
+        name="hinge", between=(WORLD, "plank"), at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), compliance=0.0
+    )
+    scene = Scene(bodies=(plank, ball("ball", -0.4, speed, mass, psi, y=arm)), constraints=(hinge,))
+    observe = {"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("plank"))}
+    result = simulate(scene, time_step=1e-3, steps=200, observe=observe)
+    impulse = (1.0 + psi) * speed / (1.0 / mass + arm**2 / moment)
+    hit = int(np.argmax(result["v"][:, 0] < speed - 1e-6))
+
+    assert result["v"][hit, 0] == pytest.approx(speed - impulse / mass, abs=1e-12)
+    assert result["w"][hit, 2] == pytest.approx(-impulse * arm / moment, abs=1e-12)
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.7, 1.0])
+def test_impacts_among_many_bodies_keep_momentum_and_gain_no_energy(psi: float) -> None:
+    """A break of balls and boxes with friction, floating: momentum to rounding, energy only falls.
+
+    Without restitution bodies stay together and a turning one sinks in a little; putting them apart again moves
+    them without an impulse and costs angular momentum.
+    """
+    rng = np.random.default_rng(3)
+    bodies = [ball("cue", -2.0, 9.0, 1.0, psi, y=0.03)]
+    for i in range(10):
+        shape = Sphere(0.15) if i % 2 else Box((0.25, 0.2, 0.3))
+        bodies.append(
+            RigidBody(
+                name=f"b{i}",
+                mass=1.0 + 0.2 * i,
+                shape=shape,
+                position=(0.4 * (i % 4), 0.4 * (i // 4) - 0.4, float(rng.uniform(-0.05, 0.05))),
+                material=Material(restitution=psi, friction=0.3),
+            )
+        )
+    observe = {
+        "p": Trace(quantity=Momentum()),
+        "l": Trace(quantity=AngularMomentum()),
+        "e": Trace(quantity=KineticEnergy()),
+    }
+    result = simulate(Scene(bodies=tuple(bodies)), time_step=1 / 240, steps=480, observe=observe)
+
+    assert result.counters["contacts"] > 10
+    assert np.abs(result["p"] - result["p"][0]).max() < 1e-11 * 9.0
+    assert np.abs(result["l"] - result["l"][0]).max() < (1e-11 if psi > 0.0 else 0.01)
+    assert np.diff(result["e"]).max() < 1e-6 * result["e"][0]

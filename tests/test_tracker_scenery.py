@@ -1,0 +1,121 @@
+"""The picture of a scene shows what the scene holds, where it is."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+from engine.bodies import WORLD, Particle, RigidBody
+from engine.forces import CentralGravity, Spring
+from engine.joints import Distance, Hinge
+from engine.scene import Scene
+from engine.shapes import Box, Capsule, Compound, Part, Plane, Sphere
+from scalar_tests.catalogue import CATALOGUE
+from tracker.document import SceneDrawing
+from tracker.scene_drawing import drawing
+from tracker.scenery import scenery, turned
+
+HALF_TURN_ABOUT_X = (0.0, 1.0, 0.0, 0.0)
+QUARTER_TURN_ABOUT_Z = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+
+
+def test_particles_links_and_attractors_are_drawn_where_they_are() -> None:
+    scene = Scene(
+        bodies=(Particle(name="a", position=(1.0, 0.0, 0.0), mass=1.0, velocity=(0.0, 2.0, 0.0)),),
+        constraints=(Distance(name="rod", between=("a", (0.0, 0.0, 0.0))),),
+        forces=(
+            CentralGravity(name="sun", strength=1.0),
+            Spring(name="spring", between=("a", (2.0, 0.0, 0.0)), stiffness=1.0),
+        ),
+        gravity=(0.0, 0.0, -9.81),
+    )
+
+    drawn = drawing(scene)
+
+    assert [(s.kind, s.position, s.velocity) for s in drawn.solids] == [
+        ("particle", (1.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    ]
+    assert [(link.kind, link.ends) for link in drawn.links] == [
+        ("distance", ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))),
+        ("spring", ((1.0, 0.0, 0.0), (2.0, 0.0, 0.0))),
+    ]
+    assert drawn.attractors == ((0.0, 0.0, 0.0),)
+    assert drawn.gravity == (0.0, 0.0, -9.81)
+
+
+def test_parts_of_a_compound_turn_with_their_body() -> None:
+    shape = Compound((Part(shape=Sphere(0.1), position=(1.0, 0.0, 0.0)), Part(shape=Box((1.0, 2.0, 3.0)))))
+    body = RigidBody(
+        name="b",
+        position=(5.0, 0.0, 0.0),
+        mass=1.0,
+        inertia=(1.0, 1.0, 1.0),
+        shape=shape,
+        orientation=QUARTER_TURN_ABOUT_Z,
+    )
+
+    ball, box = drawing(Scene(bodies=(body,))).solids
+
+    assert ball.position == pytest.approx((5.0, 1.0, 0.0))
+    assert box.size == (1.0, 2.0, 3.0)
+    assert box.orientation == pytest.approx(QUARTER_TURN_ABOUT_Z)
+
+
+def test_a_body_without_surface_is_drawn_as_the_box_that_turns_as_it_does() -> None:
+    edges = (1.0, 2.0, 3.0)
+    inertia = tuple((sum(e * e for e in edges) - e * e) / 12.0 * 6.0 for e in edges)
+    body = RigidBody(name="b", position=(0.0, 0.0, 0.0), mass=6.0, inertia=inertia)  # type: ignore[arg-type]
+
+    (solid,) = drawing(Scene(bodies=(body,))).solids
+
+    assert solid.size == pytest.approx(edges)
+
+
+def test_a_hinge_stands_where_it_was_put() -> None:
+    door = RigidBody(name="door", position=(0.5, 0.0, 0.0), mass=1.0, shape=Box((1.0, 0.1, 2.0)))
+    scene = Scene(bodies=(door,), constraints=(Hinge(name="h", between=("door", WORLD), at=(0.0, 0.0, 0.5)),))
+
+    (link,) = drawing(scene).links
+
+    assert link.ends == ((0.0, 0.0, 0.5), (0.0, 0.0, 0.5))
+
+
+def test_turning_is_right_handed() -> None:
+    assert turned(QUARTER_TURN_ABOUT_Z, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0))
+    assert turned(HALF_TURN_ABOUT_X, (0.0, 1.0, 2.0)) == pytest.approx((0.0, -1.0, -2.0))
+
+
+def test_a_box_shows_three_faces_and_a_plane_lies_behind_everything() -> None:
+    scene = Scene(
+        bodies=(
+            RigidBody(name="floor", position=(0.0, 0.0, -1.0), shape=Plane(), motion="static"),
+            RigidBody(name="box", position=(0.0, 0.0, 0.0), mass=1.0, shape=Box((1.0, 1.0, 1.0))),
+            RigidBody(name="rod", position=(2.0, 0.0, 0.0), mass=1.0, shape=Capsule(0.1, 1.0)),
+        )
+    )
+
+    made = scenery(drawing(scene))
+
+    assert made is not None
+    assert [shape.classes for shape in made.shapes[:2]] == ["floor", "grid"]
+    assert sum(shape.path.endswith("Z") and "solid" in shape.classes for shape in made.shapes) == 3
+    assert "1 plane, 1 box, 1 capsule" in made.description
+
+
+def test_nothing_to_see_makes_no_picture() -> None:
+    assert scenery(SceneDrawing(solids=())) is None
+
+
+@pytest.mark.parametrize("name", sorted(CATALOGUE))
+def test_every_scene_of_the_catalogue_fits_its_frame(name: str) -> None:
+    made = scenery(drawing(CATALOGUE[name].example().scene))
+
+    assert made is not None
+    for shape in made.shapes:
+        numbers = [float(n) for n in re.findall(r"-?[\d.]+", shape.path)]
+        if shape.centre is not None:
+            numbers = [float(shape.centre[0]), float(shape.centre[1])]
+        assert all(-1.0 <= x <= made.width + 1.0 for x in numbers[0::2])
+        assert all(-1.0 <= y <= made.height + 1.0 for y in numbers[1::2])
