@@ -35,6 +35,7 @@ void ParticleSystem::start_composition() {
     pending_ = 0.0;
     stage_steps_ = 0;
     halved_steps_ = 0;
+    lost_ = false;
     std::fill(history_.begin(), history_.end(), 0.0);
 }
 
@@ -53,10 +54,12 @@ void ParticleSystem::compose(std::int64_t steps) {
 }
 
 /// One step of length h. Where the equations have no solution near (a whip cracks within the step), the step is
-/// taken back and done in two halves, and so on; the order stays, `halved_steps_` counts it.
+/// taken back and done in two halves, and so on; the order stays, `halved_steps_` counts it. When the smallest part
+/// has none either, the state is lost: not a number from here on.
 void ParticleSystem::constrained_step(double h, int depth) {
     const std::span<const double> stages = composition_stages(scene_.method.composition);
     const std::size_t rows = row_.size();
+    if (lost_) return;
     std::vector<Vec3>&x = step_x_[static_cast<std::size_t>(depth)], &v = step_v_[static_cast<std::size_t>(depth)];
     x = x_;
     v = v_;
@@ -67,6 +70,7 @@ void ParticleSystem::constrained_step(double h, int depth) {
     ++stage_steps_;
     if (solved) return;
     if (depth + 1 == MOST_HALVINGS) {
+        lost_ = true;
         for (Vec3& speed : v_) speed.x = std::numeric_limits<double>::quiet_NaN();
         return;
     }

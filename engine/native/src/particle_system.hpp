@@ -161,7 +161,7 @@ private:
     std::int64_t sweeps_ = 0;
 
     // compositions
-    bool composed_ = false;
+    bool composed_ = false, lost_ = false;
     double pending_ = 0.0;             // s: half a stage still to be kicked (with rows) or drifted (without)
     std::int64_t stage_steps_ = 0;     // steps the history has seen
     std::int64_t newton_iterations_ = 0, halved_steps_ = 0;
