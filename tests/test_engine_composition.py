@@ -236,7 +236,9 @@ def test_rows_that_cannot_all_hold_end_the_run() -> None:
             Distance(name="right", between=("0", (1.0, 0.0, 0.0))),
         ),
     )
-    result = simulate(scene, time_step=0.1, steps=100_000, method=Method(composition="order8"), time_limit=5.0)
+    result = simulate(
+        scene, time_step=0.1, steps=100_000, method=Method(composition="order8"), time_limit=5.0
+    )
 
     assert result.status == "not_finite"
     assert (result.failed_body, result.failed_step, result.steps) == ("0", 1, 0)

@@ -86,7 +86,8 @@ void ParticleSystem::lay_out_paths(const std::vector<Path>& paths) {
             slot_of_row_[path.rows[k]] = static_cast<int>(row_.size());
             const int a = first + static_cast<int>(k);
             row_.push_back({a, a + 1, row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
-                            r.relaxation, r.softness, 1.0 / (row.rest_length * row.rest_length)});
+                            r.relaxation, r.softness, 1.0 / row.rest_length,
+                            1.0 / (row.rest_length * row.rest_length)});
         }
     }
     path_first_.push_back(static_cast<int>(row_.size()));
@@ -105,7 +106,8 @@ void ParticleSystem::lay_out_plain() {
         }
         slot_of_row_[k] = static_cast<int>(k);
         row_.push_back({node[0], node[1], row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
-                        r.relaxation, r.softness, 1.0 / (row.rest_length * row.rest_length)});
+                        r.relaxation, r.softness, 1.0 / row.rest_length,
+                            1.0 / (row.rest_length * row.rest_length)});
     }
 }
 
