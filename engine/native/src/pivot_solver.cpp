@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "friction_sweeps.hpp"
+
 namespace spook {
 
 namespace {
 
 constexpr int patience = 5;          // rounds without fewer offenders before Murty's rule
-constexpr double tolerance = 1e-11;  // of a velocity, relative to the system's scale
+constexpr int max_restarts = 7;      // then Murty's rule
+constexpr double tightest = 1e-11;   // tolerance of a velocity, relative to the system's scale
+constexpr double loosest = 1e-7;     // where contradicting rigid contacts leave no exact answer
 
 bool bilateral(const RowBlock& block, int i) noexcept { return block.lower[i] == -unbounded && block.upper[i] == unbounded; }
 bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == RowState::free; }
@@ -174,8 +178,22 @@ void PivotSolver::solve_free(MixedSystem& system, bool refine) {
     }
 }
 
+void PivotSolver::guess_by_sweeps(MixedSystem& system, int sweeps) {
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) block.multiplier[i] = std::clamp(block.multiplier[i], block.lower[i], block.upper[i]);
+    std::vector<FrictionPoint> none;
+    solve_iterative(system, none, FrictionModel::cone, sweeps, 0.0);
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) {
+            if (bilateral(block, i) || block.lower[i] == block.upper[i]) continue;
+            block.state[i] = block.multiplier[i] <= block.lower[i]   ? RowState::at_lower
+                             : block.multiplier[i] >= block.upper[i] ? RowState::at_upper
+                                                                     : RowState::free;
+        }
+}
+
 int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
-    const double slip = tolerance * speed_;
+    const double slip = tolerance_ * speed_;
     int count = 0, last = -1;
     std::fill(offends_.begin(), offends_.end(), 0);
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
@@ -204,6 +222,7 @@ int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
 PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     PivotReport report;
     report.converged = false;
+    tolerance_ = tightest;
     system.velocity.resize(system.mass.size());
     if (analyse(system)) same_matrix = false;
     measure(system);
@@ -219,7 +238,8 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         }
 
     // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
-    const int refined_rounds = 50 + 4 * bounded, last_round = refined_rounds + 50 + 8 * bounded;
+    const int refined_rounds = 50 + 4 * bounded;
+    const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
     int best = 1 << 30, left = patience;
     for (int round = 0; round < last_round; ++round) {
         bool stale = !same_matrix || factored_free_.empty();
@@ -244,6 +264,13 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         }
         if (count < best && refine) best = count, left = patience;
         else if (left > 0) --left;
+        if (left == 0 && report.restarts < max_restarts) {
+            tolerance_ = std::min(10.0 * tolerance_, loosest);
+            if (report.restarts > 1) guess_by_sweeps(system, 5 << report.restarts);
+            ++report.restarts;
+            best = 1 << 30, left = patience;
+            if (report.restarts > 2) continue;
+        }
         const bool all = left > 0 && refine;
         if (!all) offenders(system, false);
         for (std::size_t k = 0; k < system.rows.size(); ++k) {
