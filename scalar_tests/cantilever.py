@@ -411,7 +411,7 @@ TEST = ScalarTest(
             error=ladder_error,
             run=ladder_run,
             target_error=1e-6,
-            target_seconds=1e-2,
+            target_seconds=1.0,
         ),
     ),
 )

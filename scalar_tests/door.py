@@ -338,7 +338,7 @@ TEST = ScalarTest(
             error=ladder_error,
             run=ladder_run,
             target_error=1e-6,
-            target_seconds=1e-2,
+            target_seconds=0.1,
         ),
     ),
     stability=STUDIES,

@@ -242,7 +242,7 @@ TEST = ScalarTest(
             error=ladder_error,
             run=ladder_run,
             target_error=0.01,
-            target_seconds=1e-2,
+            target_seconds=0.1,
         ),
     ),
 )

@@ -207,8 +207,8 @@ TEST = ScalarTest(
             ),
             error=ladder_error,
             run=ladder_run,
-            target_error=1e-3,
-            target_seconds=1e-4,
+            target_error=0.01,
+            target_seconds=1e-3,
         ),
     ),
 )

@@ -246,8 +246,8 @@ TEST = ScalarTest(
             ),
             error=ladder_error,
             run=ladder_run,
-            target_error=1e-6,
-            target_seconds=1e-2,
+            target_error=0.1,
+            target_seconds=1.0,
         ),
     ),
     stability=(

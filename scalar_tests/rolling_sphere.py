@@ -186,7 +186,7 @@ TEST = ScalarTest(
             error=ladder_error,
             run=ladder_run,
             target_error=0.05,
-            target_seconds=1e-3,
+            target_seconds=0.01,
         ),
     ),
 )

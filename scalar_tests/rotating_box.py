@@ -251,8 +251,8 @@ TEST = ScalarTest(
             configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
             error=ladder_error,
             run=ladder_run,
-            target_error=1e-4,
-            target_seconds=1e-2,
+            target_error=1e-3,
+            target_seconds=0.05,
         ),
     ),
     stability=(

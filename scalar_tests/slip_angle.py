@@ -145,8 +145,8 @@ TEST = ScalarTest(
             ),
             error=ladder_error,
             run=ladder_run,
-            target_error=1e-9,
-            target_seconds=1e-3,
+            target_error=1e-3,
+            target_seconds=0.01,
         ),
     ),
 )

@@ -235,8 +235,8 @@ TEST = ScalarTest(
             ),
             error=ladder_error,
             run=ladder_run,
-            target_error=0.01,
-            target_seconds=1e-2,
+            target_error=0.02,
+            target_seconds=0.1,
         ),
         Ladder(
             name="violation",
@@ -246,8 +246,8 @@ TEST = ScalarTest(
             configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
             error=violation_error,
             run=ladder_run,
-            target_error=1e-4,
-            target_seconds=1e-2,
+            target_error=1e-3,
+            target_seconds=0.1,
         ),
     ),
 )

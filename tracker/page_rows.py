@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from tracker.events import Event, judged
-from tracker.nights import Book, State, TestHistory, Trend
+from tracker.nights import Book, Night, State, TestHistory, Trend
 from tracker.svg import sparkline
-from tracker.wording import band, clean, conditions, limit, margin, named, number, quantity, seconds, slug
+from tracker.wording import (
+    band,
+    clean,
+    conditions,
+    day,
+    limit,
+    margin,
+    named,
+    number,
+    quantity,
+    seconds,
+    slug,
+)
 
 SPARK_NIGHTS = 40
 
@@ -50,11 +63,12 @@ class Row:
     judged: bool
     failure: str
     spark: dict[str, object]
+    stale: str  # the night the value is of, if it is not tonight
     search: str
 
 
-def row(trend: Trend, title: str, address: str) -> Row:
-    """The line of one series, as of its newest night."""
+def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) -> Row:
+    """The line of one series, as of its newest night; `nights` tell whether that is tonight."""
     d = trend.definition
     inside = margin(d, trend.value)
     share = inside.share
@@ -86,6 +100,7 @@ def row(trend: Trend, title: str, address: str) -> Row:
         judged=judged(trend),
         failure=failed,
         spark=sparkline(trend.values[ends], states),
+        stale=day(nights[last].started) if nights and (last := trend.nights[-1]) != nights[-1].index else "",
         search=clean(f"{d.test} {title} {d.description} {d.configuration}").lower(),
     )
 
