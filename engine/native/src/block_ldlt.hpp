@@ -70,8 +70,9 @@ public:
 
 private:
     void place_columns(const Ordering& ordering);
-    void place_loads(const Ordering& ordering, const std::vector<std::int64_t>& block_at,
-                     const std::vector<std::int64_t>& touched);
+    void place_work(const std::vector<std::int64_t>& touched, std::vector<std::int64_t>& block_at);
+    void place_loads(const Ordering& ordering, const std::vector<std::int64_t>& touched,
+                     const std::vector<std::int64_t>& block_at);
     void find_raw(const std::vector<int>& position);
     void raw_scales();
     void refine(const double* rhs, double* x, int refinements);
@@ -92,11 +93,10 @@ private:
     std::vector<std::uint8_t> row_size_;
     std::vector<std::int32_t> row_offset_;
     LargeArray<std::int64_t> targets_;
-    std::vector<std::int64_t> pivot_at_;  // of each block, in factor_
     LargeArray<kernel::Load> loads_;
     LargeArray<std::int64_t> load_start_;
     std::vector<int> raw_start_, raw_blocks_, raw_edges_;
-    LargeArray<double> factor_, scale_, scratch_, residual_;
+    LargeArray<double> factor_, work_, scale_, residual_;
     Counters counters_;
 };
 
