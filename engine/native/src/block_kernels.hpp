@@ -19,12 +19,15 @@ struct Column {
 /// Where a block of the matrix goes in `work`. Blocks are taken when a column first needs them, so that the
 /// factor is written once while the matrix is read once.
 struct Load {
-    enum Kind : std::uint8_t { direct, transposed, diagonal, raw_diagonal, zero };
+    enum Kind : std::uint8_t { direct, transposed, diagonal, zero };
     std::int64_t from, to;
     std::int32_t offset;  // of the unknowns of a diagonal block
     std::uint8_t rows, columns;
     Kind kind;
-    bool constraint;  // a diagonal block of −Sig, which may get a shift in the factor
+    // Of diagonal blocks:
+    bool constraint = false;  // −Sig, which may get a shift in the factor
+    bool thin = false;        // only the diagonal of the block is stored
+    bool raw = false;         // its scale has been started already
 };
 
 struct Factor {

@@ -277,17 +277,22 @@ SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
             for (int a = 0; a < rows; ++a)
                 for (int b = 0; b < columns; ++b) to[b * rows + a] = from[a * columns + b];
             return;
-        case Load::diagonal:
-            for (int a = 0; a < rows; ++a) f.scale[item.offset + a] = std::abs(from[a * rows + a]);
-            break;
-        case Load::raw_diagonal:
-            for (int a = 0; a < rows; ++a) f.scale[item.offset + a] += std::abs(from[a * rows + a]);
-            break;
-        default: break;
+        case Load::diagonal: {
+            const int step = item.thin ? 1 : rows + 1;
+            double* scale = f.scale + item.offset;
+            for (int a = 0; a < rows; ++a) scale[a] = (item.raw ? scale[a] : 0.0) + std::abs(from[a * step]);
+            if (item.thin) {
+                std::fill_n(to, rows * rows, 0.0);
+                for (int a = 0; a < rows; ++a) to[a * rows + a] = from[a];
+            } else {
+                std::copy_n(from, rows * rows, to);
+            }
+            if (item.constraint && f.shift != 0.0)
+                for (int a = 0; a < rows; ++a) to[a * rows + a] -= f.shift;
+            return;
+        }
+        default: std::copy_n(from, rows * columns, to);
     }
-    std::copy_n(from, rows * columns, to);
-    if (item.constraint && f.shift != 0.0)
-        for (int a = 0; a < rows; ++a) to[a * rows + a] -= f.shift;
 }
 
 template <int U>

@@ -8,7 +8,7 @@
 namespace spook {
 
 void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                        std::span<const std::uint8_t> is_constraint) {
+                        std::span<const std::uint8_t> is_constraint, bool thin_constraints) {
     const int count = static_cast<int>(sizes.size());
     if (is_constraint.size() != sizes.size())
         throw std::invalid_argument("block LDLT: every block needs a size and a sign");
@@ -24,6 +24,7 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
     offset_.resize(count);
     diagonal_at_.resize(count);
     coupling_at_.resize(edges.size());
+    thin_ = thin_constraints;
     unknowns_ = 0;
     uniform_size_ = count ? size_[0] : 0;
     std::int64_t at = 0;
@@ -31,7 +32,7 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
         offset_[i] = unknowns_;
         unknowns_ += size_[i];
         diagonal_at_[i] = at;
-        at += size_[i] * size_[i];
+        at += thin_ && is_constraint_[i] ? size_[i] : size_[i] * size_[i];
         if (size_[i] != uniform_size_) uniform_size_ = 0;
     }
     for (std::size_t e = 0; e < edges.size(); ++e) {
@@ -181,15 +182,15 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
         const auto n = static_cast<std::uint8_t>(size_[block]);
         const int k = position[block];
         loads_[next[touched[k]]++] = {diagonal_at_[block], block_at[k], offset_[block], n, n,
-                                          raw[block] ? kernel::Load::raw_diagonal : kernel::Load::diagonal,
-                                          is_constraint_[block] != 0};
+                                      kernel::Load::diagonal, is_constraint_[block] != 0,
+                                      thin_ && is_constraint_[block], raw[block] != 0};
     }
     for (int k = 0; k < count; ++k)
         for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) {
             const int early = order_[k], late = ordering.column_rows[r];
             kernel::Load& item = loads_[next[touched[count + r]]++];
             item = {0, block_at[count + r], 0, static_cast<std::uint8_t>(size_[early]),
-                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero, false};
+                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero};
             if (edge_of[r] < 0) continue;
             item.from = coupling_at_[edge_of[r]];
             item.kind = early < late ? kernel::Load::direct : kernel::Load::transposed;
@@ -229,6 +230,7 @@ void BlockLdlt::raw_scales() {
             const auto [i, j] = edges_[raw_edges_[at]];
             const double* b = coupling(raw_edges_[at]);
             const int other = i == block ? j : i, m = size_[other];
+            if (is_constraint_[other]) continue;
             const double* d = diagonal(other);
             for (int a = 0; a < n; ++a)
                 for (int c = 0; c < m; ++c) {
@@ -277,8 +279,14 @@ double BlockLdlt::largest_constraint_scale() const noexcept {
 void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
     const kernel::Kernels& fast = kernel::kernels();
     if (r != rhs) std::copy_n(rhs, unknowns_, r);
-    for (int i = 0; i < block_count(); ++i)
-        fast.subtract_product(size_[i], size_[i], diagonal(i), x + offset_[i], r + offset_[i]);
+    for (int i = 0; i < block_count(); ++i) {
+        const double *d = diagonal(i), *from = x + offset_[i];
+        double* to = r + offset_[i];
+        if (thin_ && is_constraint_[i])
+            for (int k = 0; k < size_[i]; ++k) to[k] -= d[k] * from[k];
+        else
+            fast.subtract_product(size_[i], size_[i], d, from, to);
+    }
     for (std::size_t e = 0; e < edges_.size(); ++e) {
         const auto [i, j] = edges_[e];
         fast.subtract_coupling(size_[i], size_[j], coupling(static_cast<int>(e)), x + offset_[i], x + offset_[j],
