@@ -5,12 +5,13 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help nightly test check bench site serve clean require install develop native-tests FORCE
+.PHONY: help nightly test check bench mutants site serve clean require install develop native-tests FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
+	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make site      publish the website again from what is recorded"
 	@echo "make serve     look at the website on this machine"
 	@echo "make clean     remove what was built (the database stays)"
@@ -26,6 +27,9 @@ check: develop
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+mutants: develop
+	$(BIN)/python bench/mutants.py
 
 bench: develop
 	$(BIN)/python bench/run.py

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -114,6 +115,7 @@ class Program:
     ) -> None:
         """`shapes` are those of one sample of each observable, in order."""
         self._native = native
+        self._running = threading.Lock()  # one native state: a second thread waits
         self._choices = tuple(choices)
         self._bodies = tuple(bodies)
         self._observe = dict(observe)
@@ -138,7 +140,8 @@ class Program:
         for name, what in self._observe.items():
             if max(what.first, what.last or 0) > steps:
                 raise MethodError(f"observe {name!r}: its samples end beyond the last step, {steps}")
-        report = self._native.run(steps, time_limit or 0.0, time_stages)
+        with self._running:
+            report = self._native.run(steps, time_limit or 0.0, time_stages)
         observables: dict[str, Array] = {}
         sample_times: dict[str, Array] = {}
         for (name, what), shape, recording in zip(

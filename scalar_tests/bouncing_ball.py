@@ -6,9 +6,39 @@ import math
 
 import numpy as np
 
-from engine import Energy, Final, Maximum, Plane, Position, RigidBody, Scene, Sphere, Trace, Velocity
+from engine import (
+    PLAIN,
+    Box,
+    Energy,
+    Final,
+    Maximum,
+    Method,
+    Minimum,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
 from engine.bodies import Material
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.bracket import break_point
+from scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 
 RADIUS = 0.1  # m
 MASS = 1.0  # kg
@@ -17,6 +47,7 @@ HEIGHT = 1.0  # m, gap at the start
 RESTITUTION = 0.8
 TIME_STEP = 1e-3  # s
 BOUNCES = 5
+PLATE = 0.02  # m, thickness of the plate in the tunnelling study
 FALL = math.sqrt(2.0 * HEIGHT / GRAVITY)  # s, the first fall
 STOP = FALL * (1.0 + RESTITUTION) / (1.0 - RESTITUTION)  # s
 IMPACT_SPEED = math.sqrt(2.0 * GRAVITY * HEIGHT)  # m/s
@@ -44,17 +75,18 @@ def scene(gap: float = HEIGHT, speed: float = 0.0) -> Scene:
     return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def gaps(simulate: Simulate, time_step: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
+def gaps(
+    simulate: Simulate, time_step: float, duration: float, method: Method = PLAIN
+) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and gap [m] between ball and floor."""
-    result = simulate(
-        scene(), time_step=time_step, duration=duration, observe={"place": Trace(quantity=Position("ball"))}
-    )
+    observe = {"place": Trace(quantity=Position("ball"))}
+    result = simulate(scene(), time_step=time_step, duration=duration, method=method, observe=observe)
     return result.sample_times["place"], result["place"][:, 2] - RADIUS
 
 
-def bounce_heights(simulate: Simulate, time_step: float = TIME_STEP) -> np.ndarray:
+def bounce_heights(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> np.ndarray:
     """(BOUNCES,) peak gap [m] after each bounce."""
-    _, gap = gaps(simulate, time_step, 0.95 * STOP)
+    _, gap = gaps(simulate, time_step, 0.95 * STOP, method)
     rising = np.diff(gap) > 0.0
     peaks = np.nonzero(rising[:-1] & ~rising[1:])[0] + 1
     heights = gap[peaks]
@@ -132,6 +164,38 @@ def _draw_order(simulate: Simulate) -> Drawing:
         y_scale="log",
         note="An impact is met up to one step off, so single points scatter about first order.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest relative error of the first five heights."""
+    return float(np.abs(bounce_heights(simulate, time_step, method) / expected_heights() - 1.0).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same bounces with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=0.95 * STOP, method=method)
+
+
+def fastest_impact(simulate: Simulate) -> BreakPoint:
+    """Highest speed [m/s] at which the ball does not pass a plate of PLATE [m], at h = 1/60 s."""
+
+    def holds(speed: float) -> bool:
+        plate = RigidBody(
+            name="plate", motion="static", shape=Box((10.0, 10.0, PLATE)), position=(0.0, 0.0, -0.5 * PLATE)
+        )
+        ball = RigidBody(
+            name="ball",
+            mass=MASS,
+            shape=Sphere(RADIUS),
+            position=(0.0, 0.0, RADIUS + HEIGHT),
+            velocity=(0.0, 0.0, -speed),
+        )
+        shot = Scene(bodies=(plate, ball), gravity=(0.0, 0.0, -GRAVITY))
+        observe = {"place": Minimum(quantity=Position("ball"))}
+        result = simulate(shot, time_step=1.0 / 60.0, steps=120, observe=observe)
+        return result.completed and float(result["place"][2]) > 0.0
+
+    return break_point(holds, 0.1, 1e6, resolution=0.05, walk=15)
 
 
 TEST = ScalarTest(
@@ -243,5 +307,28 @@ TEST = ScalarTest(
     figures=(
         Figure(name="heights", title="Bounces", draw=_draw_heights),
         Figure(name="order", title="Error of the heights against the time step", draw=_draw_order),
+    ),
+    ladders=(
+        Ladder(
+            name="heights",
+            description="largest relative error of the first five heights",
+            unit="1",
+            time_steps=(4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=1.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.05,
+            target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="fastest-impact",
+            title="Fastest ball that does not pass a plate of 2 cm at h = 1/60 s",
+            configuration="plain",
+            definition="120 steps with the ball's centre always above the plate's top",
+            study=fastest_impact,
+            unit="m/s",
+        ),
     ),
 )

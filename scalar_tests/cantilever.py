@@ -12,8 +12,34 @@ import math
 import numpy as np
 from scipy.integrate import solve_bvp
 
-from engine import WORLD, Box, Final, Load, Lock, Orientation, Position, RigidBody, Scene, Trace, Velocity
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import (
+    PLAIN,
+    WORLD,
+    Box,
+    Final,
+    Load,
+    Lock,
+    Method,
+    Orientation,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+    Velocity,
+)
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 LENGTH = 12.0  # m
 COUNT = 60
@@ -27,6 +53,7 @@ LOAD = 10.0 * GRAVITY  # N at the tip
 SMALL = 1e-3  # fraction of the load at which the large-deflection terms fall below 1e-9
 TIME_STEP = 1.0 / 60.0  # s
 DAMPING = 0.5  # s, near critical for the first mode; the static answer does not depend on it
+LADDER_COUNT = 20
 COUNTS = (10, 20, 40, 80, 160, 320)
 TIP = LOAD * LENGTH**3 / (3.0 * STIFFNESS)  # m, .11673505
 LARGE_DEFLECTION = -4.0 / 35.0 * (LOAD * LENGTH**2 / STIFFNESS) ** 2  # of the tip, leading order
@@ -220,6 +247,23 @@ def _draw_against_count(simulate: Simulate) -> Drawing:
     )
 
 
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Tip of LADDER_COUNT pieces after 20 s over their statics, minus one."""
+    last = f"box {LADDER_COUNT}"
+    observe = {"last": Final(quantity=Position(last)), "turn": Final(quantity=Orientation(last))}
+    built = scene(LADDER_COUNT)
+    result = simulate(built, time_step=time_step, duration=20.0, method=method, observe=observe)
+    w, x, y, z = result["turn"]
+    half = 0.5 * LENGTH / LADDER_COUNT
+    tip = -(float(result["last"][2]) + half * 2.0 * float(x * z - w * y))
+    return tip / chain_tip(LADDER_COUNT) - 1.0
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same beam with nothing observed."""
+    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=20.0, method=method)
+
+
 TEST = ScalarTest(
     title="Cantilever",
     question="Is a real steel beam, clamped at one end and loaded at the other, simulated rightly?",
@@ -351,5 +395,23 @@ TEST = ScalarTest(
             thesis="Fig 3.37, lower",
         ),
         Figure(name="error-against-count", title="Node error against elements", draw=_draw_against_count),
+    ),
+    ladders=(
+        Ladder(
+            name="statics",
+            description="settled tip of 20 pieces against their statics",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (15, 30, 60, 120)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(
+                    name="direct, no refinement", method=Method(refinements=0), expected_order=None
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-6,
+            target_seconds=1.0,
+        ),
     ),
 )

@@ -8,75 +8,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import WORLD, Box, ConstraintForce, Hinge, RigidBody, Scene, Trace
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import PLAIN, ConstraintForce, Method, Result, Trace
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from scalar_tests.door_scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
+from scalar_tests.door_stability import STUDIES
 
-SIZE = (1.0, 0.06, 2.0)  # m
-MASS = 45.0  # kg
-GRAVITY = 10.0  # m/s²
-COMPLIANCE = 1e-13  # m/N and rad/(N m)
-PRINTED_DAMPING = 1e-13  # s, as printed in the thesis: next to nothing
-TIME_STEP = 1.0 / 60.0  # s
+LADDER_COUNT = 5
 COUNTS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 40, 60, 80)
 COUNTS_TO_200 = (1, 2, 3, 5, 10, 20, 50, 100, 200)
 MASSES = (1.0, 10.0, 45.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0)
-
-
-def hinge_points(count: int) -> np.ndarray:
-    """(count, 3) hinge points [m] from the door's centre: on its edge, evenly spaced over the height."""
-    heights = SIZE[2] * ((np.arange(count) + 0.5) / count - 0.5)
-    return np.column_stack([np.full(count, -0.5 * SIZE[0]), np.zeros(count), heights])
-
-
-def scene(
-    count: int = 2, mass: float = MASS, damping: float = PRINTED_DAMPING, compliance: float = COMPLIANCE
-) -> Scene:
-    """The door at rest, hung on `count` hinges with vertical axes."""
-    door = RigidBody(name="door", mass=mass, shape=Box(SIZE), position=(0.0, 0.0, 0.0))
-    hinges = tuple(
-        Hinge(
-            name=f"hinge {i + 1}",
-            between=(WORLD, "door"),
-            at=tuple(point),
-            axis=(0.0, 0.0, 1.0),
-            compliance=compliance,
-            damping=damping,
-        )
-        for i, point in enumerate(hinge_points(count).tolist())
-    )
-    return Scene(bodies=(door,), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY))
-
-
-def forces(
-    simulate: Simulate, steps: int, count: int = 2, time_step: float = TIME_STEP, **options: float
-) -> np.ndarray:
-    """(steps, count, 6) force [N] and torque [N m] of each hinge on the door, for steps 1 … steps."""
-    observe = {
-        f"hinge {i + 1}": Trace(quantity=ConstraintForce(f"hinge {i + 1}"), first=1) for i in range(count)
-    }
-    result = simulate(scene(count, **options), time_step=time_step, steps=steps, observe=observe)
-    return np.stack([result[name] for name in observe], axis=1)
-
-
-def least_norm_forces(count: int, mass: float = MASS) -> np.ndarray:
-    """(count, 6) hinge forces [N] and torques [N m] of least norm that hold the door (pseudo-inverse)."""
-    columns = []
-    for point in hinge_points(count):
-        push = np.eye(3)
-        turn = np.cross(np.broadcast_to(point, (3, 3)), push).T  # torque about the centre of each unit force
-        columns.append(
-            np.block([[push, np.zeros((3, 2))], [turn, np.eye(3)[:, :2]]])
-        )  # axis free: no torque z
-    balance = np.hstack(columns)  # (6, 5 count)
-    weight = np.array([0.0, 0.0, mass * GRAVITY, 0.0, 0.0, 0.0])
-    rows = (np.linalg.pinv(balance, rcond=1e-12) @ weight).reshape(count, 5)
-    return np.hstack([rows, np.zeros((count, 1))])
-
-
-def weight_error(held: np.ndarray, mass: float = MASS) -> np.ndarray:
-    """ΔFz [%] of the weight per step, eq 3.4 of the thesis."""
-    weight = mass * GRAVITY
-    return np.asarray(100.0 * (held[:, :, 2].sum(axis=1) - weight) / weight)
 
 
 def _largest(values: np.ndarray) -> float:
@@ -105,6 +56,11 @@ def _measure_split(simulate: Simulate) -> dict[str, float]:
         right = least_norm_forces(count)
         worst = max(worst, float(np.abs(held - right).max() / np.abs(right).max()))
     return {"split_error": worst}
+
+
+def _measure_singular(simulate: Simulate) -> dict[str, float]:
+    held = forces(simulate, steps=1200, count=5, damping=2.0 * TIME_STEP, compliance=0.0)
+    return {"weight_error_settled": _largest(weight_error(held))}
 
 
 def _measure_balance(simulate: Simulate) -> dict[str, float]:
@@ -162,6 +118,25 @@ def _draw_against_mass(simulate: Simulate) -> Drawing:
         y_scale="log",
         note="The ringing grows with √(m/N): heavier doors leave the printed limit.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest |ΔFz| in the second second, damping 2 h [%]."""
+    half = round(1.0 / time_step)
+    observe = {
+        f"hinge {i + 1}": Trace(quantity=ConstraintForce(f"hinge {i + 1}"), first=half)
+        for i in range(LADDER_COUNT)
+    }
+    built = scene(LADDER_COUNT, damping=2.0 * time_step)
+    result = simulate(built, time_step=time_step, duration=2.0, method=method, observe=observe)
+    held = np.stack([result[name] for name in observe], axis=1)
+    return abs(_largest(weight_error(held)))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same door with nothing observed."""
+    built = scene(LADDER_COUNT, damping=2.0 * time_step)
+    return simulate(built, time_step=time_step, duration=2.0, method=method)
 
 
 TEST = ScalarTest(
@@ -303,6 +278,25 @@ TEST = ScalarTest(
             measure=_measure_balance,
             note="Two hinges, damping 2 h.",
         ),
+        Measurement(
+            configuration="rigid",
+            time_step=TIME_STEP,
+            parameters={"N": 5},
+            metrics=(
+                Metric(
+                    name="weight_error_settled",
+                    description="largest deviation of the vertical force from the weight in 20 s, compliance 0",
+                    unit="%",
+                    role="companion",
+                    limit=1e-9,
+                    limit_source="rounding: the system is singular, its sum is not",
+                    reference=0.0,
+                    tolerance=1e-11,
+                ),
+            ),
+            measure=_measure_singular,
+            note="Five hinges of compliance 0: the split is undetermined, the sum is not.",
+        ),
     ),
     example=lambda: Example(scene=scene(damping=2.0 * TIME_STEP), time_step=TIME_STEP),
     figures=(
@@ -326,4 +320,26 @@ TEST = ScalarTest(
         ),
     ),
     seven=True,
+    ladders=(
+        Ladder(
+            name="weight",
+            description="largest deviation of the vertical force from the weight in the second second, five hinges",
+            unit="%",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(
+                    name="direct, no refinement", method=Method(refinements=0), expected_order=None
+                ),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-6,
+            target_seconds=0.1,
+        ),
+    ),
+    stability=STUDIES,
 )

@@ -311,7 +311,7 @@ TEST = ScalarTest(
             error=position_error,
             run=run,
             target_error=1.0,
-            target_seconds=1e-5,
+            target_seconds=1e-3,
         ),
     ),
 )

@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+import math
+
+from engine import PLAIN, ContactForce, Final, Method, Result
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 from scalar_tests.inclined_plane import FRICTION, TIME_STEP, force_ratio, scene, slide
 
+LADDER_SLOPE = 0.3
 MASSES = (1.0, 10.0, 1e2, 1e3, 1e4)  # kg
 SLOPES = tuple(0.05 * i for i in range(1, 15))
 
@@ -36,6 +51,19 @@ def _draw(simulate: Simulate) -> Drawing:
         y_label="F_t/F_n",
         note="The thesis' curve dips near tan θ = 0.3; Coulomb's law has no dip, and there is none here.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """|F_t/F_n − tan θ| of a box that stands at tan θ = 0.3, after 1 s."""
+    observe = {"force": Final(quantity=ContactForce("box"))}
+    result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
+    x, y, z = result["force"]
+    return abs(math.hypot(x, y) / abs(float(z)) - LADDER_SLOPE)
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
 
 
 TEST = ScalarTest(
@@ -77,6 +105,23 @@ TEST = ScalarTest(
     figures=(
         Figure(
             name="force-ratio-against-slope", title="Force ratio against slope", draw=_draw, thesis="Fig 3.17"
+        ),
+    ),
+    ladders=(
+        Ladder(
+            name="ratio",
+            description="error of F_t/F_n at tan θ = 0.3 after 1 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-9,
+            target_seconds=0.01,
         ),
     ),
 )

@@ -8,8 +8,19 @@ from __future__ import annotations
 
 import math
 
-from engine import Method
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import ContactForce, Final, Method, Result
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 from scalar_tests.inclined_plane import (
     BOX,
     CONE,
@@ -24,6 +35,7 @@ from scalar_tests.inclined_plane import (
 )
 
 DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
+LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
 SLIDING = 0.6  # tan θ, above the friction coefficient
 
 
@@ -77,6 +89,24 @@ def _draw_polar(slope: float) -> object:
         )
 
     return draw
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest |F_t/F_n − µ| over six directions after sliding for a second."""
+    worst = 0.0
+    for direction in LADDER_DIRECTIONS:
+        observe = {"force": Final(quantity=ContactForce("box"))}
+        result = simulate(
+            scene(SLIDING, direction), time_step=time_step, duration=1.0, method=method, observe=observe
+        )
+        x, y, z = result["force"]
+        worst = max(worst, abs(math.hypot(x, y) / abs(float(z)) - FRICTION))
+    return worst
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """One of these slides with nothing observed."""
+    return simulate(scene(SLIDING, LADDER_DIRECTIONS[1]), time_step=time_step, duration=1.0, method=method)
 
 
 TEST = ScalarTest(
@@ -214,4 +244,23 @@ TEST = ScalarTest(
         ),
     ),
     seven=True,
+    ladders=(
+        Ladder(
+            name="sliding",
+            description="largest error of F_t/F_n over six directions, sliding at tan θ = 0.6 for 1 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="cone", method=CONE, expected_order=None),
+                Configuration(name="cone, hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="cone, iterative", method=Method(solver="iterative"), expected_order=None),
+                Configuration(name="box", method=BOX, expected_order=None),
+                Configuration(name="scaled box", method=SCALED_BOX, expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.2,
+            target_seconds=0.1,
+        ),
+    ),
 )

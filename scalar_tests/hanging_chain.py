@@ -6,61 +6,38 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Energy, MaximumAbsolute, Method, Position, Result, Scene, Trace, Violation
-from engine.observe import Observable
-from scalar_tests.bracket import break_point, cell, is_stable, table
+from engine import PLAIN, Method, Position, Result, Trace
 from scalar_tests.case import (
-    BreakPoint,
+    Configuration,
     Drawing,
     Example,
     Figure,
+    Ladder,
     Measurement,
     Metric,
     ScalarTest,
     Simulate,
-    StabilityMap,
-    StabilityStudy,
 )
-from scalar_tests.chain import GRAVITY, LENGTH, MASS, hanging_chain, sideways_modes
+from scalar_tests.chain import LENGTH
+from scalar_tests.hanging_chain_scene import (
+    BELOW_BREAK,
+    COUNT,
+    HEAVY,
+    LIGHT,
+    OBSERVE,
+    STEPS,
+    STRING,
+    TILT,
+    TIME_STEP,
+    exact_load,
+    lift,
+    scene,
+)
+from scalar_tests.hanging_chain_stability import STUDIES
 from scalar_tests.sweep import line
 
-COUNT = 10
-TIME_STEP = 1.0 / 60.0  # s
-STEPS = 1200  # 20 s
-TILT = 0.01  # rad
-WIDE_TILT = 1.0  # rad, for the chain that swings far
-ZIGZAG = 1e-12  # m: wakes the fastest sideways mode
-STRING = Method(string_stiffness=True)
-HEAVY, LIGHT, BELOW_BREAK = 1e6, 10.0, 300.0  # load over a sphere's mass
-BOUND = 0.01  # of a link's length, and of the energy above hanging; a tenth for the chain that swings far
-WIDE_BOUND = 0.1
-MAP_SECONDS = 13.0  # two swings of the load
-MAP_RATIOS = tuple(float(r) for r in np.geomspace(1.0, 1e12, 13))
-MAP_STEPS = tuple(float(h) for h in np.geomspace(1.0 / 480.0, 0.1, 12))  # s
-OBSERVE: dict[str, Observable] = {
-    "violation": MaximumAbsolute(quantity=Violation()),
-    "places": Trace(quantity=Position()),
-    "energy": Trace(quantity=Energy(), from_start=True),
-}
-
-
-def scene(ratio: float, time_step: float = TIME_STEP, *, tilt: float = TILT, zigzag: float = 0.0) -> Scene:
-    """Ten spheres of 1 kg on rigid links, the last `ratio` times as heavy, leaning by `tilt` [rad]."""
-    return hanging_chain(COUNT, time_step, load=ratio * MASS, compliance=0.0, tilt=tilt, zigzag=zigzag)
-
-
-def lift(ratio: float, tilt: float = TILT) -> float:
-    """Energy [J] of the leaning chain above the hanging one."""
-    weight = GRAVITY * MASS * LENGTH * (COUNT * (COUNT - 1) / 2.0 + ratio * COUNT)
-    return weight * (1.0 - float(np.cos(tilt)))
-
-
-def exact_load(ratio: float, time: Any) -> Any:
-    """Sideways place [m] of the load in small motion: the sum of the ten modes."""
-    squares, shapes = sideways_modes(COUNT, ratio * MASS)
-    masses = np.append(np.full(COUNT - 1, MASS), ratio * MASS)
-    share = shapes.T @ (masses * np.sin(TILT) * LENGTH * np.arange(1, COUNT + 1))
-    return (shapes[-1] * share) @ np.cos(np.sqrt(squares)[:, None] * np.asarray(time)[None, :])
+LADDER_RATIO, LADDER_TILT = 1000.0, 1e-4  # rad: small motion to 1e-9
+STRING_HALF_STEP = Method(string_stiffness=True, half_step_velocities=True)
 
 
 def _answers(simulate: Simulate, ratio: float, method: Method) -> dict[str, float]:
@@ -90,102 +67,6 @@ def string_unneeded(simulate: Simulate) -> dict[str, float]:
     """String stiffness where plain SPOOK would do: what it costs."""
     with_it, without = _answers(simulate, LIGHT, STRING), _answers(simulate, LIGHT, PLAIN)
     return {"energy_cost": with_it["energy_lost"] - without["energy_lost"]}
-
-
-# --- stability ------------------------------------------------------------------------------------------
-
-
-def _kind(
-    simulate: Simulate,
-    ratio: float,
-    time_step: float,
-    method: Method,
-    *,
-    tilt: float = TILT,
-    zigzag: float = ZIGZAG,
-    seconds: float = STEPS * TIME_STEP,
-) -> str:
-    observe: dict[str, Observable] = {
-        "violation": Trace(quantity=Violation()),
-        "energy": Trace(quantity=Energy(), from_start=True),
-    }
-    result = simulate(
-        scene(ratio, time_step, tilt=tilt, zigzag=zigzag),
-        time_step=time_step,
-        steps=round(seconds / time_step),
-        method=method,
-        observe=observe,
-    )
-    return cell(result, _excess(result, ratio, tilt), bound=1.0)
-
-
-def _excess(result: Result, ratio: float, tilt: float) -> Any:
-    """Violation beyond what linearised rows cost, and energy gain beyond half a step's, each over its bound."""
-    bound = BOUND if tilt <= TILT else WIDE_BOUND
-    speed = COUNT * LENGTH * tilt * np.sqrt(GRAVITY / (COUNT * LENGTH))
-    curvature = 3.0 * (result.time_step * speed / COUNT) ** 2 / LENGTH
-    stretch = np.abs(result.partial["violation"]).max(axis=1) / (bound * LENGTH + curvature)
-    lag = 2.0 * result.time_step * np.sqrt(GRAVITY / (COUNT * LENGTH))
-    gain = result.partial["energy"] / lift(ratio, tilt) / (bound + lag)
-    # Below a tenth of the bounds nothing is growing, only swinging.
-    return np.maximum(0.1, np.maximum(stretch, gain))
-
-
-def _largest_ratio(method: Method, tilt: float, hard: float, resolution: float = 0.005) -> Any:
-    def study(simulate: Simulate) -> BreakPoint:
-        return break_point(
-            lambda ratio: is_stable(_kind(simulate, ratio, TIME_STEP, method, tilt=tilt)),
-            1.0,
-            hard,
-            resolution=resolution,
-            walk=13,
-        )
-
-    return study
-
-
-def _largest_offset(simulate: Simulate) -> BreakPoint:
-    """String stiffness at a million to one, started with its spheres pushed left and right in turn."""
-    return break_point(
-        lambda zigzag: is_stable(_kind(simulate, HEAVY, TIME_STEP, STRING, zigzag=zigzag)),
-        1e-12,
-        1e-3,
-        resolution=0.05,
-        walk=10,
-    )
-
-
-def predicted_break() -> float:
-    """Load ratio at which h² ω² = 4 for the fastest sideways mode: where an explicit step breaks."""
-    low, high = 1.0, 1e6
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        fastest = TIME_STEP**2 * sideways_modes(COUNT, middle * MASS)[0][-1]
-        low, high = (middle, high) if fastest < 4.0 else (low, middle)
-    return low
-
-
-def _map(method: Method) -> Any:
-    def study(simulate: Simulate) -> StabilityMap:
-        return StabilityMap(
-            x=MAP_RATIOS,
-            y=MAP_STEPS,
-            cells=table(
-                MAP_STEPS, MAP_RATIOS, lambda r, h: _kind(simulate, r, h, method, seconds=MAP_SECONDS)
-            ),
-            x_label="load over a sphere's mass",
-            y_label="time step [s]",
-            prediction=table(MAP_STEPS, MAP_RATIOS, _explicit_growth),
-            note="The prediction is the growth per step of the fastest sideways mode when it is stepped explicitly.",
-        )
-
-    return study
-
-
-def _explicit_growth(ratio: float, time_step: float) -> float:
-    """Largest |eigenvalue| of symplectic Euler on the fastest sideways mode."""
-    half = 0.5 * time_step**2 * float(sideways_modes(COUNT, ratio * MASS)[0][-1]) - 1.0
-    return 1.0 if half <= 1.0 else half + float(np.sqrt(half * half - 1.0))
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -250,12 +131,26 @@ def _metrics(role: Any, path: float, lost: float, why: str) -> tuple[Metric, ...
     )
 
 
-PREDICTED = predicted_break()
-HOLDS = (
-    "20 s (13 s in maps) without a link off by more than 1 % of its length, or energy above its start by more than "
-    "1 % of the lift, beyond what the step's own reading costs (10 % for the wide swing), and neither doubling in "
-    "the last third; spheres start 1e-12 m left and right in turn"
-)
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest distance of the load from small motion over 5 s, of the start's excursion."""
+    result = simulate(
+        scene(LADDER_RATIO, time_step, tilt=LADDER_TILT),
+        time_step=time_step,
+        duration=5.0,
+        method=method,
+        observe={"places": Trace(quantity=Position())},
+    )
+    exact = exact_load(LADDER_RATIO, result.sample_times["places"], LADDER_TILT)
+    return float(np.abs(result["places"][:, -1, 0] - exact).max()) / (COUNT * LENGTH * LADDER_TILT)
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same 5 s with nothing observed."""
+    return simulate(
+        scene(LADDER_RATIO, time_step, tilt=LADDER_TILT), time_step=time_step, duration=5.0, method=method
+    )
+
+
 TEST = ScalarTest(
     title="Hanging chain",
     question="Does a heavy load on a light chain swing as it should, however heavy it is?",
@@ -324,64 +219,30 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(HEAVY), time_step=TIME_STEP, method=STRING, observe=OBSERVE),
     figures=(Figure(name="path", title="The load at a million to one", draw=draw),),
-    stability=(
-        StabilityStudy(
-            name="mass-ratio-plain",
-            title="Largest mass ratio of a hanging chain, plain SPOOK",
-            configuration="plain",
-            definition=HOLDS,
-            study=_largest_ratio(PLAIN, TILT, 1e6),
+    stability=STUDIES,
+    ladders=(
+        Ladder(
+            name="load",
+            description="largest distance of a load of 1000 : 1 from small motion over 5 s, of its excursion",
             unit="1",
-            expected=(0.98 * PREDICTED, 1.02 * PREDICTED),
-            expected_source="h ω = 2 for the fastest sideways mode of ten links",
-        ),
-        StabilityStudy(
-            name="mass-ratio-string",
-            title="Largest mass ratio of a hanging chain, string stiffness",
-            configuration="string",
-            definition=HOLDS,
-            study=_largest_ratio(STRING, TILT, 1e12, 0.05),
-            unit="1",
-            expected=(1e9, 1e12),
-            expected_source="nothing in the method bounds it; double precision does",
-        ),
-        StabilityStudy(
-            name="mass-ratio-swinging-plain",
-            title="Largest mass ratio of a chain swinging from 1 rad, plain SPOOK",
-            configuration="plain",
-            definition=HOLDS,
-            study=_largest_ratio(PLAIN, WIDE_TILT, 1e6),
-            unit="1",
-        ),
-        StabilityStudy(
-            name="mass-ratio-swinging-string",
-            title="Largest mass ratio of a chain swinging from 1 rad, string stiffness",
-            configuration="string",
-            definition=HOLDS,
-            study=_largest_ratio(STRING, WIDE_TILT, 1e12, 0.05),
-            unit="1",
-        ),
-        StabilityStudy(
-            name="start-offset-string",
-            title="Largest sideways start offset at a million to one, string stiffness",
-            configuration="string",
-            definition=HOLDS.replace("1e-12 m ", "the offset "),
-            study=_largest_offset,
-            unit="m",
-        ),
-        StabilityStudy(
-            name="map-plain",
-            title="Mass ratio and time step, plain SPOOK",
-            configuration="plain",
-            definition=HOLDS,
-            study=_map(PLAIN),
-        ),
-        StabilityStudy(
-            name="map-string",
-            title="Mass ratio and time step, string stiffness",
-            configuration="string",
-            definition=HOLDS,
-            study=_map(STRING),
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 120)),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=2.0,
+                    order_range=(1 / 960, 1 / 120),
+                ),
+                Configuration(
+                    name="string", method=STRING, expected_order=1.0, order_range=(1 / 960, 1 / 240)
+                ),
+                Configuration(name="string, half-step", method=STRING_HALF_STEP, expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.01,
+            target_seconds=0.1,
         ),
     ),
 )

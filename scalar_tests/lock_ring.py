@@ -10,8 +10,32 @@ import math
 
 import numpy as np
 
-from engine import WORLD, Box, ConstraintForce, Lock, Position, RigidBody, Scene, Trace
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import (
+    PLAIN,
+    WORLD,
+    Box,
+    ConstraintForce,
+    Lock,
+    MaximumAbsolute,
+    Method,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+)
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 COUNT = 24
 PIECE = 0.5  # m, length of a box along the ring
@@ -19,6 +43,7 @@ MASS = 2.5  # kg
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 600
+LADDER_COUNT = 12
 
 
 def radius(count: int) -> float:
@@ -120,6 +145,18 @@ def _metrics(role: str) -> tuple[Metric, ...]:
     )
 
 
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest displacement of any box over 1 s, of the ring's diameter [%]."""
+    observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
+    result = simulate(scene(LADDER_COUNT), time_step=time_step, duration=1.0, method=method, observe=observe)
+    return 100.0 * float(result["place"].max()) / (2.0 * radius(LADDER_COUNT))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same ring with nothing observed."""
+    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=1.0, method=method)
+
+
 TEST = ScalarTest(
     title="Closed ring of locks",
     question="Does a closed ring of locks keep its shape in every direction?",
@@ -155,4 +192,25 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP),
     figures=(Figure(name="displacements", title="Displacement of every box", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="shape",
+            description="largest displacement of a ring of 12 over 1 s, of its diameter",
+            unit="%",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(
+                    name="direct, no refinement", method=Method(refinements=0), expected_order=None
+                ),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=None,
+            target_seconds=None,
+        ),
+    ),
 )

@@ -7,7 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from scalar_tests.case import Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import PLAIN, Method, Position, Result, Trace
+from scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 from scalar_tests.oscillator import (
     MASS,
     START,
@@ -72,6 +83,21 @@ def draw(simulate: Simulate) -> Drawing:
         y_label="position z [m]",
         note="Damping of two time steps is a physical damping ratio of h ω here, 0.118.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest distance from the oscillator of the continuum over 2 s [m]."""
+    observe = {"x": Trace(quantity=Position("mass"))}
+    result = simulate(
+        row_scene(STIFFNESS, DAMPING), time_step=time_step, duration=2.0, method=method, observe=observe
+    )
+    exact = _damped_wave(result.sample_times["x"])
+    return float(np.abs(result["x"][:, 2] - exact).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same oscillation with nothing observed."""
+    return simulate(row_scene(STIFFNESS, DAMPING), time_step=time_step, duration=2.0, method=method)
 
 
 TEST = ScalarTest(
@@ -169,4 +195,20 @@ TEST = ScalarTest(
     example=lambda: Example(scene=row_scene(STIFFNESS, DAMPING), time_step=TIME_STEP),
     figures=(Figure(name="damped", title="Damped oscillation", draw=draw, thesis="Fig 2.7"),),
     stability=(MAP_STUDY,),
+    ladders=(
+        Ladder(
+            name="position",
+            description="largest distance from the damped oscillator over 2 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0),
+                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=1.0),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.01,
+            target_seconds=1e-3,
+        ),
+    ),
 )

@@ -6,7 +6,18 @@ import math
 
 import numpy as np
 
-from scalar_tests.case import Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import PLAIN, Method, Position, Result, Trace
+from scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 from scalar_tests.oscillator import (
     MASS,
     REST_LENGTH,
@@ -150,6 +161,22 @@ AMPLITUDE = Metric(
     limit_source="the invariant bounds it",
 )
 
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest distance from the oscillator of the continuum over 2 s [m]."""
+    observe = {"x": Trace(quantity=Position("mass"))}
+    result = simulate(
+        row_scene(STIFFNESS, 0.0), time_step=time_step, duration=2.0, method=method, observe=observe
+    )
+    exact = START * np.cos(np.sqrt(STIFFNESS / MASS) * result.sample_times["x"])
+    return float(np.abs(result["x"][:, 2] - exact).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same oscillation with nothing observed."""
+    return simulate(row_scene(STIFFNESS, 0.0), time_step=time_step, duration=2.0, method=method)
+
+
 TEST = ScalarTest(
     title="Oscillator: distance row",
     question="Does a distance row with compliance 1/κ oscillate as a spring κ, bounded at any frequency?",
@@ -248,4 +275,20 @@ TEST = ScalarTest(
         Figure(name="fast", title="Far beyond h ω = 2", draw=draw_fast, thesis="Fig 2.6"),
     ),
     stability=(ROW_STUDY,),
+    ladders=(
+        Ladder(
+            name="position",
+            description="largest distance from x₀ cos ω t over 2 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0),
+                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.01,
+            target_seconds=1e-3,
+        ),
+    ),
 )

@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from scalar_tests.case import Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine import PLAIN, Method, Position, Result, Trace
+from scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 from scalar_tests.oscillator import MASS, START, STEPS, STIFFNESS, TIME_STEP, spring_scene, traced
 from scalar_tests.oscillator_stability import SPRING_STUDY
 from scalar_tests.sweep import line
+
+ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
 
 
 def verlet(steps: int = STEPS) -> np.ndarray:
@@ -40,6 +53,19 @@ def draw(simulate: Simulate) -> Drawing:
         y_label="position z [m]",
         note="One line: the difference is zero.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest distance from the oscillator of the continuum over 2 s [m]."""
+    observe = {"x": Trace(quantity=Position("mass"))}
+    result = simulate(spring_scene(), time_step=time_step, duration=2.0, method=method, observe=observe)
+    exact = START * np.cos(np.sqrt(STIFFNESS / MASS) * result.sample_times["x"])
+    return float(np.abs(result["x"][:, 2] - exact).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same oscillation with nothing observed."""
+    return simulate(spring_scene(), time_step=time_step, duration=2.0, method=method)
 
 
 TEST = ScalarTest(
@@ -97,4 +123,26 @@ TEST = ScalarTest(
     example=lambda: Example(scene=spring_scene(), time_step=TIME_STEP),
     figures=(Figure(name="position", title="Position against time", draw=draw, thesis="Fig 2.4"),),
     stability=(SPRING_STUDY,),
+    ladders=(
+        Ladder(
+            name="position",
+            description="largest distance from x₀ cos ω t over 2 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0),
+                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
+                Configuration(
+                    name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)
+                ),
+                Configuration(
+                    name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 240, 1 / 60)
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.01,
+            target_seconds=1e-3,
+        ),
+    ),
 )

@@ -49,6 +49,8 @@ from scalar_tests.planetarium_scene import (
 )
 
 PERIOD_STEPS = round(PERIOD / TIME_STEP)
+ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_8 = Method(composition="order8")
 OBSERVE: dict[str, Observable] = {
     "kinetic": Trace(quantity=KineticEnergy()),
     "potential": Trace(quantity=PotentialEnergy()),
@@ -330,17 +332,20 @@ TEST = ScalarTest(
             name="position",
             description="distance from Kepler's position after 1200 s",
             unit="m",
-            time_steps=(4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625, 1.0 / 60.0),
+            time_steps=(40.0, 20.0, 10.0, 5.0, 2.5, 1.25, 0.625, 0.3125, 0.125, 0.0625, 1.0 / 60.0),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 60, 0.25)),
+                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 60, 0.3125)),
                 Configuration(
-                    name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 60, 2.0)
+                    name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 60, 1.25)
                 ),
+                Configuration(name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1.25, 10.0)),
+                Configuration(name="order 6", method=ORDER_6, expected_order=6.0, order_range=(2.5, 10.0)),
+                Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(5.0, 20.0)),
             ),
             error=position_error,
             run=run,
-            target_error=1e-4,
-            target_seconds=1e-4,
+            target_error=1e-3,
+            target_seconds=1e-3,
         ),
     ),
     stability=(

@@ -2,11 +2,43 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from engine import Box, ContactForce, Energy, Maximum, Plane, Position, RigidBody, Scene, Trace
+from engine import (
+    PLAIN,
+    Box,
+    ContactForce,
+    Energy,
+    Final,
+    Maximum,
+    MaximumAbsolute,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+)
 from engine.bodies import Material
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from engine.observe import Observable
+from scalar_tests.bracket import break_count, break_point
+from scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 
 COUNT = 20
 EDGE = 1.0  # m
@@ -14,16 +46,18 @@ MASS = 1.0  # kg
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 600  # 10 s
+LADDER_COUNT = 8
+LADDER_DURATION = 2.0  # s
 
 
-def scene(count: int = COUNT) -> Scene:
-    """`count` equal boxes on top of each other, at rest, on a plane."""
+def scene(count: int = COUNT, masses: tuple[float, ...] = ()) -> Scene:
+    """`count` boxes on top of each other, at rest, on a plane; of 1 kg, or of `masses` [kg] from below."""
     smooth = Material(friction=0.5)
     floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
     boxes = (
         RigidBody(
             name=f"box {i + 1}",
-            mass=MASS,
+            mass=masses[i] if masses else MASS,
             shape=Box((EDGE, EDGE, EDGE)),
             position=(0.0, 0.0, (i + 0.5) * EDGE),
             material=smooth,
@@ -76,6 +110,52 @@ def _draw_loads(simulate: Simulate) -> Drawing:
         x_label="contact, from the floor up",
         y_label="force [N]",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest relative error of the force under each of eight boxes after 2 s."""
+    below = ["floor", *(f"box {i}" for i in range(1, LADDER_COUNT))]
+    observe = {
+        f"box {i + 1}": Final(quantity=ContactForce(f"box {i + 1}", below[i])) for i in range(LADDER_COUNT)
+    }
+    result = simulate(
+        scene(LADDER_COUNT), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
+    )
+    held = np.array([result[name][2] for name in observe])
+    return float(np.abs(held / expected(LADDER_COUNT) - 1.0).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same stack with nothing observed."""
+    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
+def _stands(simulate: Simulate, masses: tuple[float, ...], tolerance: float = 1e-6) -> bool:
+    """Whether boxes of these masses [kg], bottom first, stand still for two seconds with the right loads."""
+    built = scene(len(masses), masses)
+    names = [box.name for box in built.bodies]
+    observe: dict[str, Observable] = {
+        name: Final(quantity=ContactForce(name, below)) for below, name in pairwise(names)
+    }
+    observe["sink"] = MaximumAbsolute(quantity=Position(), from_start=True)
+    result = simulate(built, time_step=TIME_STEP, steps=120, observe=observe)
+    if not result.completed:
+        return False
+    right = GRAVITY * np.cumsum(masses[::-1])[::-1]
+    held = np.array([result[name][2] for name in names[1:]])
+    return bool(np.abs(held / right - 1.0).max() <= tolerance and result["sink"].max() <= tolerance * EDGE)
+
+
+def heaviest_on_light(simulate: Simulate) -> BreakPoint:
+    """Largest mass ratio of a box standing on a box of 1 kg."""
+    return break_point(
+        lambda ratio: _stands(simulate, (MASS, ratio * MASS)), 1.0, 1e12, resolution=0.1, walk=13
+    )
+
+
+def tallest_stack(simulate: Simulate) -> BreakPoint:
+    """Most equal boxes that stand on each other."""
+    return break_count(lambda count: _stands(simulate, (MASS,) * count), (2, 5, 10, 20, 40, 80))
 
 
 TEST = ScalarTest(
@@ -146,4 +226,46 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP),
     figures=(Figure(name="loads", title="Force of every contact", draw=_draw_loads),),
+    ladders=(
+        Ladder(
+            name="loads",
+            description="largest relative error of a contact's load in a stack of eight after 2 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+                Configuration(
+                    name="iterative, 200 sweeps",
+                    method=Method(solver="iterative", iterations=200),
+                    expected_order=None,
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.1,
+            target_seconds=1.0,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="heavy-on-light",
+            title="Largest mass ratio of a box on a lighter box",
+            configuration="plain",
+            definition="2 s with every load right to 1e-6 and nothing moved by more than 1e-6 of an edge",
+            study=heaviest_on_light,
+            unit="1",
+        ),
+        StabilityStudy(
+            name="tallest-stack",
+            title="Tallest stack of equal boxes",
+            configuration="plain",
+            definition="2 s with every load right to 1e-6 and nothing moved by more than 1e-6 of an edge",
+            study=tallest_stack,
+            unit="boxes",
+        ),
+    ),
 )

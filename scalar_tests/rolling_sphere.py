@@ -4,9 +4,32 @@ from __future__ import annotations
 
 import math
 
-from engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Velocity
+from engine import (
+    PLAIN,
+    AngularVelocity,
+    Final,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Velocity,
+)
 from engine.bodies import Material
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 RADIUS = 0.5  # m
 MASS = 1.0  # kg
@@ -14,6 +37,7 @@ GRAVITY = 10.0  # m/s²
 FRICTION = 0.2
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 120
+LADDER_DURATION = 2.0  # s
 ROLLING, SLIDING = 0.4, 1.0  # tan θ; a solid sphere rolls up to 3.5 µ = 0.7
 
 
@@ -99,6 +123,20 @@ def _metric(name: str, description: str, role: str) -> Metric:
     )
 
 
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Distance rolled in 2 s minus ½ a t² [m]."""
+    observe = {"place": Final(quantity=Position("ball"), from_start=True)}
+    result = simulate(
+        scene(ROLLING), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
+    )
+    return float(result["place"][0]) - 0.5 * accelerations(ROLLING)[0] * LADDER_DURATION**2
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same rolling with nothing observed."""
+    return simulate(scene(ROLLING), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
 TEST = ScalarTest(
     title="Rolling and sliding sphere",
     question="Does a sphere on a slope roll while friction can hold its contact, and slide beyond?",
@@ -134,4 +172,21 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(ROLLING), time_step=TIME_STEP),
     figures=(Figure(name="speed-against-slope", title="Speed and spin against slope", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="distance",
+            description="distance rolled in 2 s against ½ a t²",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.05,
+            target_seconds=0.01,
+        ),
+    ),
 )

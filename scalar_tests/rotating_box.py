@@ -12,16 +12,33 @@ import numpy as np
 from scipy.special import ellipk
 
 from engine import (
+    PLAIN,
     AngularMomentum,
     AngularVelocity,
     KineticEnergy,
     MaximumAbsolute,
+    Method,
     Orientation,
+    Result,
     RigidBody,
     Scene,
     Trace,
 )
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.bracket import break_point
+from scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 
 INERTIA = (0.9144, 1.098, 1.66)  # kg m²
 SPIN = (0.05, 1.0, 0.05)  # rad/s, body axes
@@ -51,22 +68,22 @@ def flip_time() -> float:
     return float(2.0 * ellipk(modulus2) / np.sqrt(rate2))
 
 
-def body_spin(simulate: Simulate, time_step: float) -> tuple[np.ndarray, np.ndarray]:
+def body_spin(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and (samples, 3) angular velocity [rad/s] in body axes."""
     observe = {
         "spin": Trace(quantity=AngularVelocity("body")),
         "turn": Trace(quantity=Orientation("body")),
     }
-    result = simulate(scene(), time_step=time_step, duration=DURATION, observe=observe)
+    result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     w, axis = result["turn"][:, :1], -result["turn"][:, 1:]
     spin = result["spin"]
     twice = 2.0 * np.cross(axis, spin)
     return result.sample_times["spin"], spin + w * twice + np.cross(axis, twice)
 
 
-def measured_flip_time(simulate: Simulate, time_step: float = TIME_STEP) -> float:
+def measured_flip_time(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
     """Mean time [s] between zero crossings of the spin about the middle axis; NaN with fewer than two."""
-    times, spin = body_spin(simulate, time_step)
+    times, spin = body_spin(simulate, time_step, method)
     middle = spin[:, 1]
     crossing = np.nonzero((middle[:-1] > 0.0) != (middle[1:] > 0.0))[0]
     if len(crossing) < 2:
@@ -123,6 +140,32 @@ def _draw_order(simulate: Simulate) -> Drawing:
         x_scale="log",
         y_scale="log",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Relative error of the mean time between flips."""
+    return measured_flip_time(simulate, time_step, method) / flip_time() - 1.0
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same tumbling with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
+
+
+def highest_spin(simulate: Simulate) -> BreakPoint:
+    """Largest h |ω| about the axis of largest inertia, a little off it."""
+
+    def holds(turn: float) -> bool:
+        spin = (1e-3 * turn / TIME_STEP, 0.0, turn / TIME_STEP)
+        body = RigidBody(
+            name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=spin
+        )
+        observe = {"turn": MaximumAbsolute(quantity=AngularMomentum(), from_start=True)}
+        result = simulate(Scene(bodies=(body,)), time_step=TIME_STEP, steps=2000, observe=observe)
+        momentum = INERTIA[2] * turn / TIME_STEP
+        return result.completed and float(result["turn"].max()) <= 1e-9 * momentum
+
+    return break_point(holds, 0.01, 10.0, resolution=1e-3)
 
 
 TEST = ScalarTest(
@@ -198,5 +241,30 @@ TEST = ScalarTest(
     figures=(
         Figure(name="spin", title="Angular velocity in body axes", draw=_draw_spin),
         Figure(name="order", title="Error of the flip time against the time step", draw=_draw_order),
+    ),
+    ladders=(
+        Ladder(
+            name="flip-time",
+            description="relative error of the time between flips",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (7.5, 15.0, 30.0, 60.0, 120.0)),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.05,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="highest-spin",
+            title="Highest spin h |ω| about the axis of largest inertia",
+            configuration="plain",
+            definition="2000 steps, angular momentum kept to 1e-9",
+            study=highest_spin,
+            unit="1",
+            expected=(0.998, 1.0),
+            expected_source="c x = h |ω|, c = √(1 − x²/4), the equation of the mid-step spin x, has a root up to h |ω| = 1",
+        ),
     ),
 )

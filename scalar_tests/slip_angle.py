@@ -4,9 +4,22 @@ from __future__ import annotations
 
 import math
 
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
-from scalar_tests.inclined_plane import FRICTION, TIME_STEP, scene, slip_slope, slips
+from engine import PLAIN, Final, Method, Result, Velocity
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from scalar_tests.inclined_plane import FRICTION, GRAVITY, TIME_STEP, scene, slip_slope, slips
 
+LADDER_SLOPE = 0.51
 COEFFICIENTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 
@@ -36,6 +49,20 @@ def _draw_angle(simulate: Simulate) -> Drawing:
         y_label="angle at which the box slides [rad]",
         note="Above µ = 1 a cube tips over before it slides, so the sweep ends at 0.9.",
     )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Speed after 1 s just beyond the friction angle minus g (sin θ − µ cos θ) t [m/s]."""
+    observe = {"velocity": Final(quantity=Velocity("box"))}
+    result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
+    tilt = math.atan(LADDER_SLOPE)
+    x, y, _ = result["velocity"]
+    return math.hypot(x, y) - GRAVITY * (math.sin(tilt) - FRICTION * math.cos(tilt))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
 
 
 TEST = ScalarTest(
@@ -103,6 +130,23 @@ TEST = ScalarTest(
             title="Angle at which the box slides against the friction coefficient",
             draw=_draw_angle,
             thesis="Fig 3.16",
+        ),
+    ),
+    ladders=(
+        Ladder(
+            name="slide",
+            description="speed after 1 s at tan θ = 0.51 against g (sin θ − µ cos θ) t, µ = 0.5",
+            unit="m/s",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.01,
         ),
     ),
 )

@@ -9,21 +9,35 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ellipk
+from scipy.special import ellipj, ellipk
 
 from engine import (
+    PLAIN,
     WORLD,
     Box,
     Energy,
     Hinge,
     JointCoordinate,
     MaximumAbsolute,
+    Method,
+    Result,
     RigidBody,
     Scene,
     Trace,
     Violation,
 )
-from scalar_tests.case import Curve, Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
+from scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 
 SIZE = (1.0, 0.06, 2.0)  # m
 MASS = 45.0  # kg
@@ -32,20 +46,21 @@ LEAN = math.radians(30.0)  # of the hinge axis from the vertical
 START = 0.5 * math.pi  # rad from the lowest position
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 22.0  # s
+LADDER_DURATION = 10.0  # s
 LEVER = 0.5 * SIZE[0]  # m, from the axis to the centre of mass
 INERTIA = MASS * (SIZE[0] ** 2 + SIZE[1] ** 2) / 12.0 + MASS * LEVER**2  # kg m², about the axis
 ACROSS = GRAVITY * math.sin(LEAN)  # m/s², gravity across the axis
 PERIOD = 4.0 * math.sqrt(INERTIA / (MASS * ACROSS * LEVER)) * float(ellipk(math.sin(0.5 * START) ** 2))  # s
 
 
-def scene() -> Scene:
-    """Door with its hinge axis along z through the origin; gravity leans towards +x instead of the axis."""
+def scene(damping: float = TIME_STEP) -> Scene:
+    """`damping` in s. Door with its hinge axis along z through the origin; gravity leans towards +x instead of the axis."""
     pull = (GRAVITY * math.sin(LEAN), 0.0, -GRAVITY * math.cos(LEAN))
     turn = (math.cos(0.5 * START), 0.0, 0.0, math.sin(0.5 * START))
     place = (LEVER * math.cos(START), LEVER * math.sin(START), 0.0)
     door = RigidBody(name="door", mass=MASS, shape=Box(SIZE), position=place, orientation=turn)
     hinges = tuple(
-        Hinge(name=name, between=(WORLD, "door"), at=(0.0, 0.0, height), compliance=1e-13, damping=TIME_STEP)
+        Hinge(name=name, between=(WORLD, "door"), at=(0.0, 0.0, height), compliance=1e-13, damping=damping)
         for name, height in (("lower", -0.75), ("upper", 0.75))
     )
     return Scene(bodies=(door,), constraints=hinges, gravity=pull, contacts=False)
@@ -101,6 +116,36 @@ def _draw(simulate: Simulate) -> Drawing:
         x_label="time [s]",
         y_label="angle from the lowest position [degrees]",
     )
+
+
+def exact_angle(time: np.ndarray) -> np.ndarray:
+    """Angle [rad] from the lowest position: sin(φ/2) = k cd(ω t | k²), k = sin(φ₀/2), by elliptic functions."""
+    modulus = math.sin(0.5 * START) ** 2
+    _, cn, dn, _ = ellipj(time * math.sqrt(MASS * ACROSS * LEVER / INERTIA), modulus)
+    return np.asarray(2.0 * np.arcsin(math.sqrt(modulus) * cn / dn))
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest |angle − exact| over 10 s [rad]."""
+    observe = {"angle": Trace(quantity=JointCoordinate("upper"))}
+    built = scene(time_step / method.substeps)
+    result = simulate(built, time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
+    angle = START + np.unwrap(result["angle"])
+    return float(np.abs(angle - exact_angle(result.sample_times["angle"])).max())
+
+
+def violation_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest violation of a hinge over 10 s [m]."""
+    observe = {"upper": MaximumAbsolute(quantity=Violation("upper"))}
+    built = scene(time_step / method.substeps)
+    result = simulate(built, time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
+    return float(result["upper"][:3].max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same swing with nothing observed."""
+    built = scene(time_step / method.substeps)
+    return simulate(built, time_step=time_step, duration=LADDER_DURATION, method=method)
 
 
 TEST = ScalarTest(
@@ -173,4 +218,36 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP),
     figures=(Figure(name="swing", title="Angle of the door", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="angle",
+            description="largest angle error over 10 s against elliptic functions",
+            unit="rad",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
+                Configuration(
+                    name="two substeps",
+                    method=Method(substeps=2),
+                    expected_order=1.0,
+                    order_range=(1 / 960, 1 / 240),
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.02,
+            target_seconds=0.1,
+        ),
+        Ladder(
+            name="violation",
+            description="largest violation of a hinge over 10 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            error=violation_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.1,
+        ),
+    ),
 )

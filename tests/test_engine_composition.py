@@ -227,6 +227,23 @@ def test_a_whip_is_halved_not_lost() -> None:
     assert result.counters["halved_steps"] > 0
 
 
+def test_rows_that_cannot_all_hold_end_the_run() -> None:
+    """A body stretched between two walls cannot move sideways: no part of a step has a solution."""
+    scene = Scene(
+        bodies=(Particle(name="0", mass=1.0, position=(0.0, 0.0, 0.0), velocity=(0.0, 1.0, 0.0)),),
+        constraints=(
+            Distance(name="left", between=((-1.0, 0.0, 0.0), "0")),
+            Distance(name="right", between=("0", (1.0, 0.0, 0.0))),
+        ),
+    )
+    result = simulate(
+        scene, time_step=0.1, steps=100_000, method=Method(composition="order8"), time_limit=5.0
+    )
+
+    assert result.status == "not_finite"
+    assert (result.failed_body, result.failed_step, result.steps) == ("0", 1, 0)
+
+
 def test_what_cannot_be_composed_is_refused() -> None:
     soft = Distance(name="rope", between=((0.0, 0.0, 0.0), "0"), compliance=1e-3)
     short = Distance(name="short", between=((0.0, 0.0, 0.0), "0"), rest_length=0.9)

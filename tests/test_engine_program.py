@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -143,6 +147,25 @@ def test_a_run_that_takes_too_long_is_stopped() -> None:
     assert result.status == "timed_out"
     assert 0 < result.steps < 1e15
     assert "0.05 s" in result.failure
+
+
+def test_the_keyboard_interrupts_a_run() -> None:
+    threading.Timer(0.3, signal.raise_signal, [signal.SIGINT]).start()
+    begin = time.perf_counter()
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(pendulum(), time_step=1e-9, duration=1e6, time_limit=20.0)
+    assert time.perf_counter() - begin < 10.0
+
+
+def test_threads_may_share_a_program() -> None:
+    program = compile(pendulum(), time_step=0.01, observe={"energy": Maximum(quantity=Energy())})
+    alone = program.run(20_000)
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(program.run, [20_000] * 8))
+
+    assert {result.state_hash for result in together} == {alone.state_hash}
+    assert {float(result["energy"]) for result in together} == {float(alone["energy"])}
 
 
 @pytest.mark.parametrize("time_step", [0.0, -1.0, math.nan, math.inf, "1", True])

@@ -48,7 +48,8 @@ def test_a_polar_chart_is_drawn_in_the_plane() -> None:
 
     assert flat.lines[0].x == pytest.approx((2.0, 0.0), abs=1e-15)
     assert flat.lines[0].y == pytest.approx((0.0, 2.0))
-    assert max(flat.rings) >= 2.0
+    assert flat.reach > 2.0
+    assert 0.5 < max(flat.rings) <= flat.reach
 
 
 @given(st.lists(NUMBERS, min_size=1, max_size=60))

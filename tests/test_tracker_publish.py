@@ -13,6 +13,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import ClassVar
 
+import msgspec
 import plotly.graph_objects as go
 import plotly.offline
 import pytest
@@ -145,6 +146,8 @@ def test_the_json_files_are_strict_json(site: Path) -> None:
 
     whole = json.loads((site / "data" / "n_pendulum.json").read_text(), parse_constant=refuse)
 
+    tonight = json.loads((site / "data" / "tonight.json").read_text(), parse_constant=refuse)
+    assert {"friction", "beam"} < {line["test"] for line in tonight}
     values = [v for series in whole["series"] for v in series["values"]]
     assert "nan" in values
     assert len(whole["nights"]) == 30
@@ -267,6 +270,31 @@ def test_ten_years_of_nights_are_published_in_seconds(tmp_path: Path) -> None:
 
     assert taken < 20.0
     assert max(path.stat().st_size for path in (tmp_path / "public" / "tests").iterdir()) < 1_500_000
+
+
+def test_values_without_a_description_have_a_page_too(tmp_path: Path) -> None:
+    """Results of another tool may come with nothing but numbers."""
+    bare = msgspec.structs.replace(document(0), tests=())
+    publish(DocumentHistory([bare]), tmp_path / "public")
+
+    assert "said nothing about the scene" in (tmp_path / "public" / "tests" / "beam.html").read_text()
+    assert Reader((tmp_path / "public" / "index.html").read_text()).open == []
+
+
+def test_a_night_of_one_test_does_not_pass_for_the_others(tmp_path: Path) -> None:
+    whole, part = document(0), document(1)
+    keys = {s.key for s in part.series if s.test == "beam"}
+    short = msgspec.structs.replace(
+        part,
+        series=tuple(s for s in part.series if s.key in keys),
+        samples=tuple(s for s in part.samples if s.series in keys),
+        tests=tuple(t for t in part.tests if t.name == "beam"),
+    )
+    publish(DocumentHistory([whole, short]), tmp_path / "public")
+    text = " ".join(" ".join(Reader((tmp_path / "public" / "index.html").read_text()).texts).split())
+
+    assert "1 test was put to spook 0.1.1. 6 were not run tonight." in text
+    assert text.count("of 2026-10-01, not run tonight") == 6
 
 
 def test_a_value_that_is_no_number_is_never_green(tmp_path: Path) -> None:

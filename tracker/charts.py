@@ -54,6 +54,7 @@ class Chart:
     note: str = ""
     thesis: str = ""
     direct: bool = False  # horizontal lines carry their names, so no legend is needed
+    reach: float = 1.0  # of a polar chart drawn flat: how far its axes go from the centre
     rings: tuple[float, ...] = ()  # of a polar chart drawn flat: radii of its grid
 
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -153,7 +154,14 @@ def flattened(chart: Chart) -> Chart:
         y = tuple(y * math.sin(angle) for angle, y in turned)
         lines.append(replace(line, x=x, y=y, notes=notes))
     rings = tuple(r for r in ticks(0.0, top, "linear", 4) if r > 0.0)
-    return replace(chart, lines=tuple(lines), rings=rings, x_scale="linear", y_scale="linear")
+    return replace(
+        chart,
+        lines=tuple(lines),
+        rings=rings,
+        reach=1.12 * max(radii, default=1.0) or 1.0,
+        x_scale="linear",
+        y_scale="linear",
+    )
 
 
 def range_of(values: Sequence[float], scale: Scale, extra: float = 0.05) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tracker.cli_history import compare, explain, list_tests, show, trend
-from tracker.cli_options import RED, OneLineErrors, database_option, example, source_options
+from tracker.cli_options import RED, OneLineErrors, database_option, example, source_options, workers_option
 from tracker.cli_storage import db, export, import_files, schema
 
 FIRST_STEPS = """\
@@ -59,7 +59,7 @@ def _print_versions() -> None:
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
-@click.option("--workers", default=2, show_default=True, help="Processes that measure values.")
+@workers_option
 @source_options
 @database_option
 def run_command(
@@ -94,7 +94,7 @@ def run_command(
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
-@click.option("--workers", default=2, show_default=True, help="Processes that measure values.")
+@workers_option
 @click.option(
     "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
 )
@@ -146,7 +146,9 @@ def publish(out: Path, database: str) -> None:
 
 @main.command(epilog=example("tracker serve public --port 8000"))
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--port", default=8000, show_default=True)
+@click.option(
+    "--port", default=8000, show_default=True, type=click.IntRange(0, 65535), help="0: any free one."
+)
 def serve(folder: Path, port: int) -> None:
     """Look at a published website on this machine."""
     from functools import partial

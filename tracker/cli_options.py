@@ -53,6 +53,17 @@ def source_options(command: Command) -> Command:
     return command
 
 
+def workers_option(command: Command) -> Command:
+    """How many processes measure values; run times are always taken alone."""
+    return click.option(
+        "--workers",
+        default=2,
+        show_default=True,
+        type=click.IntRange(1, 256),
+        help="Processes that measure values.",
+    )(command)
+
+
 def example(*lines: str) -> str:
     """The example at the end of a command's help."""
     return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)

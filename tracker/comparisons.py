@@ -19,7 +19,7 @@ from tracker.compare_document import Change, CompareDocument
 from tracker.document import Number, from_number
 from tracker.events import Event
 from tracker.nights import Book, Night, Source
-from tracker.wording import clean, day, number, opening, quantity, short_hash, slug, version
+from tracker.wording import clean, conditions, day, named, number, quantity, short_hash, slug, version
 
 NEWEST = 10  # versions to choose from
 RELEASES = 6  # and the newest releases before them
@@ -52,7 +52,9 @@ def comparisons(
     sides: dict[str, Measured] = {}
     titles = {test.name: test.card.title for test in book.tests}
     descriptions = {
-        t.definition.key: opening(t.definition.description) for test in book.tests for t in test.trends
+        t.definition.key: f"{named(t.definition)[0]} ({conditions(t.definition)})"
+        for test in book.tests
+        for t in test.trends
     }
     first_bad = {
         e.trend.definition.key: (short_hash(e.good.engine) if e.good else "", short_hash(e.first.engine))
@@ -153,7 +155,7 @@ def _change(change: Change, titles: dict[str, str], descriptions: dict[str, str]
         "red" if change.red else "",
         f"tests/{slug(change.test)}.html",
         clean(titles.get(change.test, change.test)),
-        clean(f"{descriptions.get(change.series, change.metric)} ({change.configuration})"),
+        clean(descriptions.get(change.series, f"{change.metric} ({change.configuration})")),
         _value(change.before, change.unit),
         _value(change.after, change.unit),
         said,

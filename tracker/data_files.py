@@ -47,9 +47,29 @@ def table(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
     return out.getvalue().encode("utf-8", "replace")
 
 
-def newest_csv(book: Book, tests: Sequence[TestHistory]) -> bytes:
+def records(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
+    """The same table as JSON: a list of objects, non-finite numbers as strings."""
+    found = [
+        {
+            name: to_number(cell) if isinstance(cell, float) else cell
+            for name, cell in zip(columns, line, strict=True)
+        }
+        for line in lines
+    ]
+    return json.dumps(found, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
+
+
+Table = tuple[Sequence[str], list[list[Any]]]  # names of the columns, lines
+
+
+def newest(book: Book, tests: Sequence[TestHistory]) -> Table:
     """Every series of some tests at its newest night, a line each."""
-    return table(COLUMNS, (_line(trend, book.nights) for test in tests for trend in test.trends))
+    return COLUMNS, [_line(trend, book.nights) for test in tests for trend in test.trends]
+
+
+def newest_csv(book: Book, tests: Sequence[TestHistory]) -> bytes:
+    """`newest` as CSV."""
+    return table(*newest(book, tests))
 
 
 def _line(trend: Trend, nights: Sequence[Night]) -> list[Any]:
@@ -95,13 +115,13 @@ def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list
             yield [night.started, night.engine.version, night.engine.git_hash, *line]
 
 
-def regressions_csv(events: Sequence[Event]) -> bytes:
+def regressions(events: Sequence[Event]) -> Table:
     """Every regression: what, from what to what, between which commits, and what became of it."""
     columns = (
         "series", "name", "sentence", "before", "after", "unit", "last_good", "first_bad", "first_bad_started",
         "standing", "ended", "accepted",
     )  # fmt: skip
-    return table(columns, (_event_line(event) for event in events))
+    return columns, [_event_line(event) for event in events]
 
 
 def _event_line(event: Event) -> list[Any]:
@@ -113,14 +133,14 @@ def _event_line(event: Event) -> list[Any]:
     ]  # fmt: skip
 
 
-def nights_csv(book: Book) -> bytes:
+def nights(book: Book) -> Table:
     """All nights: what ran when, where, on which engine."""
     columns = (
         "run", "started", "finished", "trigger", "engine", "version", "git_hash", "changed_tree", "commit_time",
         "compiler", "flags", "machine", "processor", "cores", "operating_system", "float_environment", "tracker",
         "ci_address",
     )  # fmt: skip
-    return table(columns, (_night_line(night) for night in book.nights))
+    return columns, [_night_line(night) for night in book.nights]
 
 
 def _night_line(night: Night) -> list[Any]:

@@ -13,7 +13,19 @@ from tracker.events import Event
 from tracker.figures import figure, grid_figure
 from tracker.nights import Night, TestHistory, Trend
 from tracker.svg import Picture, grid_picture, picture
-from tracker.wording import clean, day, number, opening, quantity, seconds, short_hash, slug, version
+from tracker.wording import (
+    clean,
+    conditions,
+    day,
+    named,
+    number,
+    opening,
+    quantity,
+    seconds,
+    short_hash,
+    slug,
+    version,
+)
 
 MOST_NIGHTS = 1500  # points of one trend; a value that stands still costs two, so this is many years
 TABLE_ROWS = 60
@@ -122,8 +134,7 @@ def trend_chart(
     magnitude = "magnitude of " if scale == "log" and any(v < 0.0 for v in values) else ""
     return Chart(
         name=f"v-{slug(definition.key)}",
-        title=(f"{title}: " if title else "")
-        + opening(f"{definition.description} ({definition.configuration})"),
+        title=(f"{title}: " if title else "") + f"{named(definition)[0]} ({conditions(definition)})",
         x_label="night",
         y_label=f"{magnitude}value" + (f" [{definition.unit}]" if definition.unit != "1" else ""),
         lines=tuple(lines),
@@ -181,7 +192,9 @@ def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
         return "linear", list(limit), ""
     one_sign = trend.definition.better == "smaller_magnitude" or min(trend.values) > 0.0
     decades = math.log10(max(sizes) / min(sizes))
-    if one_sign and (decades > 1.5 or (limit is not None and not 0.2 < limit / max(sizes) < 5.0)):
+    if one_sign and (
+        decades > 1.5 or (limit is not None and limit > 0.0 and not 0.2 < limit / max(sizes) < 5.0)
+    ):
         return "log", [limit] if limit is not None and limit > 0.0 else [], ""
     if limit is None:
         return "linear", [], ""

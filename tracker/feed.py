@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tracker.events import Event
 from tracker.nights import Book, Night
-from tracker.wording import clean, instant, limit, opening, quantity, short_hash, version
+from tracker.wording import clean, conditions, instant, limit, named, quantity, short_hash, version
 
 ATOM = "http://www.w3.org/2005/Atom"
 MOST_ENTRIES = 100
@@ -42,7 +42,7 @@ def _entry(feed: ElementTree.Element, night: Night, event: Event, word: str, add
     _put(entry, "id", f"tag:spook-tracker,2026:{_code(d.key, night.id, word)}")
     _put(entry, "updated", _moment(night))
     ElementTree.SubElement(entry, f"{{{ATOM}}}link", {"href": address})
-    told = f"{opening(clean(d.description))} ({clean(d.configuration)}): "
+    told = f"{clean(named(d)[0])} ({clean(conditions(d))}): "
     told += f"{quantity(event.before, d.unit, 6)} before, {quantity(event.value, d.unit, 6)} after; limit {limit(d)}. "
     _put(entry, "summary", told + f"Commit {short_hash(night.engine) or 'unknown'}.")
 

@@ -39,10 +39,10 @@ def index(book: Book, events: Sequence[Event]) -> Page:
     held = [trend for trend in banded if trend.held[-1]]
     open_events = [e for e in events if e.lasting]
     state, kept, _ = health(book, events)
-    seven = [row(t, test.card.title, address(test)) for test, t in gates if test.card.seven]
-    others = [row(t, test.card.title, address(test)) for test, t in gates if not test.card.seven]
+    seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
+    others = [row(t, test.card.title, address(test), book.nights) for test, t in gates if not test.card.seven]
     others += [
-        row(trend, test.card.title, address(test))
+        row(trend, test.card.title, address(test), book.nights)
         for test in book.tests
         if not test.gates()
         for trend in test.companions()[:1]
@@ -102,10 +102,12 @@ def summary(book: Book) -> str:
         of = "the thesis’ seven tests" if tests == 7 else f"{tests} of the thesis’ seven tests"
         how_many = f"All {len(seven)}" if kept == len(seven) else f"{kept} of {len(seven)}"
         parts.append(f"{how_many} gates of {of} hold.")
-    tests = len({test.name for test, _ in fresh})
-    parts.append(
-        f"{tests} tests were put to {clean(book.tonight.engine.name)} {version(book.tonight.engine)}."
-    )
+    put = {test.name for test, _ in fresh}
+    engine = f"{clean(book.tonight.engine.name)} {version(book.tonight.engine)}"
+    parts.append(f"{len(put)} {'test was' if len(put) == 1 else 'tests were'} put to {engine}.")
+    missed = [test for test in book.tests if test.gates() and test.name not in put]
+    if missed:
+        parts.append(f"{len(missed)} {'was' if len(missed) == 1 else 'were'} not run tonight.")
     if red:
         names = list(dict.fromkeys(trend.definition.test for trend in red))
         parts.append("Red: " + ", ".join(clean(n)[:60] for n in names[:5]) + ("…" if len(names) > 5 else "."))

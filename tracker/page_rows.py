@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from tracker.events import Event, judged
-from tracker.nights import Book, State, TestHistory, Trend
+from tracker.nights import Book, Night, State, TestHistory, Trend
 from tracker.svg import sparkline
-from tracker.wording import band, clean, limit, margin, number, opening, quantity, seconds, slug
+from tracker.wording import (
+    band,
+    clean,
+    conditions,
+    day,
+    limit,
+    margin,
+    named,
+    number,
+    quantity,
+    seconds,
+    slug,
+)
 
 SPARK_NIGHTS = 40
 
@@ -34,6 +47,7 @@ class Row:
     title: str
     address: str
     what: str
+    definition: str  # of stable, for a break point
     configuration: str
     time_step: str
     time_step_value: float | str
@@ -49,11 +63,12 @@ class Row:
     judged: bool
     failure: str
     spark: dict[str, object]
+    stale: str  # the night the value is of, if it is not tonight
     search: str
 
 
-def row(trend: Trend, title: str, address: str) -> Row:
-    """The line of one series, as of its newest night."""
+def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) -> Row:
+    """The line of one series, as of its newest night; `nights` tell whether that is tonight."""
     d = trend.definition
     inside = margin(d, trend.value)
     share = inside.share
@@ -68,7 +83,8 @@ def row(trend: Trend, title: str, address: str) -> Row:
         test=d.test,
         title=title,
         address=address,
-        what=opening(d.description),
+        what=named(d)[0],
+        definition=named(d)[1],
         configuration=d.configuration,
         time_step=number(d.time_step, 4),
         time_step_value="" if d.time_step is None else d.time_step,
@@ -84,6 +100,7 @@ def row(trend: Trend, title: str, address: str) -> Row:
         judged=judged(trend),
         failure=failed,
         spark=sparkline(trend.values[ends], states),
+        stale=day(nights[last].started) if nights and (last := trend.nights[-1]) != nights[-1].index else "",
         search=clean(f"{d.test} {title} {d.description} {d.configuration}").lower(),
     )
 
@@ -109,7 +126,7 @@ def event_row(event: Event, book: Book) -> dict[str, Any]:
     test = next(t for t in book.tests if t.name == d.test)
     return {
         "test": test.card.title,
-        "what": opening(f"{d.description} ({d.configuration})"),
+        "what": f"{named(d)[0]} ({conditions(d)})",
         "address": address(test),
         "anchor": f"e-{slug(d.key + '/' + event.first.id)}",
         "state": event.state,

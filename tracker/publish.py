@@ -97,20 +97,25 @@ def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Cal
         return
     newest = _bytes_of({"nights": len(told.nights), "tonight": told.tonight})
     for test in told.tests:
-        source = digest(newest, _bytes_of(_facts(test)))
-        yield f"data/{slug(test.name)}.csv", source.encode(), partial(data_files.newest_csv, told, [test])
+        facts = digest(newest, _bytes_of(_facts(test))).encode()
+        yield f"data/{slug(test.name)}.csv", facts, partial(data_files.newest_csv, told, [test])
         yield (
             f"data/{slug(test.name)}-history.csv",
-            source.encode(),
+            facts,
             partial(data_files.history_csv, told, test),
         )
-        yield f"data/{slug(test.name)}.json", source.encode(), partial(data_files.test_json, told, test)
-    whole = data_files.newest_csv(told, told.tests)
-    yield "data/tonight.csv", whole, partial(bytes, whole)
-    nights = data_files.nights_csv(told)
-    yield "data/nights.csv", nights, partial(bytes, nights)
-    red = data_files.regressions_csv(events)
-    yield "data/regressions.csv", red, partial(bytes, red)
+        yield f"data/{slug(test.name)}.json", facts, partial(data_files.test_json, told, test)
+    tables = {
+        "tonight": data_files.newest(told, told.tests),
+        "nights": data_files.nights(told),
+        "regressions": data_files.regressions(events),
+    }
+    for name, (columns, lines) in tables.items():
+        source = _bytes_of(
+            {"lines": [[repr(c) if isinstance(c, float) else c for c in line] for line in lines]}
+        )
+        yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
+        yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
     news = feed.atom(told, events, {test.name: address(test) for test in told.tests})
     yield "feed.xml", news, partial(bytes, news)
     state, kept, gates = health(told, events)

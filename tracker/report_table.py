@@ -211,7 +211,7 @@ def verdict(run: RunDocument) -> str:
         return "nothing was measured against a limit"
     if not bad:
         gates = sum(definition.role == "gate" for definition, _ in judged)
-        words = f"✓ green: all {len(judged)} limits and set points hold, {gates} gates (●) among them"
+        words = f"✓ green: all {len(judged)} limits and set points hold; gates (●) among them: {gates}"
         return click.style(words, fg="green", bold=True)
     words = f"✗ red: {len(bad) - left} of {len(judged)} limits broken"
     return click.style(words + (f", {left} set points left" if left else ""), fg="red", bold=True)

@@ -28,7 +28,7 @@ def trend_lines(
     unit = "" if definition.unit in ("", "1") else f" {definition.unit}"
     lines = [
         click.style(key, bold=True),
-        f"{sparkline(values, width() - 2)}  ({len(values)} values, limit {limit(definition)})",
+        f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {limit(definition)})",
     ]
     judged = judge_history(key, definition, history, accepted)
     lines += [f"  {line}" for line in changes(definition, judged)]

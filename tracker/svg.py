@@ -63,7 +63,7 @@ def picture(chart: Chart) -> Picture:
     box = (LEFT, top, WIDTH - RIGHT, HEIGHT - BOTTOM + 18.0 * rows)
     height = HEIGHT + 18.0 * rows
     if chart.polar:
-        reach = max(chart.rings, default=1.0) * 1.08
+        reach = chart.reach
         span_y, span_x = box[3] - box[1], box[2] - box[0]
         y_low, y_high = -reach, reach
         x_low, x_high = -reach * span_x / span_y, reach * span_x / span_y

@@ -149,6 +149,21 @@ def opening(text: str) -> str:
     return text[:1].upper() + text[1:] if len(first) > 1 and first.isalpha() and first.islower() else text
 
 
+def named(definition: SeriesDefinition) -> tuple[str, str]:
+    """What a series is called, and, for a break point, what counts as stable (which follows in brackets)."""
+    text = definition.description
+    if definition.kind == "break_point" and text.endswith(")") and " (" in text:
+        name, _, meaning = text[:-1].partition(" (")
+        return opening(name), opening(meaning)
+    return opening(text), ""
+
+
+def conditions(definition: SeriesDefinition) -> str:
+    """Configuration and parameters: plain, N = 80."""
+    named_values = [f"{key} = {number(value)}" for key, value in sorted(definition.parameters.items())]
+    return ", ".join([definition.configuration, *named_values])
+
+
 def slug(name: str) -> str:
     """A file name for any text: the name itself where that is safe, else its letters and eight hex digits."""
     if SLUG.fullmatch(name) and name not in RESERVED:

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "build_info.hpp"
+#include "run_loop.hpp"
 
 namespace spook {
 
@@ -27,6 +28,7 @@ nb::object to_array(const std::vector<double>& values, std::size_t rows, std::si
 }
 
 nb::dict to_dict(const RunReport& report) {
+    if (PyErr_Occurred()) throw nb::python_error();  // the run was interrupted from the keyboard
     nb::dict counters, stage_seconds, out;
     for (const auto& [name, count] : report.counters) counters[name.c_str()] = count;
     for (const auto& [name, seconds] : report.stage_seconds) stage_seconds[name.c_str()] = seconds;
@@ -58,6 +60,10 @@ NB_MODULE(_core, m) {
         for (const auto& [name, text] : spook::build_facts()) facts[name] = text;
         return facts;
     }, "What was baked in at build time, all texts; empty where it was not known.");
+    spook::interrupted = [] {
+        nanobind::gil_scoped_acquire hold;
+        return PyErr_CheckSignals() != 0;
+    };
     spook::bind_particles(m);
     spook::bind_rigid(m);
 }

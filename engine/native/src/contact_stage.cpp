@@ -98,7 +98,8 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         }
         const double kick = speed_between(velocity, free_velocity, contact.first) + speed_between(velocity, free_velocity, contact.second);
         const double rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
-        if (point.bounce >= 0.0 && speed > rounding) impact_needed_ = true;
+        point.rounding = rounding;
+        if (point.bounce > 0.0 && speed > rounding) impact_needed_ = true;
     }
     touches_.assign(contacts_.size(), {});
     for (std::size_t k = 0; k < contacts_.size(); ++k) touches_[k].contact = contacts_[k];
@@ -247,6 +248,8 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         RowBlock block = row_block(k, material.friction > 0.0);
         const double gap = contacts_[k].point.gap;
         point.approach = relative(k, contacts_[k].point.normal, velocity, false);
+        // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
+        if (point.approach < -point.rounding) point.approach = 0.0;
         block.right[0] += !is_closed(k) ? -gap / h
                                         : -row.violation_gain * std::max(gap, -explained_depth(k)) + row.upsilon * point.approach;
         block.softness[0] = row.softness;

@@ -2,9 +2,11 @@
 //
 // A step with contacts (v and q are those at its start; positions are frozen until its end):
 //   1. detect      points with a gap the bodies could close in this step;
-//   2. impact      if some point is approached: 0 <= nu ⟂ C v₊ + psi C v₋ >= 0, joints included, forces dropped;
+//   2. impact      if some point with restitution is approached: 0 <= nu ⟂ C v₊ + psi C v₋ >= 0, joints included,
+//                  forces and friction dropped;
 //   3. solve       C v₊ + Sig nu >= r ⟂ nu >= 0 with joints and friction, where r is
-//                    −(4/h) Ups g + Ups C v   for a closed gap (the SPOOK row), and
+//                    −(4/h) Ups g + Ups C v   for a closed gap (the SPOOK row; without Ups C v if it is hit: a
+//                                             plastic impact, with friction), and
 //                    −g/h                     for an open one: it may close, no more;
 //   4. correction  an extra displacement velocity that parts overlapping bodies and leaves no trace in v.
 //
@@ -61,7 +63,7 @@ public:
     bool detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                 const std::vector<Vec6>& free_velocity);
 
-    /// Whether a contact found by detect() is approached faster than rounding.
+    /// Whether a contact with restitution is approached faster than rounding.
     bool impact_needed() const noexcept { return impact_needed_; }
 
     /// The impact. `system` holds mass, momentum M v₋ and the rows of joints as for solve(); their right sides are
@@ -108,6 +110,7 @@ private:
         double approach = 0.0;       // C v, m/s, negative when closing; after the impact in solve()
         double push = 0.0;           // C (free velocity − v), m/s, negative when pressed together
         double bounce = 0.0;         // psi' if the point takes part in the impact, else −1
+        double rounding = 0.0;       // approaches slower than this are none, m/s
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0};
     };

@@ -35,6 +35,7 @@ void ParticleSystem::start_composition() {
     pending_ = 0.0;
     stage_steps_ = 0;
     halved_steps_ = 0;
+    lost_ = false;
     std::fill(history_.begin(), history_.end(), 0.0);
 }
 
@@ -53,10 +54,12 @@ void ParticleSystem::compose(std::int64_t steps) {
 }
 
 /// One step of length h. Where the equations have no solution near (a whip cracks within the step), the step is
-/// taken back and done in two halves, and so on; the order stays, `halved_steps_` counts it.
+/// taken back and done in two halves, and so on; the order stays, `halved_steps_` counts it. When the smallest part
+/// has none either, the state is lost: not a number from here on.
 void ParticleSystem::constrained_step(double h, int depth) {
     const std::span<const double> stages = composition_stages(scene_.method.composition);
     const std::size_t rows = row_.size();
+    if (lost_) return;
     std::vector<Vec3>&x = step_x_[static_cast<std::size_t>(depth)], &v = step_v_[static_cast<std::size_t>(depth)];
     x = x_;
     v = v_;
@@ -67,6 +70,7 @@ void ParticleSystem::constrained_step(double h, int depth) {
     ++stage_steps_;
     if (solved) return;
     if (depth + 1 == MOST_HALVINGS) {
+        lost_ = true;
         for (Vec3& speed : v_) speed.x = std::numeric_limits<double>::quiet_NaN();
         return;
     }
@@ -107,16 +111,17 @@ bool ParticleSystem::constrained_stage(double tau, double* history) {
     const double span = pending_ + 0.5 * tau, part = span / h_;
     double *one = history, *two = history + rows, *three = history + 2 * rows;
     find_kicks();
-    for (std::size_t k = 0; k < rows; ++k) {
-        Link& link = link_[k];
-        link.u = (1.0 / row_[k].rest) * (x_[row_[k].b] - x_[row_[k].a]);
-        const double force = stage_steps_ >= 3   ? 3.0 * (one[k] - two[k]) + three[k]
-                             : stage_steps_ == 2 ? 2.0 * one[k] - two[k]
-                                                 : one[k];
-        link.lambda = force * span;
+    const double a1 = stage_steps_ >= 3 ? 3.0 : stage_steps_ == 2 ? 2.0 : 1.0;
+    const double a2 = stage_steps_ >= 3 ? -3.0 : stage_steps_ == 2 ? -1.0 : 0.0, a3 = stage_steps_ >= 3 ? 1.0 : 0.0;
+    for (std::size_t k = 0; k < rows; ++k) link_[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
+    if (solver_ == ParticleSolver::path) {
+        predict_paths(part);
+    } else {
+        for (std::size_t k = 0; k < rows; ++k)
+            link_[k].u = row_[k].rest_inverse * (x_[row_[k].b] - x_[row_[k].a]);
+        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += part * kick_[node];
+        push(v_);
     }
-    for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += part * kick_[node];
-    push(v_);
     if (clock_) clock_->mark(Stage::assemble_rows);
     double before = std::numeric_limits<double>::infinity();
     bool fresh = true;
@@ -129,14 +134,16 @@ bool ParticleSystem::constrained_stage(double tau, double* history) {
         fresh = iteration > 0 && ratio > SLOW;
         if (solver_ == ParticleSolver::path) shorten_paths();
         else shorten_blocks();
-        if (iteration > 0 && off * ratio <= 0.1 * SETTLED) break;  // what is left is below rounding already
+        // What is left is below rounding already: by Newton's rate, or by that of the kept factor.
+        if (off * (iteration == 0 ? 100.0 * off : ratio) <= 0.1 * SETTLED) break;
         before = off;
     }
     if (clock_) clock_->mark(solver_ == ParticleSolver::path ? Stage::solve_path : Stage::solve_block);
+    const double per_span = 1.0 / span;
     for (std::size_t k = 0; k < rows; ++k) {
         three[k] = two[k];
         two[k] = one[k];
-        one[k] = link_[k].lambda / span;
+        one[k] = link_[k].lambda * per_span;
     }
     for (std::size_t node = 0; node < x_.size(); ++node) x_[node] += tau * v_[node];
     pending_ = 0.5 * tau;
@@ -189,15 +196,38 @@ double ParticleSystem::lengthen_paths(double tau, bool fresh) noexcept {
 void ParticleSystem::shorten_paths() noexcept {
     for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
         double change = 0.0;
-        for (int k = path_first_[path + 1] - 1; k >= path_first_[path]; --k) {
+        Vec3 out;
+        const int first = path_first_[path], end = path_first_[path + 1];
+        for (int k = end - 1; k >= first; --k) {
             Link& link = link_[k];
             change = (link.rhs - link.length * change) * link.pivot_inverse;
             link.lambda += change;
-            const Vec3 impulse = change * link.u;
-            v_[row_[k].a] -= w_[row_[k].a] * impulse;
-            v_[row_[k].b] += w_[row_[k].b] * impulse;
+            const Vec3 in = change * link.u;
+            v_[row_[k].b] += w_[row_[k].b] * (in - out);
+            out = in;
         }
+        v_[row_[first].a] -= w_[row_[first].a] * out;
     }
+}
+
+/// Kicks and predicted impulses, node by node.
+void ParticleSystem::predict_paths(double part) noexcept {
+    int node = 0;
+    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
+        Vec3 in, here = x_[node];
+        for (int k = path_first_[path]; k < path_first_[path + 1]; ++k, ++node) {
+            Link& link = link_[k];
+            const Vec3 next = x_[node + 1];
+            link.u = row_[k].rest_inverse * (next - here);
+            const Vec3 out = link.lambda * link.u;
+            v_[node] += part * kick_[node] + w_[node] * (in - out);
+            in = out;
+            here = next;
+        }
+        v_[node] += part * kick_[node] + w_[node] * in;
+        ++node;
+    }
+    for (; node < static_cast<int>(v_.size()); ++node) v_[node] += part * kick_[node];
 }
 
 /// The same for rows that branch or close loops: the symmetric matrix at the start of the stage, so the iteration

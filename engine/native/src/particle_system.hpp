@@ -64,7 +64,7 @@ private:
     struct Row {  // one distance: constants
         int a, b;  // nodes
         double rest, stiff, diagonal;  // m; w_a + w_b; the same + softness, 1/kg
-        double violation_gain, velocity_gain, relaxation, softness, rest_inverse_square;
+        double violation_gain, velocity_gain, relaxation, softness, rest_inverse, rest_inverse_square;
     };
     struct Link {  // what this step found out about it
         Vec3 u;
@@ -118,6 +118,7 @@ private:
     void push(std::vector<Vec3>& v) const noexcept;
     double lengthen_paths(double tau, bool fresh) noexcept;
     void shorten_paths() noexcept;
+    void predict_paths(double part) noexcept;
     double lengthen_blocks(double tau, bool fresh);
     void shorten_blocks();
     void factor_rigid_blocks();
@@ -161,7 +162,7 @@ private:
     std::int64_t sweeps_ = 0;
 
     // compositions
-    bool composed_ = false;
+    bool composed_ = false, lost_ = false;
     double pending_ = 0.0;             // s: half a stage still to be kicked (with rows) or drifted (without)
     std::int64_t stage_steps_ = 0;     // steps the history has seen
     std::int64_t newton_iterations_ = 0, halved_steps_ = 0;

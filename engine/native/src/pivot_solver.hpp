@@ -13,24 +13,29 @@ namespace spook {
 struct PivotReport {
     int rounds = 0;         // linear systems solved
     int flips = 0;          // rows that changed state
+    int restarts = 0;       // times the search stalled and began anew
     bool converged = true;  // no row is on the wrong side of its complementarity
     bool finite = true;     // the factorisation met only finite values
 };
 
 /// Solves MixedSystem by block pivoting: free every row that wants to leave its bound, bind every row that broke
-/// one, all at once; after five rounds without fewer offenders only the one of the largest index (Murty 1974),
-/// which ends for P-matrices. Rows start from RowBlock::state; bilateral rows never leave the free set.
+/// one, all at once. Five rounds without fewer offenders are a stall. Rigid redundant contacts may contradict each
+/// other by rounding, so at each stall the tolerance, 1e-11 of the system's speed at first, is loosened tenfold, to
+/// 1e-7 at most; from the third on Gauss–Seidel sweeps guess the free set anew (fixed bounds make a convex quadratic
+/// problem, which sweeps descend); after seven only the offender of the largest index is flipped (Murty 1974), which
+/// ends for P-matrices. Rows start from RowBlock::state; bilateral rows never leave the free set.
 ///
 /// Singular systems (four rigid corners, Sig = 0): the factored matrix carries a compliance of `relief` times each
-/// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the solution is refined against the true equations until the residual
-/// stops shrinking. That gives the solution of least norm among equals, weighted by (G M⁻¹ Gᵀ)ᵢᵢ, and changes no
-/// equation. A factor 1e-6 is small enough to converge in a few refinements and large enough that the rounding
-/// of gaps, divided by it, stays out of the loads.
+/// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the relief is then taken out again against the true equations, by conjugate
+/// gradients with the factor as preconditioner. That gives the solution of least norm among equals, weighted by
+/// (G M⁻¹ Gᵀ)ᵢᵢ, and changes no equation. A factor 1e-6 is small enough for a few rounds and large enough that the
+/// rounding of gaps, divided by it, stays out of the loads.
 class PivotSolver {
 public:
     double floor = 1e-12;   // of BlockLdlt::factor
     double relief = 1e-6;   // of bounded rows, in the factor only
-    int max_refinements = 8;
+    int max_directions = 30;
+    int round_limit = 1 << 30;  // give up after so many rounds; without it the search ends by itself
 
     /// Fills velocity, multipliers and states. With `same_matrix` the caller promises that mass, Jacobians and
     /// softness are those of the call before: a factor of the same free set is then used again.
@@ -43,10 +48,18 @@ private:
     bool analyse(const MixedSystem& system);
     void measure(const MixedSystem& system);
     bool factor(const MixedSystem& system);
-    void solve_free(MixedSystem& system, bool refine);
+    void solve_free(MixedSystem& system, bool refined);
+    double refine(MixedSystem& system, int rounds);
+    bool conjugate_directions(MixedSystem& system);
+    void correct(MixedSystem& system, const std::vector<double>& direction, double length);
     double residual(const MixedSystem& system);
+    void guess_by_sweeps(MixedSystem& system, int sweeps);
     int offenders(const MixedSystem& system, bool mark_all);
 
+    struct Relieved {
+        int at;  // in the vectors of matrix_
+        double relief;
+    };
     struct Pattern {
         int first, second, size;
         bool operator==(const Pattern&) const = default;
@@ -60,8 +73,10 @@ private:
     std::vector<std::uint8_t> factored_free_;    // per row
     std::vector<int> row_start_;                 // per row block, index of its first row
     std::vector<double> own_;                    // per row, (G M⁻¹ Gᵀ)ᵢᵢ
+    double tolerance_ = 0.0;                     // of this solve
     double speed_ = 0.0;                         // the scale of velocities in this system, m/s
-    std::vector<double> right_, solution_, residual_;
+    std::vector<double> solution_, residual_, direction_, image_, gradient_;
+    std::vector<Relieved> relieved_;
     std::vector<std::uint8_t> offends_;
     std::vector<Mat6> mass_factor_;
     std::vector<Vec6> free_velocity_;  // M⁻¹ p

@@ -18,6 +18,9 @@ struct Health {
     const char* reason = "";  // what is wrong with the body, when the status does not say it
 };
 
+/// Asked between blocks of steps, at most ten times a second; true ends the run. Python's Ctrl-C comes in here.
+inline bool (*interrupted)() = nullptr;
+
 /// A System has
 ///   void advance(int64 steps)             do that many steps, with no check inside
 ///   void observe(Recorder&, int64 sample)  recorder.sample(sample), looking ahead if velocities need it
@@ -42,7 +45,16 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
     std::int64_t done = 0;
     Health health = system.health();
     if (health.status != Status::completed) report.failed_step = 0;
+    double asked = 0.0;
     while (done < steps && health.status == Status::completed) {
+        if (interrupted != nullptr && elapsed() > asked + 0.1) {
+            asked = elapsed();
+            if (interrupted()) {
+                report.status = Status::timed_out;
+                report.failed_step = done + 1;
+                break;
+            }
+        }
         if (time_limit > 0.0 && elapsed() > time_limit) {
             report.status = Status::timed_out;
             report.failed_step = done + 1;

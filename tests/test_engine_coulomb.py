@@ -1,0 +1,358 @@
+"""Friction: Coulomb's law on slopes, in every direction, by every model and solver, and in heaps of balls."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from engine import (
+    AngularVelocity,
+    Box,
+    ContactForce,
+    Final,
+    KineticEnergy,
+    Material,
+    Method,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+
+TIME_STEP = 1.0 / 60.0  # s
+GRAVITY = 10.0  # m/s²
+DIRECTIONS = [math.radians(10 * k) for k in range(36)]
+Array = npt.NDArray[np.float64]
+
+
+def slope(
+    tangent: float, direction: float, mu: float = 0.5, mass: float = 1.0, slip_compliance: float = 0.0
+) -> Scene:
+    """A unit box on a level plane, gravity tilted by atan(tangent) towards `direction`."""
+    theta = math.atan(tangent)
+    pull = (math.sin(theta) * math.cos(direction), math.sin(theta) * math.sin(direction), -math.cos(theta))
+    surface = Material(friction=mu)
+    plane = RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=surface)
+    box = RigidBody(
+        name="box",
+        position=(0, 0, 0.5),
+        mass=mass,
+        shape=Box((1, 1, 1)),
+        material=Material(friction=mu, slip_compliance=slip_compliance),
+    )
+    x, y, z = pull
+    return Scene(bodies=(plane, box), gravity=(GRAVITY * x, GRAVITY * y, GRAVITY * z))
+
+
+OBSERVE = {
+    "force": Trace(quantity=ContactForce("box", "plane"), first=1),
+    "velocity": Trace(quantity=Velocity("box"), first=1),
+}
+
+
+def ratio(force: Array) -> Array:
+    """|F_t|/|F_n| of forces (…, 3) on a level plane."""
+    return np.asarray(np.hypot(force[..., 0], force[..., 1]) / force[..., 2])
+
+
+def angle_between(a: float, b: float) -> float:
+    return abs(math.remainder(a - b, 2.0 * math.pi))
+
+
+@pytest.mark.parametrize("tangent", [0.5, 0.6])
+def test_the_cone_is_the_same_in_every_direction(tangent: float) -> None:
+    """Standing at tan θ = mu and sliding at .6: F_t/F_n = .5 to 1e-9 at every step, along the slope to 1e-6°."""
+    for direction in DIRECTIONS:
+        result = simulate(slope(tangent, direction), time_step=TIME_STEP, duration=1.0, observe=OBSERVE)
+
+        assert np.abs(ratio(result["force"]) - 0.5).max() <= 1e-9
+        fx, fy, _ = result["force"][-1]
+        assert math.degrees(angle_between(math.atan2(-fy, -fx), direction)) <= 1e-6
+        if tangent > 0.5:
+            vx, vy, _ = result["velocity"][-1]
+            assert math.degrees(angle_between(math.atan2(vy, vx), direction)) <= 1e-6
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("mass", [1.0, 1e4])
+@pytest.mark.parametrize("direction", [0.0, 0.4, math.pi / 4])
+def test_it_sticks_just_below_the_friction_angle_and_slips_just_above(
+    mu: float, mass: float, direction: float
+) -> None:
+    """T11: sticks iff tan θ <= mu, whatever the mass; then a = g (sin θ − mu cos θ), at every step."""
+    below = simulate(
+        slope(mu * 0.9998, direction, mu, mass), time_step=TIME_STEP, duration=1.0, observe=OBSERVE
+    )
+    above = simulate(
+        slope(mu * 1.0002, direction, mu, mass), time_step=TIME_STEP, duration=1.0, observe=OBSERVE
+    )
+
+    assert np.abs(below["velocity"]).max() < 1e-9
+    theta = math.atan(mu * 1.0002)
+    acceleration = GRAVITY * (math.sin(theta) - mu * math.cos(theta))
+    speed = np.linalg.norm(above["velocity"], axis=1)
+    np.testing.assert_allclose(speed, acceleration * TIME_STEP * np.arange(1, 61), rtol=0, atol=1e-9)
+
+
+def test_without_friction_it_slides_freely() -> None:
+    result = simulate(slope(0.3, 0.5, mu=0.0), time_step=TIME_STEP, duration=1.0, observe=OBSERVE)
+
+    speed = np.linalg.norm(result["velocity"][-1])
+    assert speed == pytest.approx(GRAVITY * math.sin(math.atan(0.3)), abs=1e-11)
+    assert np.abs(result["force"][:, :2]).max() == 0.0
+
+
+@pytest.mark.parametrize("model", ["box", "scaled_box"])
+def test_the_box_models_hold_a_tenth_more_across_their_axes(model: str) -> None:
+    """At tan θ = .6: sliding along an axis the ratio is .5; at 45° each axis allows .5, so the box stands at .6."""
+    method = Method(friction=model)  # type: ignore[arg-type]
+    ratios = []
+    for direction in DIRECTIONS:
+        result = simulate(
+            slope(0.6, direction), time_step=TIME_STEP, duration=1.0, observe=OBSERVE, method=method
+        )
+        ratios.append(float(ratio(result["force"][-1])))
+
+    assert min(ratios) == pytest.approx(0.5, abs=1e-9)
+    assert max(ratios) - min(ratios) == pytest.approx(0.1, abs=1e-3)
+    expected = [
+        min(0.6, math.hypot(*(min(0.5, 0.6 * abs(c)) for c in (math.cos(d), math.sin(d)))))
+        for d in DIRECTIONS
+    ]
+    # Sliding along one axis only, the other holding: at most that; the ratio is the norm of both.
+    np.testing.assert_allclose(ratios, expected, rtol=0, atol=0.04)
+
+
+def test_the_box_lags_a_step_behind_a_changing_load() -> None:
+    """The box bounds friction by the normal force of the step before: a landing block feels the old load first."""
+    material = Material(friction=0.5)
+    bodies = (
+        RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
+        RigidBody(
+            name="box",
+            position=(0, 0, 0.52),
+            mass=1.0,
+            shape=Box((1, 1, 1)),
+            velocity=(5.0, 0, -3.0),
+            material=material,
+        ),
+    )
+    scene = Scene(bodies=bodies, gravity=(0, 0, -GRAVITY))
+    runs = {
+        model: simulate(scene, time_step=TIME_STEP, steps=6, method=Method(friction=model), observe=OBSERVE)  # type: ignore[arg-type]
+        for model in ("box", "scaled_box")
+    }
+
+    current = ratio(runs["scaled_box"]["force"])
+    assert np.abs(current[np.isfinite(current)] - 0.5).max() < 1e-9
+    force = runs["box"]["force"]
+    hit = int(np.argmax(force[:, 2]))
+    assert abs(force[hit + 1, 0]) > 0.7 * force[hit + 1, 2]  # still bounded by the blow
+
+
+@pytest.mark.parametrize("solver", ["iterative", "hybrid"])
+@pytest.mark.parametrize("tangent", [0.3, 0.6])
+def test_other_solvers_reach_the_direct_answer(solver: str, tangent: float) -> None:
+    method = Method(solver=solver, iterations=2000, residual_tolerance=1e-13)  # type: ignore[arg-type]
+    direct = simulate(slope(tangent, 0.3), time_step=TIME_STEP, duration=1.0, observe=OBSERVE)
+    other = simulate(slope(tangent, 0.3), time_step=TIME_STEP, duration=1.0, observe=OBSERVE, method=method)
+
+    np.testing.assert_allclose(other["velocity"], direct["velocity"], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(ratio(other["force"]), min(tangent, 0.5), rtol=0, atol=1e-7)
+    assert other.counters["sweeps"] > 0
+    assert direct.counters["sweeps"] == 0
+
+
+def test_slip_compliance_lets_it_creep() -> None:
+    """T11: creep speed gamma F_t; four points share the force, none at its bound."""
+    gamma = 1e-3
+    result = simulate(
+        slope(0.2, 0.7, slip_compliance=gamma), time_step=TIME_STEP, duration=2.0, observe=OBSERVE
+    )
+
+    force = GRAVITY * math.sin(math.atan(0.2))
+    assert np.linalg.norm(result["velocity"][-1]) == pytest.approx(gamma * force / 4.0, rel=1e-6)
+
+
+def test_a_sliding_ball_begins_to_roll_and_keeps_five_sevenths() -> None:
+    """It slows by mu g while it slides, exactly in discrete time, then rolls on without loss."""
+    mu, start = 0.2, 3.0
+    material = Material(friction=mu)
+    bodies = (
+        RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
+        RigidBody(
+            name="ball",
+            position=(0, 0, 0.2),
+            mass=1.0,
+            shape=Sphere(0.2),
+            velocity=(start, 0, 0),
+            material=material,
+        ),
+    )
+    result = simulate(
+        Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
+        time_step=TIME_STEP,
+        duration=2.0,
+        observe={"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("ball"))},
+    )
+
+    time = TIME_STEP * np.arange(121)
+    sliding = time < 2.0 / 7.0 * start / (mu * GRAVITY)
+    np.testing.assert_allclose(
+        result["v"][sliding, 0], start - mu * GRAVITY * time[sliding], rtol=0, atol=1e-9
+    )
+    assert result["v"][-1, 0] == pytest.approx(5.0 / 7.0 * start, abs=1e-9)
+    assert result["w"][-1, 1] * 0.2 == pytest.approx(result["v"][-1, 0], abs=1e-9)
+
+
+def test_a_ball_rolls_down_a_slope_with_five_sevenths_of_gravity() -> None:
+    theta = math.atan(0.3)
+    material = Material(friction=0.5)
+    bodies = (
+        RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
+        RigidBody(name="ball", position=(0, 0, 0.5), mass=2.0, shape=Sphere(0.5), material=material),
+    )
+    result = simulate(
+        Scene(bodies=bodies, gravity=(GRAVITY * math.sin(theta), 0, -GRAVITY * math.cos(theta))),
+        time_step=TIME_STEP,
+        duration=1.0,
+        observe={"v": Final(quantity=Velocity("ball")), "f": Final(quantity=ContactForce("ball"))},
+    )
+
+    assert result["v"][0] == pytest.approx(5.0 / 7.0 * GRAVITY * math.sin(theta), abs=1e-9)
+    assert result["f"][0] == pytest.approx(-2.0 / 7.0 * 2.0 * GRAVITY * math.sin(theta), abs=1e-7)
+
+
+def test_a_conveyor_takes_its_load_along() -> None:
+    """A kinematic belt moves at 1 m/s: the load is pulled by mu g until it moves with the belt."""
+    material = Material(friction=0.25)
+    bodies = (
+        RigidBody(
+            name="belt",
+            position=(0, 0, -0.5),
+            shape=Box((20, 4, 1)),
+            motion="kinematic",
+            velocity=(1.0, 0, 0),
+            material=material,
+        ),
+        RigidBody(name="load", position=(0, 0, 0.5), mass=3.0, shape=Box((1, 1, 1)), material=material),
+    )
+    result = simulate(
+        Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
+        time_step=TIME_STEP,
+        duration=2.0,
+        observe={"v": Trace(quantity=Velocity("load"))},
+    )
+
+    assert result["v"][12, 0] == pytest.approx(0.25 * GRAVITY * 12 * TIME_STEP, abs=1e-9)
+    np.testing.assert_allclose(result["v"][-1], (1.0, 0, 0), rtol=0, atol=1e-9)
+
+
+def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
+    """Every pair has one contact, so its force and slip can be read from outside: Signorini and Coulomb hold at
+    each, and forces explain the motion of every ball.
+    """
+    mu, radius = 0.3, 0.5
+    material = Material(friction=mu)
+    places = [(0.0, 0.0), (0.97, 0.1), (0.45, 0.9), (-0.6, 0.75), (0.48, 0.38), (-0.1, 0.5)]
+    heights = [0.5, 0.5, 0.5, 0.5, 1.35, 1.5]
+    names = [f"ball{k}" for k in range(len(places))]
+    bodies = [RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material)]
+    bodies += [
+        RigidBody(
+            name=name,
+            position=(x, y, z),
+            mass=1.0 + k,
+            shape=Sphere(radius),
+            velocity=(0.5 - 0.2 * k, 0.1 * k, 0),
+            material=material,
+        )
+        for k, (name, (x, y), z) in enumerate(zip(names, places, heights, strict=True))
+    ]
+    pairs = [*combinations(names, 2), *((name, "plane") for name in names)]
+    result = simulate(
+        Scene(bodies=tuple(bodies), gravity=(0, 0, -GRAVITY)),
+        time_step=TIME_STEP,
+        steps=60,
+        observe={
+            "x": Trace(quantity=Position()),
+            "v": Trace(quantity=Velocity()),
+            "w": Trace(quantity=AngularVelocity()),
+        }
+        | {f"{a} {b}": Trace(quantity=ContactForce(a, b)) for a, b in pairs},
+    )
+    index = {"plane": 0} | {name: k + 1 for k, name in enumerate(names)}
+
+    sliding = sticking = 0
+    for step in range(1, 61):
+        x, v, w = result["x"][step - 1], result["v"][step], result["w"][step]
+        total = np.zeros((len(bodies), 3))
+        for a, b in pairs:
+            i, j = index[a], index[b]
+            force = result[f"{a} {b}"][step]
+            total[i] += force
+            total[j] -= force
+            if not force.any():
+                continue
+            # The engine takes a contact at the middle of the gap.
+            if b == "plane":
+                normal, arm = np.array((0.0, 0.0, 1.0)), (x[i][2] + radius) / 2.0
+            else:
+                distance = float(np.linalg.norm(x[i] - x[j]))
+                normal, arm = (x[i] - x[j]) / distance, distance / 2.0
+            slip = v[i] + np.cross(w[i], -arm * normal)
+            if b != "plane":
+                slip = slip - v[j] - np.cross(w[j], arm * normal)
+            load = force @ normal
+            tangential = force - load * normal
+            slip -= (slip @ normal) * normal
+            assert load >= -1e-9
+            assert np.linalg.norm(tangential) <= mu * load + 1e-6 * GRAVITY
+            if np.linalg.norm(slip) > 1e-7:
+                sliding += 1
+                against = -mu * load * slip / np.linalg.norm(slip)
+                np.testing.assert_allclose(tangential, against, rtol=0, atol=1e-6 * max(1.0, load))
+            else:
+                sticking += 1
+        for k in range(len(names)):
+            gained = (1.0 + k) * (result["v"][step, k + 1] - result["v"][step - 1, k + 1]) / TIME_STEP
+            weight = (1.0 + k) * np.array((0.0, 0.0, -GRAVITY))
+            np.testing.assert_allclose(
+                total[k + 1] + weight, gained, rtol=0, atol=1e-8 * (1.0 + np.abs(gained).max())
+            )
+    assert sliding > 50
+    assert sticking > 50
+
+
+def test_friction_only_takes_energy() -> None:
+    """A box set spinning and sliding: its kinetic energy falls at every step until it rests."""
+    material = Material(friction=0.4)
+    bodies = (
+        RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
+        RigidBody(
+            name="box",
+            position=(0, 0, 0.25),
+            mass=1.0,
+            shape=Box((1, 1, 0.5)),
+            velocity=(2, 1, 0),
+            angular_velocity=(0, 0, 6),
+            material=material,
+        ),
+    )
+    result = simulate(
+        Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
+        time_step=TIME_STEP,
+        duration=2.0,
+        observe={"k": Trace(quantity=KineticEnergy())},
+    )
+
+    assert np.diff(result["k"]).max() < 1e-12
+    assert result["k"][-1] < 1e-15

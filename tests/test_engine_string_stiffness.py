@@ -1,0 +1,88 @@
+"""A taut chain is unstable where T h²/(m l) > 1; with string stiffness it is not, at nearly no cost elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from engine import (
+    Distance,
+    Energy,
+    MaximumAbsolute,
+    Method,
+    Particle,
+    Position,
+    Result,
+    Scene,
+    Trace,
+    Violation,
+    simulate,
+)
+
+GRAVITY = 9.81  # m/s²
+H = 1 / 60  # s
+STRINGS = Method(string_stiffness=True)
+
+
+def hanging(ratio: float, offset: float = 1e-6, links: int = 10) -> Scene:
+    """Unit links of 1 kg hanging straight but for a tiny zigzag; the last weighs `ratio` kg."""
+    bodies = tuple(
+        Particle(
+            name=f"b{i}",
+            mass=ratio if i == links - 1 else 1.0,
+            position=(offset * (-1.0) ** i, 0.0, -1.0 - i),
+        )
+        for i in range(links)
+    )
+    rows = tuple(
+        Distance(
+            name=f"r{i}", between=((0.0, 0.0, 0.0) if i == 0 else f"b{i - 1}", f"b{i}"), compliance=1e-13
+        )
+        for i in range(links)
+    )
+    return Scene(bodies=bodies, constraints=rows, gravity=(0.0, 0.0, -GRAVITY))
+
+
+def hang(ratio: float, method: Method, duration: float = 20.0) -> Result:
+    observe = {
+        "x": MaximumAbsolute(quantity=Position()),
+        "g": MaximumAbsolute(quantity=Violation()),
+        "e": Trace(quantity=Energy()),
+    }
+    return simulate(hanging(ratio), time_step=H, duration=duration, method=method, observe=observe)
+
+
+def sideways(result: Result) -> float:
+    """Largest sideways excursion [m]; infinite if the run failed."""
+    return float(result["x"][:, 0].max()) if result.completed else math.inf
+
+
+def test_a_plain_chain_breaks_where_theory_says() -> None:
+    """(M + a little) g h²/(m l) = 1 lies at 367: 350 hangs still, 380 does not."""
+    assert sideways(hang(350.0, Method())) < 1e-4
+    assert sideways(hang(380.0, Method())) > 1e-2
+
+
+@pytest.mark.parametrize("ratio", [380.0, 1000.0])
+def test_with_string_stiffness_it_holds(ratio: float) -> None:
+    result = hang(ratio, STRINGS)
+
+    assert sideways(result) < 1e-5
+    assert result["g"].max() < 1e-13 * GRAVITY * (ratio + 10.0) * 1.1 + 1e-9
+
+
+def test_string_stiffness_costs_next_to_nothing_where_it_is_not_needed() -> None:
+    """A light pendulum at 1/1000: the same motion within the error the method has anyway."""
+    bob = Particle(name="bob", mass=1.0, position=(1.0, 0.0, 0.0))
+    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"), compliance=1e-13)
+    scene = Scene(bodies=(bob,), constraints=(rod,), gravity=(0.0, 0.0, -GRAVITY))
+    observe = {"x": Trace(quantity=Position("bob")), "e": Trace(quantity=Energy())}
+    plain, strings = (
+        simulate(scene, time_step=1e-3, duration=5.0, method=method, observe=observe)
+        for method in (Method(), STRINGS)
+    )
+
+    assert np.abs(plain["x"] - strings["x"]).max() < 2e-3
+    assert abs(strings["e"][-1] - plain["e"][-1]) < 1e-3 * GRAVITY

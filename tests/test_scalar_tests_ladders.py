@@ -1,0 +1,108 @@
+"""Error against run time: every configuration has the order of accuracy that theory gives it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from engine import PLAIN, simulate
+from scalar_tests.case import Configuration, Ladder, Simulate
+from scalar_tests.catalogue import CATALOGUE
+from tracker.order import in_range, observed_order
+
+BAND = 0.1
+LADDERS = [
+    (name, ladder, configuration)
+    for name, test in CATALOGUE.items()
+    for ladder in test.ladders
+    for configuration in ladder.configurations
+]
+ORDERED = [entry for entry in LADDERS if entry[2].expected_order is not None]
+ORDERS = {(name, ladder.name, c.name): c.expected_order for name, ladder, c in LADDERS}
+
+
+def order(ladder: Ladder, configuration: Configuration, engine: Simulate = simulate) -> float:
+    steps = [h for h in ladder.time_steps if in_range(h, configuration.order_range)]
+    found = observed_order(steps, [ladder.error(engine, h, configuration.method) for h in steps])
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("ladder", "configuration"),
+    [entry[1:] for entry in ORDERED],
+    ids=[f"{name}-{ladder.name}-{configuration.name}" for name, ladder, configuration in ORDERED],
+)
+def test_the_observed_order_is_the_expected_one(ladder: Ladder, configuration: Configuration) -> None:
+    assert configuration.expected_order is not None
+    assert abs(order(ladder, configuration) - configuration.expected_order) < BAND
+
+
+@pytest.mark.parametrize(
+    ("test", "ladder", "configuration", "expected"),
+    [
+        ("falling_object", "position", "plain", 1.0),
+        ("falling_object", "position", "half-step", None),
+        ("pendulum", "length", "plain", 2.0),
+        ("pendulum", "length", "curved", 4.0),
+        ("planetarium", "position", "plain", 1.0),
+        ("planetarium", "position", "half-step", 2.0),
+        ("pendulum", "angle", "order 4", 4.0),
+        ("planetarium", "position", "order 4", 4.0),
+    ],
+)
+def test_the_orders_that_were_promised_are_asked_for(
+    test: str, ladder: str, configuration: str, expected: float | None
+) -> None:
+    assert ORDERS[(test, ladder, configuration)] == expected
+
+
+@pytest.mark.parametrize("name", [name for name, test in CATALOGUE.items() if test.ladders])
+def test_running_and_measuring_simulate_the_same(name: str) -> None:
+    """What is timed does as many steps as what is measured, so that error and time belong together."""
+    for ladder in CATALOGUE[name].ladders:
+        h = ladder.time_steps[0]
+        for configuration in ladder.configurations:
+            steps: list[int] = []
+
+            def counting(scene: Any, steps: list[int] = steps, **options: Any) -> Any:
+                result = simulate(scene, **options)
+                steps.append(result.steps if result.completed else -1)
+                return result
+
+            ladder.run(counting, h, configuration.method)
+            try:
+                ladder.error(counting, h, configuration.method)
+            except Exception:  # an iterative solver may lose the scene: then there is nothing to compare
+                continue
+            assert len(set(steps)) == 1, (ladder.name, configuration.name, steps)
+
+
+def test_falling_with_half_step_velocities_is_exact() -> None:
+    ladder = CATALOGUE["falling_object"].ladders[0]
+    half_step = next(c for c in ladder.configurations if c.name == "half-step")
+
+    assert all(abs(ladder.error(simulate, h, half_step.method)) < 1e-10 for h in ladder.time_steps)
+
+
+def test_an_engine_that_forgets_its_options_has_the_wrong_order() -> None:
+    def deaf(scene: Any, **options: Any) -> Any:
+        return simulate(scene, **(options | {"method": PLAIN}))
+
+    ladder = next(item for item in CATALOGUE["planetarium"].ladders if item.name == "position")
+    half_step = next(c for c in ladder.configurations if c.name == "half-step")
+
+    assert abs(order(ladder, half_step, deaf) - 1.0) < BAND
+
+
+@pytest.mark.parametrize("name", [name for name, test in CATALOGUE.items() if test.ladders])
+def test_every_target_is_within_reach(name: str) -> None:
+    """Time to a given error is a trend only if each configuration reaches that error somewhere."""
+    for ladder in CATALOGUE[name].ladders:
+        if ladder.target_error is None:
+            continue
+        for configuration in ladder.configurations:
+            errors = [abs(ladder.error(simulate, h, configuration.method)) for h in ladder.time_steps]
+            assert min(e for e in errors if math.isfinite(e)) <= ladder.target_error, configuration.name
