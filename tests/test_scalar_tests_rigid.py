@@ -170,7 +170,7 @@ BROKEN: dict[str, Simulate] = {
     "bouncing_ball": with_scene(dull),
     "rotating_box": with_scene(lopsided),
     "swinging_door": with_scene(much_lighter),
-    "spinning_top": with_scene(lopsided),
+    "spinning_top": with_scene(much_lighter),
     "motor": with_scene(overdriven),
     "lock_ring": with_joints(compliance=1e-6),
     "resting_stack": with_scene(lighter),
