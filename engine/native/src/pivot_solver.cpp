@@ -68,7 +68,6 @@ bool PivotSolver::analyse(const MixedSystem& system) {
     bodies_ = bodies;
     pattern_ = std::move(pattern);
     factored_free_.clear();
-    right_.assign(matrix_.unknowns(), 0.0);
     solution_.assign(matrix_.unknowns(), 0.0);
     residual_.assign(matrix_.unknowns(), 0.0);
     own_.assign(row_start_.back(), 0.0);
@@ -153,29 +152,91 @@ double PivotSolver::residual(const MixedSystem& system) {
     return std::max(force > 0.0 ? largest / force : largest, speed_ > 0.0 ? slip / speed_ : slip);
 }
 
-void PivotSolver::solve_free(MixedSystem& system, bool refine) {
+void PivotSolver::correct(MixedSystem& system, const std::vector<double>& direction, double length) {
+    for (int b = 0; b < bodies_; ++b)
+        for (int a = 0; a < 6; ++a) system.velocity[b][a] += length * direction[6 * b + a];
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        RowBlock& block = system.rows[k];
+        const double* y = direction.data() + matrix_.offset(bodies_ + static_cast<int>(k));
+        for (int i = 0; i < block.size; ++i)
+            if (is_free(block, i)) block.multiplier[i] -= length * y[i];  // the unknown is −z
+    }
+}
+
+double PivotSolver::refine(MixedSystem& system, int rounds) {
+    double before = unbounded, now = residual(system);
+    for (int round = 0; round < rounds && now > 1e-16 && now < 0.25 * before; ++round) {
+        before = now;
+        solution_ = residual_;
+        matrix_.solve(solution_.data());
+        correct(system, solution_, 1.0);
+        now = residual(system);
+    }
+    return now;
+}
+
+void PivotSolver::solve_free(MixedSystem& system, bool refined) {
     // Start from zero velocities and free multipliers, the bound ones in place: the first residual is the right side.
     for (Vec6& v : system.velocity) v.fill(0.0);
     for (RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i)
             block.multiplier[i] = is_free(block, i) ? 0.0 : block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
-    double before = residual(system);
-    for (int round = 0; round <= (refine ? max_refinements : 0); ++round) {
-        std::copy(residual_.begin(), residual_.end(), solution_.begin());
-        matrix_.solve(solution_.data());
-        for (int b = 0; b < bodies_; ++b)
-            for (int a = 0; a < 6; ++a) system.velocity[b][a] += solution_[6 * b + a];
-        for (std::size_t k = 0; k < system.rows.size(); ++k) {
-            RowBlock& block = system.rows[k];
-            const double* y = solution_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
-            for (int i = 0; i < block.size; ++i)
-                if (is_free(block, i)) block.multiplier[i] -= y[i];  // the unknown is −z
-        }
-        if (!refine) return;
-        const double after = residual(system);
-        if (round > 0 && (after <= 1e-16 || !(after < 0.25 * before))) return;
-        before = after;
+    refine(system, refined ? 3 : 1);
+    if (refined && conjugate_directions(system)) refine(system, 2);
+}
+
+/// Takes the relief out of the solution. In the multipliers of relieved rows, all else eliminated, the true equations
+/// read S z = b and the factor solves with P = S + relief: conjugate gradients with P as preconditioner need one
+/// solve per round and about as many rounds as S has eigenvalues below the relief (a heavy body on a light one).
+bool PivotSolver::conjugate_directions(MixedSystem& system) {
+    relieved_.clear();
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        const int offset = matrix_.offset(bodies_ + static_cast<int>(k));
+        for (int i = 0; i < block.size; ++i)
+            if (is_free(block, i) && !bilateral(block, i)) relieved_.push_back({offset + i, relief * own_[row_start_[k] + i]});
     }
+    auto only_relieved = [&] {  // the rest is rounding; directions are scaled, so leave it to refine()
+        solution_.assign(residual_.size(), 0.0);
+        double largest = 0.0;
+        for (const Relieved& row : relieved_) {
+            solution_[row.at] = residual_[row.at];
+            largest = std::max(largest, std::abs(residual_[row.at]));
+        }
+        return largest;
+    };
+    double residual_before = only_relieved(), product_before = 0.0;
+    const double small = 1e-15 * speed_;
+    int round = 0, stalled = 0;
+    for (; round < max_directions && residual_before > small && stalled < 8; ++round) {
+        gradient_.resize(relieved_.size());
+        for (std::size_t k = 0; k < relieved_.size(); ++k) gradient_[k] = residual_[relieved_[k].at];
+        matrix_.solve(solution_.data());
+        double product = 0.0;
+        for (std::size_t k = 0; k < relieved_.size(); ++k) product -= gradient_[k] * solution_[relieved_[k].at];
+        if (!(product > 0.0)) break;
+        const double turn = round == 0 ? 0.0 : product / product_before;
+        if (round == 0) {
+            direction_ = solution_;
+            image_ = gradient_;
+        } else {
+            for (std::size_t i = 0; i < direction_.size(); ++i) direction_[i] = solution_[i] + turn * direction_[i];
+            for (std::size_t k = 0; k < relieved_.size(); ++k) image_[k] = gradient_[k] + turn * image_[k];
+        }
+        double curvature = 0.0;  // pᵀ S p, with S p = P p − relief p
+        for (std::size_t k = 0; k < relieved_.size(); ++k) {
+            const double p = -direction_[relieved_[k].at];
+            curvature += p * (image_[k] - relieved_[k].relief * p);
+        }
+        if (!(curvature > 1e-14 * product)) break;  // a direction of equal solutions: nothing to gain
+        correct(system, direction_, product / curvature);
+        residual(system);
+        const double now = only_relieved();
+        stalled = now < 0.5 * residual_before ? 0 : stalled + 1;
+        residual_before = now;
+        product_before = product;
+    }
+    return round > 0;
 }
 
 void PivotSolver::guess_by_sweeps(MixedSystem& system, int sweeps) {
@@ -252,17 +313,17 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
             break;
         }
         same_matrix = true;
-        const bool refine = round < refined_rounds;
-        solve_free(system, refine);
+        const bool refined = round < refined_rounds;
+        solve_free(system, refined);
         ++report.rounds;
 
         int count = offenders(system, true);
-        if (count == 0 && !refine) solve_free(system, true);
+        if (count == 0 && !refined) solve_free(system, true);
         if (count == 0) {
             report.converged = true;
             break;
         }
-        if (count < best && refine) best = count, left = patience;
+        if (count < best && refined) best = count, left = patience;
         else if (left > 0) --left;
         if (left == 0 && report.restarts < max_restarts) {
             tolerance_ = std::min(10.0 * tolerance_, loosest);
@@ -271,7 +332,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
             best = 1 << 30, left = patience;
             if (report.restarts > 2) continue;
         }
-        const bool all = left > 0 && refine;
+        const bool all = left > 0 && refined;
         if (!all) offenders(system, false);
         for (std::size_t k = 0; k < system.rows.size(); ++k) {
             RowBlock& block = system.rows[k];

@@ -26,15 +26,15 @@ struct PivotReport {
 /// ends for P-matrices. Rows start from RowBlock::state; bilateral rows never leave the free set.
 ///
 /// Singular systems (four rigid corners, Sig = 0): the factored matrix carries a compliance of `relief` times each
-/// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the solution is refined against the true equations until the residual
-/// stops shrinking. That gives the solution of least norm among equals, weighted by (G M⁻¹ Gᵀ)ᵢᵢ, and changes no
-/// equation. A factor 1e-6 is small enough to converge in a few refinements and large enough that the rounding
-/// of gaps, divided by it, stays out of the loads.
+/// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the relief is then taken out again against the true equations, by conjugate
+/// gradients with the factor as preconditioner. That gives the solution of least norm among equals, weighted by
+/// (G M⁻¹ Gᵀ)ᵢᵢ, and changes no equation. A factor 1e-6 is small enough for a few rounds and large enough that the
+/// rounding of gaps, divided by it, stays out of the loads.
 class PivotSolver {
 public:
     double floor = 1e-12;   // of BlockLdlt::factor
     double relief = 1e-6;   // of bounded rows, in the factor only
-    int max_refinements = 8;
+    int max_directions = 30;
     int round_limit = 1 << 30;  // give up after so many rounds; without it the search ends by itself
 
     /// Fills velocity, multipliers and states. With `same_matrix` the caller promises that mass, Jacobians and
@@ -48,11 +48,18 @@ private:
     bool analyse(const MixedSystem& system);
     void measure(const MixedSystem& system);
     bool factor(const MixedSystem& system);
-    void solve_free(MixedSystem& system, bool refine);
+    void solve_free(MixedSystem& system, bool refined);
+    double refine(MixedSystem& system, int rounds);
+    bool conjugate_directions(MixedSystem& system);
+    void correct(MixedSystem& system, const std::vector<double>& direction, double length);
     double residual(const MixedSystem& system);
     void guess_by_sweeps(MixedSystem& system, int sweeps);
     int offenders(const MixedSystem& system, bool mark_all);
 
+    struct Relieved {
+        int at;  // in the vectors of matrix_
+        double relief;
+    };
     struct Pattern {
         int first, second, size;
         bool operator==(const Pattern&) const = default;
@@ -68,7 +75,8 @@ private:
     std::vector<double> own_;                    // per row, (G M⁻¹ Gᵀ)ᵢᵢ
     double tolerance_ = 0.0;                     // of this solve
     double speed_ = 0.0;                         // the scale of velocities in this system, m/s
-    std::vector<double> right_, solution_, residual_;
+    std::vector<double> solution_, residual_, direction_, image_, gradient_;
+    std::vector<Relieved> relieved_;
     std::vector<std::uint8_t> offends_;
     std::vector<Mat6> mass_factor_;
     std::vector<Vec6> free_velocity_;  // M⁻¹ p
