@@ -161,7 +161,11 @@ def _ladder(test: str, unit: str, night: int, broken: int) -> list[Any]:
             )  # fmt: skip
             error = math.nan if night >= broken and h == 0.1 and test == "n_pendulum" else 0.3 * h**order
             noise = 1.0 + 0.01 * math.sin(7.0 * night + h)
-            timing = Timing(seconds=(2e-6 / h * order * noise, 2.1e-6 / h * order), runs_per_repeat=10)
+            timing = Timing(
+                seconds=(2e-6 / h * order * noise, 2.1e-6 / h * order),
+                runs_per_repeat=10,
+                stage_seconds={"solve_path": 3e-6 / h, "apply_gravity": 1e-6 / h},
+            )
             steps = round(20.0 / h)
             counters = {"steps": steps, "block_operations": round(steps * 4 * order)}
             pairs.append((rung, sample(rung, error, timing=timing, counters=counters)))

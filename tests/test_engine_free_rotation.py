@@ -184,7 +184,16 @@ def test_a_sphere_turns_by_the_arc_sine_of_its_step() -> None:
 
 
 def test_a_body_too_fast_for_the_step_ends_the_run_by_name() -> None:
-    """The step needs h |w| < 2."""
+    """A ball turns by asin(h |L|/I) a step: beyond h |L|/I = 1 there is no answer, just below there is."""
+    for spin, fits in ((9.9, True), (10.1, False)):
+        ball = RigidBody(
+            name="ball",
+            mass=1.0,
+            inertia=(1.0, 1.0, 1.0),
+            position=(0.0, 0.0, 0.0),
+            angular_velocity=(0.0, spin, 0.0),
+        )
+        assert simulate(Scene(bodies=(ball,)), time_step=0.1, steps=100).completed == fits
     body = RigidBody(
         name="fast",
         mass=1.0,

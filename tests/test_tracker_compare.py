@@ -227,6 +227,21 @@ def test_an_unchanged_build_is_identical_ten_times_out_of_ten(seed):
     assert (document.verdict, document.exit_code) == ("identical", 0)
 
 
+def test_a_time_of_one_session_is_judged_where_history_knows_its_noise():
+    def seconds(value: float):
+        return pair("t/c/time", value, kind="time", better="smaller", unit="s", role="reported")
+
+    before, slower = run("a", seconds(1.0)), run("b", seconds(1.1))
+    noise = {"t/c/time": (1.0, 0.05)}
+
+    assert compare(before, slower).counts == {"changed": 1}
+    assert compare(before, slower, usual=noise).changes[0].name == "slower"
+    assert compare(before, run("b", seconds(1.04)), usual=noise).exit_code == 0
+    assert compare(before, run("b", seconds(0.9)), usual=noise).counts == {"improved": 1}
+    elsewhere = compare(before, run("b", seconds(9.0), machine="other"), usual=noise)
+    assert elsewhere.changes[0].word == "not_comparable"
+
+
 def test_run_times_of_another_machine_are_not_compared():
     document = compare(run("a", *ladder(1)), run("b", *ladder(2, cost=9.0), machine="other"))
 

@@ -272,6 +272,15 @@ def test_ten_years_of_nights_are_published_in_seconds(tmp_path: Path) -> None:
     assert max(path.stat().st_size for path in (tmp_path / "public" / "tests").iterdir()) < 1_500_000
 
 
+def test_values_without_a_description_have_a_page_too(tmp_path: Path) -> None:
+    """Results of another tool may come with nothing but numbers."""
+    bare = msgspec.structs.replace(document(0), tests=())
+    publish(DocumentHistory([bare]), tmp_path / "public")
+
+    assert "said nothing about the scene" in (tmp_path / "public" / "tests" / "beam.html").read_text()
+    assert Reader((tmp_path / "public" / "index.html").read_text()).open == []
+
+
 def test_a_night_of_one_test_does_not_pass_for_the_others(tmp_path: Path) -> None:
     whole, part = document(0), document(1)
     keys = {s.key for s in part.series if s.test == "beam"}

@@ -132,6 +132,12 @@ def test_what_is_not_finite_is_the_worst_value_at_once(broken):
     assert verdict(broken, 1e-3, limit=1.0).word == "fixed"
 
 
+def test_a_document_that_calls_nan_a_value_is_not_believed():
+    lying = Sample(series="t/c/m", value="nan", outcome="value", passed=True, set_point_held=True)
+
+    assert judge(series(limit=1.0), sample(0.1), lying).name == "not finite"
+
+
 def test_every_worse_class_is_regressed_and_every_better_one_is_not():
     for old in RANK:
         for new in RANK:

@@ -105,8 +105,7 @@ def _exit_as(document: Any, fail_on: str) -> None:
 
 
 def _compared(history: Any, before: str, after: str, levels: Any) -> Any:
-    """The comparison, with the first bad commit of what is red."""
-    from tracker.analyse import commit_of, judge_history, nights
+    """The comparison, with what history knows: the noise of run times, the first bad commit of what is red."""
     from tracker.compare import Measured, side_of
     from tracker.compare import compare as compared
 
@@ -115,18 +114,45 @@ def _compared(history: Any, before: str, after: str, levels: Any) -> Any:
         Measured(side=side_of(run), samples=history.samples(run.id), maps=history.maps(run.id))
         for run in (old, new)
     )
-    document = compared(earlier, later, levels)
+    usual = _usual_times(history, old, earlier.samples)
+    document = compared(earlier, later, levels, usual=usual)
     reds = [change.series for change in document.changes if change.red]
-    if not reds:
-        return document
+    known = _first_bad(history, new, reds) if reds else {}
+    return compared(earlier, later, levels, known, usual) if known else document
+
+
+def _usual_times(history: Any, run: Any, samples: Any) -> dict[str, tuple[float, float]]:
+    """Level and noise of each series of run times up to a run, on its machine and under its definition."""
+    from tracker.document import from_number
+    from tracker.noise import usual_of
+
+    timed = {key: definition for key, (definition, _) in samples.items() if definition.kind == "time"}
+    found = {}
+    for key, stored in history.series(timed, evidence=False).items() if timed else ():
+        values = []
+        for other, sample, version in stored.points:
+            if (other.machine.fingerprint, version) == (run.machine.fingerprint, timed[key].test_version):
+                values.append(from_number(sample.value))
+            if other.id == run.id:
+                break
+        usual = usual_of(values)
+        if usual is not None:
+            found[key] = usual
+    return found
+
+
+def _first_bad(history: Any, run: Any, series: list[str]) -> dict[str, tuple[str, str]]:
+    """Last good and first bad commit of red series, as far as the history knows them."""
+    from tracker.analyse import commit_of, judge_history, nights
+
     known = {}
-    for key, stored in history.series(reds).items():
+    for key, stored in history.series(series).items():
         told = judge_history(key, stored.definition, nights(stored.points))
-        place = next((j for j in reversed(told) if j.night.run.id == new.id), None)
-        if place is not None and place.first_bad is not None:
-            good = commit_of(place.last_good.run) if place.last_good else ""
-            known[key] = (good, commit_of(place.first_bad.run))
-    return compared(earlier, later, levels, known)
+        night = next((judged for judged in reversed(told) if judged.night.run.id == run.id), None)
+        if night is not None and night.first_bad is not None:
+            good = commit_of(night.last_good.run) if night.last_good else ""
+            known[key] = (good, commit_of(night.first_bad.run))
+    return known
 
 
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))
@@ -193,15 +219,24 @@ def show(test: str, engine: str, catalogue: str) -> None:
     say(card(test, tests[test]))
 
 
-@click.command(epilog=example("tracker explain falling_object"))
+@click.command(epilog=example("tracker explain falling_object --cost"))
 @click.argument("test")
+@click.option(
+    "--cost", is_flag=True, help="Also measure what each stage takes, and saves where it is left out."
+)
 @source_options
-def explain(test: str, engine: str, catalogue: str) -> None:
+def explain(test: str, cost: bool, engine: str, catalogue: str) -> None:
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
     from tracker.console import say
+    from tracker.ladder import saved_by_leaving_out, stage_costs
     from tracker.report_catalogue import stage_table
     from tracker.run import Source, select
 
     source = Source(catalogue=catalogue, engine=engine)
     tests = select(source.tests(), [test])
-    say(stage_table(test, tests[test], source.module()))
+    if cost:
+        simulate = source.simulate()
+        saved = saved_by_leaving_out(tests, simulate).get(test, {})
+        say(stage_table(test, tests[test], source.module(), stage_costs(tests[test], simulate), saved))
+    else:
+        say(stage_table(test, tests[test], source.module()))

@@ -17,6 +17,7 @@ from tracker.accepted import Accepted, acceptance
 from tracker.compare_document import Change, CompareDocument, Side
 from tracker.compare_ladders import frontiers, run_times
 from tracker.document import MapData, Sample, SeriesDefinition, from_number
+from tracker.noise import Usual, judge_time
 from tracker.verdict import RED, Verdict, judge, judge_map
 from tracker.wording import slug
 
@@ -76,9 +77,14 @@ def compare(
     after: Measured,
     accepted: Sequence[Accepted] = (),
     first_bad: Mapping[str, tuple[str, str]] | None = None,
+    usual: Mapping[str, Usual] | None = None,
 ) -> CompareDocument:
-    """What changed from one to the other. `first_bad`: by series, the last good and first bad commit."""
-    changes = _series_changes(before, after) + _map_changes(before, after)
+    """What changed from one to the other.
+
+    `first_bad`: by series, the last good and first bad commit. `usual`: by series of run times, their level at
+    the earlier version and the relative change that stands clear of their noise, where history knows them.
+    """
+    changes = _series_changes(before, after, usual or {}) + _map_changes(before, after)
     same_machine = before.side.machine == after.side.machine
     if same_machine and before.side.run != after.side.run:
         changes += run_times(before.samples, after.samples)
@@ -102,14 +108,15 @@ def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regress
     """Red before anything; then whether what decides could be compared at all."""
     if any(change.red for change in changes):
         return "regressed"
+    compared = [c for c in changes if c.word not in ("not_comparable", "new", "not_measured")]
     values = [change for change in changes if change.kind not in ("time", "run_time")]
-    compared = [c for c in values if c.word not in ("not_comparable", "new", "not_measured")]
     if not compared or any(c.word == "not_comparable" and c.role != "reported" for c in values):
         return "not_comparable"
-    return "identical" if all(change.word == "identical" for change in compared) else "same"
+    told = [change for change in compared if change.kind not in ("time", "run_time")] or compared
+    return "identical" if all(change.word == "identical" for change in told) else "same"
 
 
-def _series_changes(before: Measured, after: Measured) -> list[Change]:
+def _series_changes(before: Measured, after: Measured, usual: Mapping[str, Usual]) -> list[Change]:
     old_run, new_run = before.side, after.side
     measured = {(definition.test, FAMILY[definition.kind]) for definition, _ in after.samples.values()}
     changes = []
@@ -123,7 +130,8 @@ def _series_changes(before: Measured, after: Measured) -> list[Change]:
             changes.append(_gone(key, old, asked))
         elif old is not None and new is not None:
             if new[0].kind == "time" and from_number(new[1].value) != from_number(old[1].value):
-                verdict = _time_scalar(old, new, before.side.machine == after.side.machine)
+                same_machine = before.side.machine == after.side.machine
+                verdict = _time_scalar(old, new, same_machine, usual.get(key))
             else:
                 verdict = judge(
                     new[0],
@@ -154,13 +162,18 @@ def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool) -> Change
 
 
 def _time_scalar(
-    old: tuple[SeriesDefinition, Sample], new: tuple[SeriesDefinition, Sample], same_machine: bool
+    old: tuple[SeriesDefinition, Sample],
+    new: tuple[SeriesDefinition, Sample],
+    same_machine: bool,
+    usual: Usual | None,
 ) -> Verdict:
-    """Scalars read off one timing session carry its noise: classes are judged, sizes by `run_times`."""
+    """Scalars read off one timing session carry its noise: their size is judged where history knows it."""
     if not same_machine:
         return Verdict(word="not_comparable", sentence="run times of another machine")
     verdict = judge(new[0], old[1], new[1], same_definition=old[0].test_version == new[0].test_version)
     if verdict.word in ("regressed", "improved") and old[1].outcome == new[1].outcome:
+        if usual is not None:
+            return judge_time(usual, from_number(new[1].value), new[0].better == "larger")
         return Verdict(
             word="changed", sentence=f"{verdict.sentence}, of one timing session", decades=verdict.decades
         )

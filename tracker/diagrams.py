@@ -192,7 +192,9 @@ def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
         return "linear", list(limit), ""
     one_sign = trend.definition.better == "smaller_magnitude" or min(trend.values) > 0.0
     decades = math.log10(max(sizes) / min(sizes))
-    if one_sign and (decades > 1.5 or (limit is not None and not 0.2 < limit / max(sizes) < 5.0)):
+    if one_sign and (
+        decades > 1.5 or (limit is not None and limit > 0.0 and not 0.2 < limit / max(sizes) < 5.0)
+    ):
         return "log", [limit] if limit is not None and limit > 0.0 else [], ""
     if limit is None:
         return "linear", [], ""

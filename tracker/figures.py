@@ -8,6 +8,7 @@ sheet, so that a chart follows light and dark.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, names_on_lines, thinned, ticks
@@ -139,14 +140,21 @@ def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]
     axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "range": [low, high]}
     if scale == "log":
         decades = ticks(low, high, scale)
-        within = [e + math.log10(m) for e in range(math.floor(low), math.ceil(high)) for m in (1, 2, 5)]
-        shown = decades if len(decades) > 2 else [e for e in within if low <= e <= high]
+        shown = decades if len(decades) > 2 else _within(low, high, (1, 2, 5))
+        if len(shown) < 3:
+            shown = _within(low, high, (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9))
         axis |= {
             "tickvals": [10.0**e for e in shown],
             "ticktext": [number(float(f"{10.0**e:.3g}"), 3) for e in shown],
             "minor": {"showgrid": False},
         }
     return axis
+
+
+def _within(low: float, high: float, steps: Sequence[float]) -> list[float]:
+    """Marks inside the decades, as decades."""
+    marks = [e + math.log10(m) for e in range(math.floor(low), math.ceil(high)) for m in steps]
+    return [e for e in marks if low <= e <= high]
 
 
 def _polar(layout: dict[str, Any], chart: Chart) -> None:

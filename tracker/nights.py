@@ -228,6 +228,8 @@ def _chapter(
     by_test: dict[str, list[Trend]] = {}
     for trend in trends.values():
         by_test.setdefault(trend.definition.test, []).append(trend)
+    for test, of_test in by_test.items():
+        cards.setdefault(test, _bare_card(test, of_test[0].definition.title))
     for ordered in by_test.values():
         ordered.sort(key=lambda trend: trend.order)
     tests = [
@@ -242,6 +244,14 @@ def _chapter(
         for test, card in cards.items()
     ]
     return nights, sorted(tests, key=lambda t: not t.card.seven)
+
+
+def _bare_card(name: str, title: str) -> TestCard:
+    """A test of which only values came: results of another tool, perhaps."""
+    return TestCard(
+        name=name, title=title or name, question="", why="", model="", parameters=(), theory=(), reference="",
+        conclusion="", source="", misprints=(), seven=False, stages=(),
+    )  # fmt: skip
 
 
 def _add_evidence(history: Source, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:

@@ -24,6 +24,9 @@ NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CREEP = 5  # nights in each median that is compared for drift
 
 
+Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noisy:
     """One night's verdict; `against`, `first_bad`, `last_good` are places in the sequence."""
@@ -95,7 +98,24 @@ def judge_noisy(
     return found
 
 
-def _usual(values: Sequence[float]) -> tuple[float, float]:
+def usual_of(values: Sequence[float]) -> Usual | None:
+    """What is usual after these nights; None while there are too few to know the noise."""
+    recent = [value for value in values[-WINDOW:] if math.isfinite(value)]
+    return _usual(recent) if len(recent) >= FEWEST else None
+
+
+def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Verdict:
+    """One value against what was usual: red if it stands clear of the noise."""
+    level, threshold = usual
+    change = _worse_by(level, value, larger_is_better)
+    if change > threshold:
+        return _verdict(change, level, value, "slower")
+    if -change > threshold:
+        return Verdict(word="improved", sentence=_words(change))
+    return Verdict(word="same", sentence=f"{_words(change)}, inside the noise (±{100.0 * threshold:.0f} %)")
+
+
+def _usual(values: Sequence[float]) -> Usual:
     """Level, and the relative change that stands clear of it."""
     finite = [value for value in values if math.isfinite(value)]
     if not finite:

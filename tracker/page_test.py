@@ -9,6 +9,7 @@ from tracker.events import Event, of_test
 from tracker.nights import Book, TestHistory
 from tracker.page_rows import Page, address, event_row, row
 from tracker.scenery import scenery
+from tracker.stage_times import stage_times
 from tracker.wording import clean, day, slug
 
 
@@ -27,10 +28,12 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     contents += [("error-time", "Error against run time")] if charts else []
     contents += [("stability", "Stability")] if test.maps or break_points else []
     contents += [("stages", "Stages")] if test.card.stages else []
-    contents += [("conclusion", "Conclusions"), ("data", "Data")]
+    contents += [("conclusion", "Conclusions")] if test.card.conclusion else []
+    contents += [("data", "Data")]
     context = {
         "card": test.card,
         "slug": slug(test.name),
+        "stage_times": stage_times(test),
         "scenery": scenery(test.card.scene) if test.card.scene else None,
         "state": test.state,
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),

@@ -17,6 +17,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
+
 from tracker.document import MapData, OutcomeClass, Sample, SeriesDefinition, from_number
 
 Word = Literal[
@@ -78,6 +80,7 @@ def judge(
         return _incomparable("the definition of the test changed")
     if not same_environment:
         return _incomparable("measured in another float environment")
+    before, after = _honest(before), _honest(after)
     old, new = from_number(before.value), from_number(after.value)
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
     if same_bits(old, new) and before.outcome == after.outcome:
@@ -100,6 +103,13 @@ def judge(
     if after.set_point_held and not before.set_point_held and definition.set_point is not None:
         return Verdict(word="fixed", sentence="back at its set point", decades=decades, ulps=ulps)
     return _by_size(definition, old, new, decades, ulps)
+
+
+def _honest(sample: Sample) -> Sample:
+    """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
+    if RANK[sample.outcome] >= RANK["not_finite"] or math.isfinite(from_number(sample.value)):
+        return sample
+    return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
 
 
 def _incomparable(why: str) -> Verdict:

@@ -1,0 +1,286 @@
+"""The symmetries of mechanics hold: other units, another place, direction, speed or order give the same motion.
+
+Units scaled by powers of two change no mantissa, so the motion must agree to the last bit: a constant hidden in
+a tolerance or threshold would break that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engine import (
+    Box,
+    Capsule,
+    CentralGravity,
+    Distance,
+    Hinge,
+    JointSpring,
+    Limit,
+    Load,
+    Material,
+    Method,
+    Motor,
+    Particle,
+    Plane,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Sphere,
+    Spring,
+    simulate,
+)
+from engine.bodies import Body
+from engine.joints import Constraint
+from tests import particle_scenes, rigid_scenes
+from tests.oracle import Array
+from tests.oracle_rigid import product, rotation
+
+TIME_STEP = 0.01  # s
+
+
+def heap(rng: np.random.Generator) -> Scene:
+    """Bodies of several shapes thrown onto rough ground."""
+    rough = Material(friction=0.5, restitution=0.3, compliance=1e-7)
+    shapes = (Sphere(0.2), Box((0.4, 0.3, 0.2)), Capsule(0.1, 0.3), Box((0.2, 0.2, 0.2)))
+    bodies: list[Body] = [
+        RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    ]
+    bodies += [
+        RigidBody(
+            name=f"b{i}",
+            mass=1.0 + i,
+            shape=shape,
+            position=(0.35 * i, 0.1 * i, 0.35 + 0.1 * i),
+            velocity=(1.0 - i, 0.2 * i, -1.0),
+            material=rough,
+        )
+        for i, shape in enumerate(shapes)
+    ]
+    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -9.81))
+
+
+def scaled(scene: Scene, mass: float, time: float) -> Scene:
+    """The same scene with all masses times `mass` and all times times `time`; lengths stay."""
+    speed, pull, force = 1.0 / time, 1.0 / time**2, mass / time**2
+
+    def vector(v: tuple[float, float, float], factor: float) -> tuple[float, float, float]:
+        return (v[0] * factor, v[1] * factor, v[2] * factor)
+
+    def soft(value: float | tuple[float, ...]) -> float | tuple[float, ...]:
+        return tuple(v / force for v in value) if isinstance(value, tuple) else value / force
+
+    def late(value: float | tuple[float, ...] | None) -> float | tuple[float, ...] | None:
+        if value is None:
+            return None
+        return tuple(v * time for v in value) if isinstance(value, tuple) else value * time
+
+    def body(b: Body) -> Body:
+        moved = replace(b, velocity=vector(b.velocity, speed))
+        if isinstance(moved, Particle):
+            return replace(moved, mass=moved.mass * mass)
+        moved = replace(moved, angular_velocity=vector(moved.angular_velocity, speed))
+        m = moved.material
+        surface = replace(
+            m,
+            compliance=m.compliance / force,
+            damping=late(m.damping),
+            slip_compliance=m.slip_compliance / mass * time,
+        )
+        moved = replace(moved, material=surface)
+        if moved.motion != "dynamic":
+            return moved
+        assert moved.mass is not None and moved.inertia is not None
+        return replace(moved, mass=moved.mass * mass, inertia=vector(moved.inertia, mass))
+
+    def constraint(c: Constraint) -> Constraint:
+        changed = replace(c, compliance=soft(c.compliance), damping=late(c.damping))
+        if isinstance(changed, Hinge | Prismatic):
+            if changed.motor:
+                bound = changed.motor.max_force
+                motor = Motor(
+                    speed=changed.motor.speed * speed, max_force=None if bound is None else bound * force
+                )
+                changed = replace(changed, motor=motor)
+            if changed.spring:
+                s = changed.spring
+                spring = JointSpring(stiffness=s.stiffness * force, rest=s.rest, damping=late(s.damping))  # type: ignore[arg-type]
+                changed = replace(changed, spring=spring)
+            if changed.limit:
+                limit = changed.limit
+                changed = replace(
+                    changed,
+                    limit=Limit(
+                        lower=limit.lower,
+                        upper=limit.upper,
+                        compliance=limit.compliance / force,
+                        damping=late(limit.damping),  # type: ignore[arg-type]
+                    ),
+                )
+        return changed
+
+    def push(f: Spring | CentralGravity | Load) -> Spring | CentralGravity | Load:
+        if isinstance(f, Spring):
+            return replace(f, stiffness=f.stiffness * force, viscosity=f.viscosity * mass / time)
+        if isinstance(f, CentralGravity):
+            return replace(f, strength=f.strength * pull)
+        return replace(f, force=vector(f.force, force), torque=vector(f.torque, force))
+
+    return replace(
+        scene,
+        bodies=tuple(map(body, scene.bodies)),
+        constraints=tuple(map(constraint, scene.constraints)),
+        forces=tuple(map(push, scene.forces)),
+        gravity=vector(scene.gravity, pull),
+    )
+
+
+def states(scene: Scene, steps: int, time_step: float = TIME_STEP, method: Method | None = None) -> Array:
+    """(n, 13) final states in the order of the bodies' names."""
+    final = simulate(scene, time_step=time_step, steps=steps, method=method or Method()).final_state
+    return np.array([final[name] for name in sorted(final)])
+
+
+SCENES: dict[str, Callable[[np.random.Generator], Scene]] = {
+    "particle chain": particle_scenes.chain,
+    "particle loop": particle_scenes.loop,
+    "particles and forces": particle_scenes.everything,
+    "rigid tree": rigid_scenes.tree,
+    "rigid loop": rigid_scenes.loop,
+    "rigid drives": rigid_scenes.everything,
+    "heap": heap,
+}
+STEPS = 60
+TO_ROUNDING = {"rigid loop": 1e-13, "heap": 1e-9}  # there an iteration ends by a criterion that knows units
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("mass", "time"), [(2.0**20, 1.0), (2.0**-20, 1.0), (1.0, 2.0**10), (1.0, 2.0**-10)])
+def test_other_units_of_mass_and_time_change_no_bit_of_the_positions(
+    name: str, mass: float, time: float
+) -> None:
+    scene = SCENES[name](np.random.default_rng(8))
+    here = states(scene, STEPS)
+    there = states(scaled(scene, mass, time), STEPS, TIME_STEP * time)
+
+    atol = TO_ROUNDING.get(name, 0.0)
+    np.testing.assert_allclose(there[:, :7], here[:, :7], rtol=0.0, atol=atol)
+    np.testing.assert_allclose(there[:, 7:] * time, here[:, 7:], rtol=0.0, atol=1000.0 * atol)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        Method(half_step_velocities=True, corrections=2),
+        Method(string_stiffness=True),
+        Method(substeps=2, corrections=1),
+        Method(solver="iterative", iterations=30),
+    ],
+    ids=["curved half-step", "strings", "substeps", "iterative"],
+)
+def test_the_options_of_particles_know_no_units_either(method: Method) -> None:
+    scene = particle_scenes.chain(np.random.default_rng(8))
+    for mass, time in ((2.0**12, 1.0), (1.0, 2.0**-6)):
+        if method.solver == "iterative" and mass == 1.0:
+            continue  # its tolerance is a speed in m/s, by definition
+        here = states(scene, STEPS, method=method)
+        there = states(scaled(scene, mass, time), STEPS, TIME_STEP * time, method)
+        np.testing.assert_array_equal(there[:, :7], here[:, :7])
+
+
+def turned(scene: Scene, q: Array, shift: Array, boost: Array) -> Scene:
+    """The scene turned by a quaternion, then moved and set in motion."""
+    r = rotation(q)
+
+    def place(v: object, offset: Array | float = 0.0) -> tuple[float, float, float]:
+        x, y, z = r @ np.array(v) + offset
+        return (float(x), float(y), float(z))
+
+    def body(b: Body) -> Body:
+        velocity = boost if isinstance(b, Particle) or b.motion == "dynamic" else 0.0
+        moved = replace(b, position=place(b.position, shift), velocity=place(b.velocity, velocity))
+        if isinstance(moved, Particle):
+            return moved
+        return replace(
+            moved,
+            orientation=tuple(product(q, np.array(moved.orientation))),
+            angular_velocity=place(moved.angular_velocity),
+        )
+
+    def constraint(c: Constraint) -> Constraint:
+        if isinstance(c, Distance):
+            ends = tuple(e if isinstance(e, str) else place(e, shift) for e in c.between)
+            return replace(c, between=ends)
+        changed = replace(c, at=None if c.at is None else place(c.at, shift))
+        axes = {name: place(getattr(c, name)) for name in ("axis", "cross_axis") if hasattr(c, name)}
+        changed = replace(changed, **axes)  # type: ignore[arg-type]
+        return replace(changed, compliance=1e-6, damping=0.02)  # rows follow axes, so all must be alike
+
+    def force(f: Spring | CentralGravity | Load) -> Spring | CentralGravity | Load:
+        if isinstance(f, Spring):
+            return replace(f, between=tuple(e if isinstance(e, str) else place(e, shift) for e in f.between))
+        if isinstance(f, CentralGravity):
+            return replace(f, centre=place(f.centre, shift))
+        return replace(f, force=place(f.force), torque=place(f.torque))
+
+    return replace(
+        scene,
+        bodies=tuple(map(body, scene.bodies)),
+        constraints=tuple(map(constraint, scene.constraints)),
+        forces=tuple(map(force, scene.forces)),
+        gravity=place(scene.gravity),
+    )
+
+
+STILL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_space_has_no_direction_and_no_origin(name: str) -> None:
+    """Turned and moved, a scene moves the same, turned and moved."""
+    scene = SCENES[name](np.random.default_rng(9))
+    q = np.array([0.7, -0.2, 0.5, 0.4])
+    q /= np.linalg.norm(q)
+    r, shift = rotation(q), np.array([3.0, -5.0, 2.0])
+    here = states(turned(scene, STILL, np.zeros(3), np.zeros(3)), 30)
+    there = states(turned(scene, q, shift, np.zeros(3)), 30)
+
+    assert np.abs(there[:, :3] - here[:, :3] @ r.T - shift).max() < 1e-10
+    assert np.abs(there[:, 7:10] - here[:, 7:10] @ r.T).max() < 1e-8
+    assert np.abs(there[:, 10:] - here[:, 10:] @ r.T).max() < 1e-8
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_uniform_motion_cannot_be_noticed(seed: int) -> None:
+    """A floating cloud of jointed bodies, in motion as a whole, moves within itself as at rest."""
+    rng = np.random.default_rng(seed)
+    held = rigid_scenes.tree(rng)
+    scene = replace(held, constraints=held.constraints[1:], gravity=(0.0, 0.0, 0.0))
+    boost = np.array([4.0, -2.0, 1.0])
+    here = states(turned(scene, STILL, np.zeros(3), np.zeros(3)), 50)
+    there = states(turned(scene, STILL, np.zeros(3), boost), 50)
+
+    assert np.abs(there[:, :3] - here[:, :3] - 50 * TIME_STEP * boost).max() < 1e-11
+    assert np.abs(there[:, 7:10] - here[:, 7:10] - boost).max() < 1e-10
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_order_in_which_a_scene_is_written_does_not_matter(name: str) -> None:
+    """Up to rounding: bodies, constraints and forces shuffled."""
+    scene = SCENES[name](np.random.default_rng(10))
+    rng = np.random.default_rng(11)
+
+    def shuffled(items: tuple[object, ...]) -> tuple[object, ...]:
+        return tuple(items[i] for i in rng.permutation(len(items)))
+
+    other = replace(
+        scene,
+        bodies=shuffled(scene.bodies),
+        constraints=shuffled(scene.constraints),
+        forces=shuffled(scene.forces),
+    )
+
+    assert np.abs(states(other, 30) - states(scene, 30)).max() < 1e-9
