@@ -37,6 +37,10 @@ RigidSystem::RigidSystem(const RigidScene& scene)
         if (slot_[body] == 0 || (touching && constants_[body].moves())) {
             slot_[body] = static_cast<int>(tied_.size());
             tied_.push_back(body);
+        } else if (constants_[body].moves()) {
+            free_.push_back(body);
+        } else if (constants_[body].motion == Motion::kinematic) {
+            driven_.push_back(body);
         }
     if (touching) {
         std::vector<SurfaceMaterial> materials;
@@ -55,6 +59,7 @@ RigidSystem::RigidSystem(const RigidScene& scene)
 
 void RigidSystem::reset(StageClock* clock) {
     live_ = {};
+    tied_are_moved_ = false;
     live_.bodies = start_;
     matrix_.shift_constraints(0.0);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
