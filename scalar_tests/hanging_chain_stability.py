@@ -71,6 +71,13 @@ def _largest_ratio(method: Method, tilt: float, hard: float, resolution: float =
     return study
 
 
+def lightest_load(simulate: Simulate) -> BreakPoint:
+    """Smallest mass ratio of the last sphere, plain SPOOK."""
+    return break_point(
+        lambda ratio: is_stable(_kind(simulate, ratio, TIME_STEP, PLAIN)), 1.0, 1e-14, walk=15, resolution=0.1
+    )
+
+
 def _largest_offset(simulate: Simulate) -> BreakPoint:
     """String stiffness at a million to one, started with its spheres pushed left and right in turn."""
     return break_point(
@@ -157,6 +164,15 @@ STUDIES = (
         definition=HOLDS,
         study=_largest_ratio(STRING, WIDE_TILT, 1e12, 0.05),
         unit="1",
+    ),
+    StabilityStudy(
+        name="lightest-load",
+        title="Smallest mass ratio of the last sphere, plain SPOOK",
+        configuration="plain",
+        definition=HOLDS,
+        study=lightest_load,
+        unit="1",
+        better="smaller",
     ),
     StabilityStudy(
         name="start-offset-string",

@@ -37,13 +37,22 @@ MODULUS = 0.5  # m = sin²(θ₀/2) for a start at 90°
 
 
 def scene(
-    time_step: float, *, mass: float = MASS, compliance: float = COMPLIANCE, damping: float | None = None
+    time_step: float,
+    *,
+    mass: float = MASS,
+    compliance: float = COMPLIANCE,
+    damping: float | None = None,
+    away: float = 0.0,
+    start: float = LENGTH,
 ) -> Scene:
-    """A bob on a rod, level with the pivot at the origin and at rest; damping None is one time step [s]."""
-    bob = Particle(name="bob", position=(LENGTH, 0.0, 0.0), mass=mass)
+    """A bob on a rod, level with the pivot and at rest; damping None is one time step [s].
+
+    The pivot lies `away` [m] from the origin on every axis, the bob `start` [m] from the pivot.
+    """
+    bob = Particle(name="bob", position=(away + start, away, away), mass=mass)
     rod = Distance(
         name="rod",
-        between=((0.0, 0.0, 0.0), "bob"),
+        between=((away, away, away), "bob"),
         rest_length=LENGTH,
         compliance=compliance,
         damping=time_step if damping is None else damping,

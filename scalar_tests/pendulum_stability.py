@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Energy, Method, Result, Trace, Violation
+from engine import PLAIN, Energy, MaximumAbsolute, Method, Result, Trace, Violation
 from engine.observe import Observable
 from engine.theory import one_row_matrix
 from scalar_tests.bracket import break_point, cell, is_stable, table
@@ -83,6 +84,32 @@ def smallest_compliance(simulate: Simulate) -> BreakPoint:
     )
 
 
+def farthest(simulate: Simulate) -> BreakPoint:
+    """Farthest pivot [m] from the origin at which the length deviation is that at the origin to 1e-3."""
+
+    def worst(away: float) -> float:
+        observe: dict[str, Observable] = {"violation": MaximumAbsolute(quantity=Violation("rod"))}
+        result = swing(simulate, TIME_STEP, observe=observe, away=away)
+        return float(result["violation"]) if result.completed else math.inf
+
+    home = worst(0.0)
+    return break_point(lambda away: abs(worst(away) / home - 1.0) <= 1e-3, 1.0, 1e15, walk=16, resolution=0.1)
+
+
+def largest_start(simulate: Simulate) -> BreakPoint:
+    """Largest start violation, as a fraction of the length, that is gone within five seconds."""
+
+    def holds(violation: float) -> bool:
+        result = swing(simulate, TIME_STEP, observe=OBSERVE, start=LENGTH * (1.0 + violation))
+        if not result.completed:
+            return False
+        late = np.abs(result["violation"][round(5.0 / TIME_STEP) :]).max() / LENGTH
+        gain = result["energy"].max() / (MASS * GRAVITY * LENGTH)
+        return bool(late <= 0.01 and gain <= BOUND)
+
+    return break_point(holds, 0.001, 1000.0, walk=13, resolution=0.05)
+
+
 def damping_map(simulate: Simulate) -> StabilityMap:
     """(τ/h, compliance) at h = 1/60 s beside the eigenvalue of the rod's own motion."""
 
@@ -133,6 +160,25 @@ STUDIES = (
         study=smallest_compliance,
         unit="m/N",
         better="smaller",
+    ),
+    StabilityStudy(
+        name="farthest-from-origin",
+        title="Farthest from the origin that the pendulum keeps its error",
+        configuration="plain",
+        definition="22 s with the largest length deviation that of a pivot at the origin, to a part in a thousand",
+        study=farthest,
+        unit="m",
+        expected=(1e6, 1e15),
+        expected_source="a place is rounded to 1e-16 of its distance; the deviation is 4e-3 m",
+    ),
+    StabilityStudy(
+        name="largest-start-violation",
+        title="Largest start violation that the rod takes back",
+        configuration="plain",
+        definition="after 5 s the length is never off by more than 1 %, and the energy has never risen by more than 10 % "
+        "of m g l",
+        study=largest_start,
+        unit="1",
     ),
     StabilityStudy(
         name="damping-compliance-map",

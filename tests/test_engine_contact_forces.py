@@ -117,6 +117,25 @@ def test_action_and_reaction() -> None:
     np.testing.assert_allclose(result["ground None"], [0.0, 0.0, -3.0 * GRAVITY], atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("shape", "ratio"),
+    [(Sphere(0.5), 1e6), (Sphere(0.5), 1e12), (Box((1.0, 1.0, 1.0)), 1e6), (Box((1.0, 1.0, 1.0)), 1e9)],
+    ids=str,
+)
+def test_a_heavy_body_stands_on_a_light_one(shape: Shape, ratio: float) -> None:
+    bodies = (ground(), body(shape, 0.5, "light", mass=1.0), body(shape, 1.5, "heavy", mass=ratio))
+    observe = {
+        "low": Final(quantity=ContactForce("light", "ground")),
+        "high": Final(quantity=ContactForce("heavy")),
+        "moved": MaximumAbsolute(quantity=Position(), from_start=True),
+    }
+    result = simulate(Scene(bodies=bodies, gravity=DOWN), time_step=H, steps=120, observe=observe)
+
+    assert result["low"][2] == pytest.approx(GRAVITY * (1.0 + ratio), rel=1e-9)
+    assert result["high"][2] == pytest.approx(GRAVITY * ratio, rel=1e-9)
+    assert result["moved"].max() < 1e-3  # nothing but rounding holds a box without friction between two faces
+
+
 def test_an_overlapping_start_settles_without_being_launched() -> None:
     box = body(Box((1.0, 1.0, 1.0)), 0.4)  # 10 cm inside the ground
     observe = {"x": Trace(quantity=Position("body")), "v": Trace(quantity=Velocity("body"))}
@@ -171,7 +190,7 @@ def test_contacts_repeat_to_the_bit() -> None:
         for i in range(12)
     )
     program = compile(Scene(bodies=(ground(Material(friction=0.4)), *bodies), gravity=DOWN), time_step=H)
-    first, second = program.run(60), program.run(60)
+    first, second = program.run(200), program.run(200)
 
     assert first.completed and first.counters["contacts"] > 100
     assert first.state_hash == second.state_hash and first.counters == second.counters

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from engine import Load, RigidBody, Scene, simulate
+from engine import PLAIN, Load, RigidBody, Scene, simulate
 from engine.joints import Joint
 from scalar_tests import beam_scene, cantilever
 from scalar_tests.case import Measurement, Simulate
@@ -176,6 +176,23 @@ def test_a_broken_engine_turns_a_gate_red(test: str) -> None:
             found += [metric.passes(values[metric.name]) for metric in gates]
 
     assert found and not all(found)
+
+
+def test_an_engine_without_refinement_is_caught_by_name() -> None:
+    """One refinement against the true equations is worth five digits where rows are redundant."""
+
+    def rough(scene: Scene, **options: Any) -> Any:
+        method = replace(options.pop("method", PLAIN), refinements=0)
+        return simulate(scene, method=method, **options)
+
+    split = next(m for m in CATALOGUE["door"].measurements if m.metrics[0].name == "split_error")
+    ring = next(m for m in CATALOGUE["lock_ring"].measurements if m.parameters.get("N") == 200)
+
+    for measurement in (split, ring):
+        good, bad = measurement.measure(simulate), measurement.measure(rough)
+        metric = measurement.metrics[0]
+        assert metric.passes(good[metric.name])
+        assert not metric.passes(bad[metric.name]), metric.name
 
 
 # --- the references themselves --------------------------------------------------------------------------

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from engine import PLAIN, Distance, simulate
+from engine.theory import one_row_matrix
 from scalar_tests.bracket import break_count, break_point, cell, is_stable
 from scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from scalar_tests.catalogue import CATALOGUE
-from scalar_tests.oscillator_stability import growth_error
+from scalar_tests.oscillator_stability import growth_error, measured_growth, predicted_growth
 
 KINDS = {"settled", "bounded", "growing", "diverged", "not_finite"}
 SLOW = {"map-string", "longest-beam"}  # seconds each; every night runs them
@@ -163,3 +164,27 @@ def test_losing_damping_is_seen() -> None:
 
     assert growth_error(weak) > 1e-3
     assert point("pendulum", "smallest-damping", weak) > 100.0 * point("pendulum", "smallest-damping")
+
+
+def test_the_misprinted_sign_of_the_damping_term_is_caught_by_name() -> None:
+    """Eq 2.11 of the thesis has −τ where the method has +τ: one mass on one row, stepped so."""
+
+    def misprinted(scene: Any, *, time_step: float, steps: int, observe: Any, **_: Any) -> Any:
+        row, mass = scene.constraints[0], scene.bodies[0]
+        step = one_row_matrix(mass.mass, row.compliance, -row.damping, time_step)
+        states = [np.array([mass.position[2], mass.velocity[2]])]
+        for _step in range(steps):
+            states.append(step @ states[-1])
+        path = np.array(states)
+        place, speed = (np.pad(path[:, k : k + 1], ((0, 0), (2, 0))) for k in (0, 1))
+        result = SimpleNamespace(completed=True, status="completed", sample_times={"x": np.arange(steps + 1)})
+        found = {"x": place, "v": speed}
+        return type("Run", (), {"__getitem__": lambda self, name: found[name], **vars(result)})()
+
+    damped = CATALOGUE["oscillator_damped"].measurements[0]
+    values = damped.measure(misprinted)
+
+    assert [m.name for m in damped.metrics if m.role == "gate" and not m.passes(values[m.name])] == [
+        "difference"
+    ]
+    assert abs(measured_growth(misprinted, 10.0, 2.0) - predicted_growth(10.0, 2.0)) > 1e-3

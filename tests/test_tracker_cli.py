@@ -253,6 +253,9 @@ def test_list_show_and_explain_tell_what_is_asked_and_what_it_needs():
     stages = tracker("explain", "fall").output
     assert stages.startswith("fall: apply_gravity\n")
     assert re.search(r"left out +collision +no body has a shape", stages)
+    assert re.search(
+        r"kept +apply_gravity +takes \S+ \S+ +the scene has", tracker("explain", "fall", "--cost").output
+    )
 
 
 @pytest.mark.parametrize(

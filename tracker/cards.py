@@ -39,7 +39,7 @@ def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[S
             stage=choice.stage,
             kept=choice.kept,
             reason=sentence(choice.reason),
-            saved_seconds_per_step=saved.get(choice.stage),
+            saved_seconds_per_step=None if choice.kept else saved.get(choice.stage),
         )
         for choice in answer.value or ()
     )

@@ -219,15 +219,24 @@ def show(test: str, engine: str, catalogue: str) -> None:
     say(card(test, tests[test]))
 
 
-@click.command(epilog=example("tracker explain falling_object"))
+@click.command(epilog=example("tracker explain falling_object --cost"))
 @click.argument("test")
+@click.option(
+    "--cost", is_flag=True, help="Also measure what each stage takes, and saves where it is left out."
+)
 @source_options
-def explain(test: str, engine: str, catalogue: str) -> None:
+def explain(test: str, cost: bool, engine: str, catalogue: str) -> None:
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
     from tracker.console import say
+    from tracker.ladder import saved_by_leaving_out, stage_costs
     from tracker.report_catalogue import stage_table
     from tracker.run import Source, select
 
     source = Source(catalogue=catalogue, engine=engine)
     tests = select(source.tests(), [test])
-    say(stage_table(test, tests[test], source.module()))
+    if cost:
+        simulate = source.simulate()
+        saved = saved_by_leaving_out(tests, simulate).get(test, {})
+        say(stage_table(test, tests[test], source.module(), stage_costs(tests[test], simulate), saved))
+    else:
+        say(stage_table(test, tests[test], source.module()))

@@ -17,7 +17,7 @@ from tracker.definition import definition_hash
 from tracker.document import OutcomeClass, Sample, SeriesDefinition, Timing, to_number
 from tracker.measure import Witness, ask, series_key
 from tracker.order import error_in_time, in_range, observed_order, time_at_error
-from tracker.timing import Timed, interleaved, once
+from tracker.timing import Timed, interleaved, once, stage_seconds
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
 ORDER_BAND = 0.1
@@ -270,6 +270,18 @@ def saved_by_leaving_out(tests: Mapping[str, ScalarTest], simulate: Simulate) ->
                 cost = min(s for s in forced if s is not None) - min(s for s in without if s is not None)
                 saved.setdefault(name, {})[stage] = max(0.0, cost) / steps
     return saved
+
+
+def stage_costs(test: ScalarTest, simulate: Simulate) -> dict[str, float]:
+    """Seconds per step of each stage kept, of the test's example scene with nothing observed; the best of a few."""
+    example = test.example()
+    steps = max(1, min(2000, round(1.0 / example.time_step)))
+    run = _example_run(example, steps, ())
+    costs: dict[str, float] = {}
+    for _ in range(SAVED_RUNS):
+        for stage, seconds in stage_seconds(run, simulate).items():
+            costs[stage] = min(costs.get(stage, math.inf), seconds / steps)
+    return costs
 
 
 def _example_run(example: Example, steps: int, stages: tuple[str, ...]) -> Timed:

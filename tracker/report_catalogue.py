@@ -11,6 +11,7 @@ import click
 from scalar_tests.case import Measurement, Metric, ScalarTest
 from tracker.cards import explained
 from tracker.console import Column, table, width
+from tracker.report_sweep import seconds
 from tracker.report_table import number
 
 
@@ -76,12 +77,32 @@ def _metric(measurement: Measurement, metric: Metric, room: int) -> Iterator[str
         yield from textwrap.wrap(words, room, initial_indent="  ", subsequent_indent="  ")
 
 
-def stage_table(name: str, test: ScalarTest, engine: Any) -> str:
-    """The stages of a step of this test's scene: first those kept, in order, then why."""
+def _per_step(cost: float | None, verb: str) -> str:
+    return "" if cost is None else f"{verb} {seconds(cost)}" if cost > 0.0 else f"{verb} nothing"
+
+
+def stage_table(
+    name: str,
+    test: ScalarTest,
+    engine: Any,
+    costs: Mapping[str, float] | None = None,
+    saved: Mapping[str, float] | None = None,
+) -> str:
+    """The stages of a step of this test's scene: first those kept, in order, then why.
+
+    `costs` are seconds per step of stages kept, `saved` those that leaving a stage out saves, if measured.
+    """
     choices = list(explained(test, engine))
     kept = [choice.stage for choice in choices if choice.kept]
-    rows = [("✓ kept" if c.kept else "· left out", c.stage, c.reason) for c in choices]
-    columns = (Column("stage"), Column("name"), Column("why", flexible=True))
+    rows: list[tuple[str, ...]] = [("✓ kept" if c.kept else "· left out", c.stage, c.reason) for c in choices]
+    columns: tuple[Column, ...] = (Column("stage"), Column("name"), Column("why", flexible=True))
+    if costs is not None and saved is not None:
+        told = [
+            _per_step(costs.get(c.stage), "takes") if c.kept else _per_step(saved.get(c.stage), "saves")
+            for c in choices
+        ]
+        columns = (*columns[:2], Column("a step", "right"), columns[2])
+        rows = [(*row[:2], cost, row[2]) for row, cost in zip(rows, told, strict=True)]
 
     def paint(row: int, text: str) -> str:
         return click.style(text, fg="green" if choices[row].kept else None)

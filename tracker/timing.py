@@ -109,7 +109,7 @@ def _timing(lane: _Lane, simulate: Simulate) -> Timing:
         seconds=tuple(lane.seconds),
         runs_per_repeat=lane.runs,
         instructions=_instructions(lane.run, simulate) if short and can_count() else None,
-        stage_seconds=_stage_seconds(lane.run, simulate) if short else {},
+        stage_seconds=stage_seconds(lane.run, simulate) if short else {},
     )
 
 
@@ -124,7 +124,7 @@ def _instructions(run: Timed, simulate: Simulate) -> int | None:
     return min((count for count in counts if count), default=None)
 
 
-def _stage_seconds(run: Timed, simulate: Simulate) -> dict[str, float]:
+def stage_seconds(run: Timed, simulate: Simulate) -> dict[str, float]:
     """Time by stage; empty for an engine that has no such clock."""
     watch = Stopwatch(simulate, {"time_stages": True})
     answer = ask(partial(run, watch))

@@ -5,24 +5,29 @@
 
 namespace spook::kernel {
 
-/// One column of the factor. In memory from `at` on: the pivot block, unit upper U (n × n); 1/D (n); then for
-/// each coupled row block its n × n_r block Z = D⁻¹ U⁻ᵀ A.
+/// One column of the factor. In `values` from `at` on: U above its unit diagonal, row by row; 1/D (n); then for
+/// each coupled row block its n × n_r block Z = D⁻¹ U⁻ᵀ A. In `work` from `work` on, while the column is being
+/// summed up: the pivot block (n × n), then the row blocks. Columns that are done give their room in `work` to
+/// later ones: of a chain, all of it stays in the nearest cache.
 struct Column {
-    std::int64_t at, first_row, first_target;
+    std::int64_t at, work, first_row, first_target;
     std::int32_t offset;  // of its unknowns
     std::int32_t row_count;
     std::uint8_t size, is_constraint;
 };
 
-/// Where a block of the matrix goes in the factor. Blocks are taken when a column first needs them, so that the
+/// Where a block of the matrix goes in `work`. Blocks are taken when a column first needs them, so that the
 /// factor is written once while the matrix is read once.
 struct Load {
-    enum Kind : std::uint8_t { direct, transposed, diagonal, raw_diagonal, zero };
+    enum Kind : std::uint8_t { direct, transposed, diagonal, zero };
     std::int64_t from, to;
     std::int32_t offset;  // of the unknowns of a diagonal block
     std::uint8_t rows, columns;
     Kind kind;
-    bool constraint;  // a diagonal block of −Sig, which may get a shift in the factor
+    // Of diagonal blocks:
+    bool constraint = false;  // −Sig, which may get a shift in the factor
+    bool thin = false;        // only the diagonal of the block is stored
+    bool raw = false;         // its scale has been started already
 };
 
 struct Factor {
@@ -30,13 +35,13 @@ struct Factor {
     std::int64_t column_count;
     const std::uint8_t* row_size;
     const std::int32_t* row_offset;
-    const std::int64_t* targets;  // per column, for each pair of its rows r ≤ s: where the update goes
+    const std::int64_t* targets;  // per column, for each pair of its rows r ≤ s: where in `work` the update goes
     const double* matrix;
     const Load* loads;
     const std::int64_t* load_start;  // per column: loads[load_start[k]] … before loads[load_start[k + 1]]
     double* values;
+    double* work;
     double* scale;    // per unknown: sum of magnitudes a pivot came from
-    double* scratch;  // the widest column before division by D
     double shift;     // taken from the diagonal of every constraint, in the factor only
 };
 

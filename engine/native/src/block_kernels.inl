@@ -95,12 +95,12 @@ SPOOK_INLINE int pivot(double* u, double* inverse, const double* scale, double s
     return inverse[N - 1] - inverse[N - 1] == 0.0 ? replaced : -1;
 }
 
-/// Y ← U⁻ᵀ A (to scratch), Z ← D⁻¹ Y (in place of A).
+/// Y ← U⁻ᵀ A (in place of A), Z ← D⁻¹ Y.
 template <int N, int R>
 SPOOK_INLINE void divide(const double* u, const double* inverse, double* z, double* y) {
     Row<R> rows[N];
 #pragma GCC unroll 6
-    for (int i = 0; i < N; ++i) rows[i].load(z + i * R);
+    for (int i = 0; i < N; ++i) rows[i].load(y + i * R);
 #pragma GCC unroll 6
     for (int i = 0; i < N; ++i) {
 #pragma GCC unroll 6
@@ -149,12 +149,23 @@ SPOOK_INLINE void update_diagonal(const double* y, const double* z, double* t, d
     }
 }
 
+/// U above its diagonal, row by row: entry (i, j) with j > i.
+constexpr int packed(int n, int i, int j) { return i * n - i * (i + 1) / 2 + j - i - 1; }
+
 template <int N>
-SPOOK_INLINE void forward_pivot(const double* u, double* x) {
+SPOOK_INLINE void pack(const double* u, double* p) {
 #pragma GCC unroll 6
     for (int i = 0; i < N; ++i)
 #pragma GCC unroll 6
-        for (int j = i + 1; j < N; ++j) x[j] -= u[i * N + j] * x[i];
+        for (int j = i + 1; j < N; ++j) p[packed(N, i, j)] = u[i * N + j];
+}
+
+template <int N>
+SPOOK_INLINE void forward_pivot(const double* p, double* x) {
+#pragma GCC unroll 6
+    for (int i = 0; i < N; ++i)
+#pragma GCC unroll 6
+        for (int j = i + 1; j < N; ++j) x[j] -= p[packed(N, i, j)] * x[i];
 }
 
 /// xᵣ −= Zᵀ x.
@@ -185,11 +196,11 @@ SPOOK_INLINE void backward_row(const double* z, const double* xr, double* x) {
 }
 
 template <int N>
-SPOOK_INLINE void backward_pivot(const double* u, double* x) {
+SPOOK_INLINE void backward_pivot(const double* p, double* x) {
 #pragma GCC unroll 6
     for (int i = N - 1; i >= 0; --i)
 #pragma GCC unroll 6
-        for (int j = i + 1; j < N; ++j) x[i] -= u[i * N + j] * x[j];
+        for (int j = i + 1; j < N; ++j) x[i] -= p[packed(N, i, j)] * x[j];
 }
 
 template <int N, int R, int S>
@@ -217,6 +228,10 @@ int pivot_call(double* u, double* inverse, const double* scale, double sign, dou
     return pivot<N>(u, inverse, scale, sign, floor, replacement);
 }
 template <int N>
+void pack_call(const double* u, double* p) {
+    pack<N>(u, p);
+}
+template <int N>
 void forward_pivot_call(const double* u, double* x) {
     forward_pivot<N>(u, x);
 }
@@ -228,6 +243,8 @@ void backward_pivot_call(const double* u, double* x) {
 #define SPOOK_SIX(f) {f(1), f(2), f(3), f(4), f(5), f(6)}
 #define SPOOK_P(n) pivot_call<n>
 constexpr int (*pivot_table[6])(double*, double*, const double*, double, double, double) = SPOOK_SIX(SPOOK_P);
+#define SPOOK_PK(n) pack_call<n>
+constexpr void (*pack_table[6])(const double*, double*) = SPOOK_SIX(SPOOK_PK);
 #define SPOOK_FP(n) forward_pivot_call<n>
 constexpr void (*forward_pivot_table[6])(const double*, double*) = SPOOK_SIX(SPOOK_FP);
 #define SPOOK_BP(n) backward_pivot_call<n>
@@ -253,24 +270,29 @@ template <int U>
 SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
     const int rows = U ? U : item.rows, columns = U ? U : item.columns;
     const double* from = f.matrix + item.from;
-    double* to = f.values + item.to;
+    double* to = f.work + item.to;
     switch (item.kind) {
         case Load::zero: std::fill_n(to, rows * columns, 0.0); return;
         case Load::transposed:
             for (int a = 0; a < rows; ++a)
                 for (int b = 0; b < columns; ++b) to[b * rows + a] = from[a * columns + b];
             return;
-        case Load::diagonal:
-            for (int a = 0; a < rows; ++a) f.scale[item.offset + a] = std::abs(from[a * rows + a]);
-            break;
-        case Load::raw_diagonal:
-            for (int a = 0; a < rows; ++a) f.scale[item.offset + a] += std::abs(from[a * rows + a]);
-            break;
-        default: break;
+        case Load::diagonal: {
+            const int step = item.thin ? 1 : rows + 1;
+            double* scale = f.scale + item.offset;
+            for (int a = 0; a < rows; ++a) scale[a] = (item.raw ? scale[a] : 0.0) + std::abs(from[a * step]);
+            if (item.thin) {
+                std::fill_n(to, rows * rows, 0.0);
+                for (int a = 0; a < rows; ++a) to[a * rows + a] = from[a];
+            } else {
+                std::copy_n(from, rows * rows, to);
+            }
+            if (item.constraint && f.shift != 0.0)
+                for (int a = 0; a < rows; ++a) to[a * rows + a] -= f.shift;
+            return;
+        }
+        default: std::copy_n(from, rows * columns, to);
     }
-    std::copy_n(from, rows * columns, to);
-    if (item.constraint && f.shift != 0.0)
-        for (int a = 0; a < rows; ++a) to[a * rows + a] -= f.shift;
 }
 
 template <int U>
@@ -280,7 +302,7 @@ SPOOK_INLINE void forward_column(const Factor& f, const Column& column, double* 
     double* xk = x + column.offset;
     if constexpr (U) forward_pivot<U>(u, xk);
     else forward_pivot_table[n - 1](u, xk);
-    const double* z = u + n * n + n;
+    const double* z = u + n * (n + 1) / 2;
     for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
         const int m = U ? U : f.row_size[r];
         if constexpr (U) forward_row<U, U>(z, xk, x + f.row_offset[r]);
@@ -297,8 +319,8 @@ std::int64_t factor_columns(const Factor& f, double floor, double replacement, d
         for (std::int64_t i = f.load_start[k]; i < f.load_start[k + 1]; ++i) load_block<U>(f, f.loads[i]);
         const Column& column = f.columns[k];
         const int n = U ? U : column.size;
-        double* u = f.values + column.at;
-        double* inverse = u + n * n;
+        double* u = f.work + column.work;
+        double* inverse = f.values + column.at + n * (n - 1) / 2;
         const double sign = column.is_constraint ? -1.0 : 1.0;
         const double* scale = f.scale + column.offset;
         int count;
@@ -306,8 +328,10 @@ std::int64_t factor_columns(const Factor& f, double floor, double replacement, d
         else count = pivot_table[n - 1](u, inverse, scale, sign, floor, replacement);
         if (count < 0) return -1;
         replaced += count;
+        if constexpr (U) pack<U>(u, f.values + column.at);
+        else pack_table[n - 1](u, f.values + column.at);
         double* z = inverse + n;
-        double* y = f.scratch;
+        double* y = u + n * n;
         const std::uint8_t* sizes = f.row_size + column.first_row;
         for (int r = 0; r < column.row_count; ++r) {
             const int m = U ? U : sizes[r];
@@ -319,17 +343,17 @@ std::int64_t factor_columns(const Factor& f, double floor, double replacement, d
         const std::int64_t* target = f.targets + column.first_target;
         const std::int32_t* offsets = f.row_offset + column.first_row;
         const double* zr = inverse + n;
-        y = f.scratch;
+        y = u + n * n;
         for (int r = 0; r < column.row_count; ++r) {
             const int m = U ? U : sizes[r];
-            double* goal = f.values + *target++;
+            double* goal = f.work + *target++;
             if constexpr (U) update_diagonal<U, U>(y, zr, goal, f.scale + offsets[r], !column.is_constraint);
             else update_diagonal_table[n - 1][m - 1](y, zr, goal, f.scale + offsets[r], !column.is_constraint);
             zr += n * m;
             const double* zs = zr;
             for (int s = r + 1; s < column.row_count; ++s) {
                 const int l = U ? U : sizes[s];
-                goal = f.values + *target++;
+                goal = f.work + *target++;
                 if constexpr (U) update<U, U, U>(y, zs, goal);
                 else update_table[n - 1][m - 1][l - 1](y, zs, goal);
                 zs += n * l;
@@ -353,7 +377,7 @@ void backward_columns(const Factor& f, double* x) {
         const int n = U ? U : column.size;
         const double* u = f.values + column.at;
         double* xk = x + column.offset;
-        const double* inverse = u + n * n;
+        const double* inverse = u + n * (n - 1) / 2;
         for (int i = 0; i < n; ++i) xk[i] *= inverse[i];
         const double* z = inverse + n;
         for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 
 namespace spook {
 
 void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                        std::span<const std::uint8_t> is_constraint) {
+                        std::span<const std::uint8_t> is_constraint, bool thin_constraints) {
     const int count = static_cast<int>(sizes.size());
     if (is_constraint.size() != sizes.size())
         throw std::invalid_argument("block LDLT: every block needs a size and a sign");
@@ -23,6 +24,7 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
     offset_.resize(count);
     diagonal_at_.resize(count);
     coupling_at_.resize(edges.size());
+    thin_ = thin_constraints;
     unknowns_ = 0;
     uniform_size_ = count ? size_[0] : 0;
     std::int64_t at = 0;
@@ -30,7 +32,7 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
         offset_[i] = unknowns_;
         unknowns_ += size_[i];
         diagonal_at_[i] = at;
-        at += size_[i] * size_[i];
+        at += thin_ && is_constraint_[i] ? size_[i] : size_[i] * size_[i];
         if (size_[i] != uniform_size_) uniform_size_ = 0;
     }
     for (std::size_t e = 0; e < edges.size(); ++e) {
@@ -53,63 +55,101 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     for (int k = 0; k < count; ++k) position[order_[k]] = k;
 
     columns_.resize(count);
-    pivot_at_.resize(count);
     row_size_.resize(ordering.column_rows.size());
     row_offset_.resize(ordering.column_rows.size());
-    std::vector<std::int64_t> block_at(ordering.column_rows.size());
-    std::int64_t at = 0, target_count = 0, widest = 0;
+    std::int64_t at = 0, target_count = 0;
     operations_per_factor_ = 0;
     for (int k = 0; k < count; ++k) {
         const int block = order_[k], n = size_[block];
         const std::int64_t first = ordering.column_start[k], last = ordering.column_start[k + 1], d = last - first;
-        columns_[k] = {at, first, target_count, offset_[block], static_cast<std::int32_t>(d),
+        columns_[k] = {at,  0, first, target_count, offset_[block], static_cast<std::int32_t>(d),
                        static_cast<std::uint8_t>(n), is_constraint_[block]};
-        pivot_at_[block] = at;
-        at += n * n + n;
-        const std::int64_t start = at;
+        at += n * (n + 1) / 2;
         for (std::int64_t r = first; r < last; ++r) {
             const int row = ordering.column_rows[r];
             row_size_[r] = static_cast<std::uint8_t>(size_[row]);
             row_offset_[r] = offset_[row];
-            block_at[r] = at;
             at += n * size_[row];
         }
-        widest = std::max(widest, at - start);
         target_count += d * (d + 1) / 2;
         operations_per_factor_ += 1 + d + d * (d + 1) / 2;
     }
     factor_.assign(at, 0.0);
-    scratch_.assign(widest, 0.0);
 
-    targets_.resize(target_count);
-    // The first column that needs each block, of the diagonal and then of the rows: its own, or one that updates it.
+    // Blocks are numbered: pivot blocks in order of elimination, then the rows. Each is touched first by its own
+    // column, or by the first one that updates it.
     std::vector<std::int64_t> touched(count + ordering.column_rows.size());
     for (int k = 0; k < count; ++k) {
-        touched[order_[k]] = k;
+        touched[k] = k;
         for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) touched[count + r] = k;
     }
+    targets_.resize(target_count);
     std::int64_t next = 0;
     for (int k = 0; k < count; ++k) {
         const std::int64_t last = ordering.column_start[k + 1];
+        const auto aim = [&](std::int64_t block) {
+            targets_[next++] = block;
+            touched[block] = std::min<std::int64_t>(touched[block], k);
+        };
         for (std::int64_t r = ordering.column_start[k]; r < last; ++r) {
-            const int row = ordering.column_rows[r], p = position[row];
-            targets_[next++] = pivot_at_[row];
-            touched[row] = std::min<std::int64_t>(touched[row], k);
+            const int p = position[ordering.column_rows[r]];
+            aim(p);
             // Both lists are in order of elimination, and the later one contains the rest of this one.
             std::int64_t q = ordering.column_start[p];
             for (std::int64_t s = r + 1; s < last; ++s) {
                 while (ordering.column_rows[q] != ordering.column_rows[s]) ++q;
-                targets_[next++] = block_at[q];
-                touched[count + q] = std::min<std::int64_t>(touched[count + q], k);
+                aim(count + q);
             }
         }
     }
-
-    place_loads(ordering, block_at, touched);
+    std::vector<std::int64_t> block_at(touched.size());
+    place_work(touched, block_at);
+    for (std::int64_t& target : targets_) target = block_at[target];
+    place_loads(ordering, touched, block_at);
 }
 
-void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int64_t>& block_at,
-                            const std::vector<std::int64_t>& touched) {
+void BlockLdlt::place_work(const std::vector<std::int64_t>& touched, std::vector<std::int64_t>& block_at) {
+    const int count = block_count();
+    std::vector<std::vector<int>> born(count);
+    for (int k = 0; k < count; ++k) {
+        std::int64_t first = touched[k];
+        for (std::int64_t r = columns_[k].first_row; r < columns_[k].first_row + columns_[k].row_count; ++r)
+            first = std::min(first, touched[count + r]);
+        born[first].push_back(k);
+    }
+    std::map<std::int64_t, std::vector<std::int64_t>> vacant;  // by size
+    std::int64_t end = 0;
+    for (int k = 0; k < count; ++k) {
+        for (int c : born[k]) {
+            kernel::Column& column = columns_[c];
+            std::int64_t room = column.size * column.size;
+            for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r)
+                room += column.size * row_size_[r];
+            std::vector<std::int64_t>& free = vacant[room];
+            if (free.empty()) {
+                column.work = end;
+                end += room;
+            } else {
+                column.work = free.back();
+                free.pop_back();
+            }
+            block_at[c] = column.work;
+            std::int64_t at = column.work + column.size * column.size;
+            for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
+                block_at[count + r] = at;
+                at += column.size * row_size_[r];
+            }
+        }
+        const kernel::Column& done = columns_[k];
+        std::int64_t room = done.size * done.size;
+        for (std::int64_t r = done.first_row; r < done.first_row + done.row_count; ++r) room += done.size * row_size_[r];
+        vacant[room].push_back(done.work);
+    }
+    work_.assign(end, 0.0);
+}
+
+void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int64_t>& touched,
+                            const std::vector<std::int64_t>& block_at) {
     const int count = block_count();
     std::vector<int> position(count);
     for (int k = 0; k < count; ++k) position[order_[k]] = k;
@@ -140,16 +180,17 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
     loads_.resize(touched.size());
     for (int block = 0; block < count; ++block) {
         const auto n = static_cast<std::uint8_t>(size_[block]);
-        loads_[next[touched[block]]++] = {diagonal_at_[block], pivot_at_[block], offset_[block], n, n,
-                                          raw[block] ? kernel::Load::raw_diagonal : kernel::Load::diagonal,
-                                          is_constraint_[block] != 0};
+        const int k = position[block];
+        loads_[next[touched[k]]++] = {diagonal_at_[block], block_at[k], offset_[block], n, n,
+                                      kernel::Load::diagonal, is_constraint_[block] != 0,
+                                      thin_ && is_constraint_[block], raw[block] != 0};
     }
     for (int k = 0; k < count; ++k)
         for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) {
             const int early = order_[k], late = ordering.column_rows[r];
             kernel::Load& item = loads_[next[touched[count + r]]++];
-            item = {0, block_at[r], 0, static_cast<std::uint8_t>(size_[early]),
-                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero, false};
+            item = {0, block_at[count + r], 0, static_cast<std::uint8_t>(size_[early]),
+                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero};
             if (edge_of[r] < 0) continue;
             item.from = coupling_at_[edge_of[r]];
             item.kind = early < late ? kernel::Load::direct : kernel::Load::transposed;
@@ -189,6 +230,7 @@ void BlockLdlt::raw_scales() {
             const auto [i, j] = edges_[raw_edges_[at]];
             const double* b = coupling(raw_edges_[at]);
             const int other = i == block ? j : i, m = size_[other];
+            if (is_constraint_[other]) continue;
             const double* d = diagonal(other);
             for (int a = 0; a < n; ++a)
                 for (int c = 0; c < m; ++c) {
@@ -205,8 +247,8 @@ kernel::Factor BlockLdlt::view() const noexcept {
             row_size_.data(),     row_offset_.data(),
             targets_.data(),      values_.data(),
             loads_.data(),        load_start_.data(),
-            self->factor_.data(), self->scale_.data(),
-            self->scratch_.data(), shift_};
+            self->factor_.data(), self->work_.data(),
+            self->scale_.data(),  shift_};
 }
 
 bool BlockLdlt::factor_with(double floor, double* x) {
@@ -237,8 +279,14 @@ double BlockLdlt::largest_constraint_scale() const noexcept {
 void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
     const kernel::Kernels& fast = kernel::kernels();
     if (r != rhs) std::copy_n(rhs, unknowns_, r);
-    for (int i = 0; i < block_count(); ++i)
-        fast.subtract_product(size_[i], size_[i], diagonal(i), x + offset_[i], r + offset_[i]);
+    for (int i = 0; i < block_count(); ++i) {
+        const double *d = diagonal(i), *from = x + offset_[i];
+        double* to = r + offset_[i];
+        if (thin_ && is_constraint_[i])
+            for (int k = 0; k < size_[i]; ++k) to[k] -= d[k] * from[k];
+        else
+            fast.subtract_product(size_[i], size_[i], d, from, to);
+    }
     for (std::size_t e = 0; e < edges_.size(); ++e) {
         const auto [i, j] = edges_[e];
         fast.subtract_coupling(size_[i], size_[j], coupling(static_cast<int>(e)), x + offset_[i], x + offset_[j],

@@ -24,10 +24,12 @@ public:
 
     /// sizes[i] in 1 … 6; edges are the non-zero blocks off the diagonal, first < second, each pair once;
     /// is_constraint[i] says the sign of the pivots. Sets all values to zero. Throws std::invalid_argument.
+    /// With `thin_constraints` the diagonal blocks of constraints are diagonal and only that is stored.
     void analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                 std::span<const std::uint8_t> is_constraint);
+                 std::span<const std::uint8_t> is_constraint, bool thin_constraints = false);
 
-    /// Row-major square block; the caller fills all of it, symmetric. A constraint's holds −Sig.
+    /// Row-major square block; the caller fills all of it, symmetric. A constraint's holds −Sig; if thin, it is a
+    /// vector.
     double* diagonal(int block) noexcept { return values_.data() + diagonal_at_[block]; }
     const double* diagonal(int block) const noexcept { return values_.data() + diagonal_at_[block]; }
     /// Row-major block of the edge: rows of its first block, columns of its second.
@@ -70,8 +72,9 @@ public:
 
 private:
     void place_columns(const Ordering& ordering);
-    void place_loads(const Ordering& ordering, const std::vector<std::int64_t>& block_at,
-                     const std::vector<std::int64_t>& touched);
+    void place_work(const std::vector<std::int64_t>& touched, std::vector<std::int64_t>& block_at);
+    void place_loads(const Ordering& ordering, const std::vector<std::int64_t>& touched,
+                     const std::vector<std::int64_t>& block_at);
     void find_raw(const std::vector<int>& position);
     void raw_scales();
     void refine(const double* rhs, double* x, int refinements);
@@ -81,6 +84,7 @@ private:
     std::vector<int> size_, offset_, order_;
     std::vector<BlockEdge> edges_;
     std::vector<std::uint8_t> is_constraint_;
+    bool thin_ = false;
     int unknowns_ = 0, uniform_size_ = 0;
     double shift_ = 0.0;
     std::int64_t operations_per_factor_ = 0;
@@ -92,11 +96,10 @@ private:
     std::vector<std::uint8_t> row_size_;
     std::vector<std::int32_t> row_offset_;
     LargeArray<std::int64_t> targets_;
-    std::vector<std::int64_t> pivot_at_;  // of each block, in factor_
     LargeArray<kernel::Load> loads_;
     LargeArray<std::int64_t> load_start_;
     std::vector<int> raw_start_, raw_blocks_, raw_edges_;
-    LargeArray<double> factor_, scale_, scratch_, residual_;
+    LargeArray<double> factor_, work_, scale_, residual_;
     Counters counters_;
 };
 

@@ -23,38 +23,42 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         block.second = spec.second;
         block.size = joint.constants.rows;
         for (int k = 0; k < block.size; ++k) {
-            joint.regularisation[k] = regularise(spec.compliance[k], spec.damping[k], time_step);
-            block.softness[k] = joint.regularisation[k].softness;
+            const Regularisation row = regularise(spec.compliance[k], spec.damping[k], time_step);
+            joint.gain[k] = {row.upsilon, row.violation_gain};
+            block.softness[k] = row.softness;
         }
         blocks_.push_back(block);
 
-        joint.has_motor = spec.has_motor;
-        joint.has_limit = spec.has_limit;
-        joint.has_spring = spec.has_spring;
         joint.tracked = spec.has_limit || spec.has_spring;
         if (spec.has_motor || spec.has_limit || spec.has_spring) {
+            Axial axial;
+            axial.has_motor = spec.has_motor;
+            axial.has_limit = spec.has_limit;
+            axial.has_spring = spec.has_spring;
             block.axial = true;
             block.size = 0;
             block.softness = {};
             if (spec.has_motor) {
-                joint.speed = spec.motor_speed;
-                joint.impulse = time_step * spec.motor_force;
-                block.bounded = std::isfinite(joint.impulse);
+                axial.speed = spec.motor_speed;
+                axial.impulse = time_step * spec.motor_force;
+                block.bounded = std::isfinite(axial.impulse);
                 block.softness[block.size++] = 0.0;
             }
             if (spec.has_limit) {
-                joint.lower = spec.limit_lower;
-                joint.upper = spec.limit_upper;
-                joint.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
-                block.bounded = block.bounded || joint.lower < joint.upper;
-                block.softness[block.size++] = joint.limit.softness;
+                axial.lower = spec.limit_lower;
+                axial.upper = spec.limit_upper;
+                axial.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
+                block.bounded = block.bounded || axial.lower < axial.upper;
+                block.softness[block.size++] = axial.limit.softness;
             }
             if (spec.has_spring) {
-                joint.spring_rest = spec.spring_rest;
-                joint.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
-                block.softness[block.size++] = joint.spring.softness;
+                axial.spring_rest = spec.spring_rest;
+                axial.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
+                block.softness[block.size++] = axial.spring.softness;
             }
             blocks_.push_back(block);
+            joint.axial = static_cast<int>(axials_.size());
+            axials_.push_back(axial);
         }
         joints_.push_back(joint);
     }
@@ -73,8 +77,7 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
     assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows, state.first_reach,
                    state.second_reach);
     for (int k = 0; k < block.size; ++k) {
-        const Regularisation& r = joint.regularisation[k];
-        right.right[k] = r.upsilon * rows.rate[k] - r.violation_gain * rows.violation[k];
+        right.right[k] = joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
     }
 }
 
@@ -88,6 +91,7 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
                               double* second, BlockRight& right) noexcept {
     const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
     if (joint.tracked) state.angle = unwrapped(joint, row.coordinate, state.angle);
+    const Axial& axial = axials_[joint.axial];
     int k = 0;
     const auto next = [&](double value) {
         std::copy_n(row.first, 6, first + 6 * k);
@@ -95,19 +99,19 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         right.right[k] = value;
         return k++;
     };
-    if (joint.has_motor) {
-        const int motor = next(joint.speed);
-        right.lower[motor] = -joint.impulse;
-        right.upper[motor] = joint.impulse;
+    if (axial.has_motor) {
+        const int motor = next(axial.speed);
+        right.lower[motor] = -axial.impulse;
+        right.upper[motor] = axial.impulse;
     }
-    if (joint.has_limit) {
+    if (axial.has_limit) {
         // Only the nearer end can be reached within a step. An open gap may close but no more: then it meets no
         // row at all, and a bounce off the limit would depend on the phase of the step.
-        const bool low = joint.lower == joint.upper || state.angle - joint.lower <= joint.upper - state.angle;
-        const double violation = state.angle - (low ? joint.lower : joint.upper);
+        const bool low = axial.lower == axial.upper || state.angle - axial.lower <= axial.upper - state.angle;
+        const double violation = state.angle - (low ? axial.lower : axial.upper);
         const bool open = low ? violation > 0.0 : violation < 0.0;
-        const Regularisation& r = joint.limit;
-        if (joint.lower == joint.upper) {
+        const Regularisation& r = axial.limit;
+        if (axial.lower == axial.upper) {
             next(r.upsilon * row.rate - r.violation_gain * violation);
         } else {
             const int limit =
@@ -115,8 +119,8 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
             (low ? right.lower : right.upper)[limit] = 0.0;
         }
     }
-    if (joint.has_spring)
-        next(joint.spring.upsilon * row.rate - joint.spring.violation_gain * (state.angle - joint.spring_rest));
+    if (axial.has_spring)
+        next(axial.spring.upsilon * row.rate - axial.spring.violation_gain * (state.angle - axial.spring_rest));
 }
 
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {

@@ -62,9 +62,14 @@ public:
 private:
     struct Joint {
         JointConstants constants;
-        int first = -1, second = -1;
-        std::array<Regularisation, 6> regularisation;
-        bool tracked = false, has_motor = false, has_limit = false, has_spring = false;
+        int first = -1, second = -1, axial = -1;  // axial: index into axials_
+        bool tracked = false;
+        struct {
+            double upsilon, violation;
+        } gain[6];
+    };
+    struct Axial {
+        bool has_motor = false, has_limit = false, has_spring = false;
         double speed = 0.0, impulse = 0.0;
         double lower = 0.0, upper = 0.0, spring_rest = 0.0;
         Regularisation limit, spring;
@@ -80,6 +85,7 @@ private:
     double time_step_;
     BodyState world_;
     LargeArray<Joint> joints_;
+    std::vector<Axial> axials_;
     LargeArray<JointBlock> blocks_;
 };
 

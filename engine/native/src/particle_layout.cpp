@@ -61,7 +61,7 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     seen_lambda_.resize(row_.size());
     first_rhs_.resize(row_.size());
     if (solver_ == ParticleSolver::block) analyse_blocks();
-    block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps), 1, 4096);
+    block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps), 16, 4096);
 }
 
 int ParticleSystem::anchor(Vec3 point) {

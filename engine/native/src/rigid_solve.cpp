@@ -27,11 +27,11 @@ void RigidSystem::analyse_block() {
         tie(blocks[k].second, places_[k].second_edge, places_[k].second_particle);
     }
     for (int body : tied_) sizes.push_back(constants_[body].particle ? 3 : 6);
-    matrix_.analyse(sizes, edges, is_constraint);
+    matrix_.analyse(sizes, edges, is_constraint, true);
     right_.assign(matrix_.unknowns(), 0.0);
     solution_.assign(matrix_.unknowns(), 0.0);
     for (int k = 0; k < row_blocks; ++k)
-        for (int i = 0; i < sizes[k]; ++i) matrix_.diagonal(k)[i * sizes[k] + i] = -blocks[k].softness[i];
+        for (int i = 0; i < sizes[k]; ++i) matrix_.diagonal(k)[i] = -blocks[k].softness[i];
     for (std::size_t k = 0; k < tied_.size(); ++k) {
         const int block = row_blocks + static_cast<int>(k), n = matrix_.size(block);
         for (int i = 0; i < 3; ++i) matrix_.diagonal(block)[i * n + i] = constants_[tied_[k]].mass;
@@ -106,10 +106,13 @@ void RigidSystem::solve_block() {
         BodyState& s = live_.bodies[i];
         s.velocity = {x[0], x[1], x[2]};
         x += 3;
-        if (constants_[i].particle) continue;
-        s.angular_momentum = s.inertia * Vec3{x[0], x[1], x[2]};
-        x += 3;
+        if (!constants_[i].particle) {
+            s.angular_momentum = s.inertia * Vec3{x[0], x[1], x[2]};
+            x += 3;
+        }
+        if (!clock_) integrate_body(i);  // while it is at hand; a timed run keeps the stages apart
     }
+    tied_are_moved_ = clock_ == nullptr;
     if (clock_) clock_->mark(Stage::solve_block);
 }
 

@@ -57,8 +57,7 @@ void RigidSystem::kick_free_body(int i) noexcept {
 }
 
 void RigidSystem::kick_free_bodies() {
-    for (int i = 0; i < bodies(); ++i)
-        if (constants_[i].moves() && slot_[i] < 0) kick_free_body(i);
+    for (int i : free_) kick_free_body(i);
     if (clock_) clock_->mark(Stage::apply_gravity);
 }
 
@@ -85,9 +84,16 @@ bool RigidSystem::find_contacts() {
     return found;
 }
 
+void RigidSystem::integrate_body(int i) {
+    if (!integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
+}
+
 void RigidSystem::integrate_all() {
-    for (int i = 0; i < bodies(); ++i)
-        if (!integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
+    if (!tied_are_moved_)
+        for (int i : tied_) integrate_body(i);
+    tied_are_moved_ = false;
+    for (int i : free_) integrate_body(i);
+    for (int i : driven_) integrate_body(i);
     if (contacts_ && !contacts_->correction().empty()) {
         const std::vector<Vec6>& extra = contacts_->correction();
         for (std::size_t k = 0; k < tied_.size(); ++k)

@@ -37,13 +37,17 @@ RigidSystem::RigidSystem(const RigidScene& scene)
         if (slot_[body] == 0 || (touching && constants_[body].moves())) {
             slot_[body] = static_cast<int>(tied_.size());
             tied_.push_back(body);
+        } else if (constants_[body].moves()) {
+            free_.push_back(body);
+        } else if (constants_[body].motion == Motion::kinematic) {
+            driven_.push_back(body);
         }
     if (touching) {
         std::vector<SurfaceMaterial> materials;
         for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
         fresh_contacts_.emplace(std::move(detection), materials, slot_,
                                 ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
-                                               method_.residual_tolerance, method_.floor});
+                                               method_.residual_tolerance, method_.floor, method_.refinements});
     }
     if (method_.solver == SolverKind::iterative)
         solver_ = joints_.blocks().empty() ? RigidSolver::none : RigidSolver::iterative;
@@ -55,6 +59,7 @@ RigidSystem::RigidSystem(const RigidScene& scene)
 
 void RigidSystem::reset(StageClock* clock) {
     live_ = {};
+    tied_are_moved_ = false;
     live_.bodies = start_;
     matrix_.shift_constraints(0.0);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
@@ -63,6 +68,7 @@ void RigidSystem::reset(StageClock* clock) {
     residual_ = 0.0;
     pivot_ = PivotSolver{};
     pivot_.floor = method_.floor;
+    pivot_.refinements = method_.refinements;
     contacts_ = fresh_contacts_;
     matrix_.clear_counters();
     mixed_ = MixedSystem{};

@@ -93,6 +93,7 @@ private:
     std::pair<double, int> row_residual(double& speed);
     void find_contradiction();
     void solve_mixed(bool touching);
+    void integrate_body(int body);
     void integrate_all();
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
@@ -121,6 +122,8 @@ private:
     // One step's work.
     std::vector<Vec3> force_;           // of springs and centres, per body
     std::vector<int> tied_;             // dynamic bodies that have rows
+    std::vector<int> free_, driven_;    // dynamic bodies that never have rows; kinematic ones
+    bool tied_are_moved_ = false;
     std::vector<int> slot_;             // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     LargeArray<double> right_, solution_, left_;
