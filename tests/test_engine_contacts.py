@@ -256,6 +256,26 @@ def test_every_contact_of_a_stack_carries_what_stands_on_it() -> None:
     assert (result["energy"] - result["energy"][0]).max() < 1e-9
 
 
+@pytest.mark.parametrize("ratio", [1e3, 1e6, 1e9, 1e12])
+def test_a_heavy_ball_rests_on_a_light_one(ratio: float) -> None:
+    """Whatever the ratio of masses, both contacts carry what stands on them and nothing sinks."""
+    bodies = (ground(), ball("light", 0.5), ball("heavy", 1.5, mass=ratio))
+    result = simulate(
+        Scene(bodies=bodies, gravity=DOWN),
+        time_step=TIME_STEP,
+        duration=3.0,
+        observe={
+            "low": Trace(quantity=ContactForce("light", "ground"), first=1),
+            "high": Trace(quantity=ContactForce("heavy", "light"), first=1),
+            "z": Final(quantity=Position()),
+        },
+    )
+
+    np.testing.assert_allclose(result["low"][:, 2], (1.0 + ratio) * GRAVITY, rtol=1e-12)
+    np.testing.assert_allclose(result["high"][:, 2], ratio * GRAVITY, rtol=1e-12)
+    np.testing.assert_allclose(result["z"][1:, 2], (0.5, 1.5), rtol=0, atol=1e-11)
+
+
 @pytest.mark.parametrize("pile", ["balls", "cylinders", "boxes"])
 def test_a_beam_of_locked_boxes_rests_on_its_piles(pile: str) -> None:
     """Eighty boxes on one, two or four frictionless points at each end: straight to 1e-12 % of the length."""

@@ -37,6 +37,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     auto solver_of = [&](int first_body) -> PivotSolver& {
         PivotSolver& solver = solvers_[first_body];
         solver.floor = floor;
+        solver.refinements = refinements;
         return solver;
     };
     if (islands.count <= 1) return solve(system, points, solver_of(0));

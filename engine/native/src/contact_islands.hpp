@@ -25,6 +25,7 @@ public:
     using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, PivotSolver&)>;
 
     double floor = 1e-12;
+    int refinements = 1;
 
     /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and sweeps and takes the
     /// largest residual.

@@ -34,7 +34,10 @@ constexpr double closed = 1e-9;  // gaps up to this part of the larger body's ra
 ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
                            const ContactOptions& options)
     : detection_(std::move(detection)), materials_(std::move(materials)), unknown_(std::move(unknown)), options_(options) {
-    resting_solver_.floor = impact_solver_.floor = parting_solver_.floor = options.floor;
+    for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
+        solver->floor = options.floor;
+        solver->refinements = options.refinements;
+    }
     margin_.assign(unknown_.size(), 0.0);
     prescribed_.assign(unknown_.size(), Vec6{});
 }

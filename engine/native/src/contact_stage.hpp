@@ -13,7 +13,8 @@
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth a contact's own compliance
 // explains, twice eps times the force it carried last, enters r; the rest is parted by positions, at the same
-// rate 4 Ups per step, through the same solver with joints held.
+// rate 4 Ups per step, through the same solver with joints held. Positions that move without velocities keep the
+// centre of mass to rounding; the angular momentum of bodies in flight, r × p, changes a little while they part.
 //
 // Restitution acts a step early on a gap that is still open by g but closes in this step; else a fast body would
 // have to enter the other first. psi is then reduced to psi' so that the fall still ahead is not won twice:
@@ -39,7 +40,8 @@ struct ContactOptions {
     SolverKind solver = SolverKind::direct;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
-    double floor = 1e-12;
+    double floor = 1e-12;  // of pivots, in the factor only
+    int refinements = 1;
 };
 
 struct ContactCounters {  // exact, equal on every machine

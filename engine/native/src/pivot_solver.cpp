@@ -53,12 +53,10 @@ bool PivotSolver::analyse(const MixedSystem& system) {
     std::vector<BlockEdge> edges;
     first_edge_.assign(pattern.size(), -1);
     second_edge_.assign(pattern.size(), -1);
-    row_start_.assign(1, 0);
     for (std::size_t k = 0; k < pattern.size(); ++k) {
         const int block = bodies + static_cast<int>(k);
         sizes.push_back(pattern[k].size);
         is_constraint.push_back(1);
-        row_start_.push_back(row_start_.back() + pattern[k].size);
         if (pattern[k].first >= 0) first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
         if (pattern[k].second >= 0) second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
     }
@@ -67,159 +65,167 @@ bool PivotSolver::analyse(const MixedSystem& system) {
     last_ = {};
     bodies_ = bodies;
     pattern_ = std::move(pattern);
-    factored_free_.clear();
+    factored_ = false;
     solution_.assign(matrix_.unknowns(), 0.0);
     residual_.assign(matrix_.unknowns(), 0.0);
-    own_.assign(row_start_.back(), 0.0);
-    offends_.assign(row_start_.back(), 0);
+    state_.assign(matrix_.unknowns(), 0.0);
+    right_.assign(matrix_.unknowns(), 0.0);
     return true;
 }
 
 void PivotSolver::measure(const MixedSystem& system) {
-    mass_factor_.resize(system.mass.size());
+    std::vector<Mat6>& mass_factor = mass_factor_;
+    mass_factor.resize(system.mass.size());
     free_velocity_.resize(system.mass.size());
     for (std::size_t b = 0; b < system.mass.size(); ++b) {
-        mass_factor_[b] = cholesky(system.mass[b]);
+        mass_factor[b] = cholesky(system.mass[b]);
         free_velocity_[b] = system.momentum[b];
-        cholesky_solve(mass_factor_[b], free_velocity_[b]);
+        cholesky_solve(mass_factor[b], free_velocity_[b]);
     }
     speed_ = 0.0;
+    bounded_.clear();
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         for (int i = 0; i < block.size; ++i) {
-            double own = 0.0;
-            for (const auto& [body, jacobian] : {std::pair{block.first, &block.first_jacobian[i]}, std::pair{block.second, &block.second_jacobian[i]}}) {
-                if (body < 0) continue;
-                Vec6 x = *jacobian;
-                cholesky_solve(mass_factor_[body], x);
-                own += dot(*jacobian, x);
-            }
-            own_[row_start_[k] + i] = own;
             speed_ = std::max(speed_, std::abs(block.right[i]) + std::abs(row_velocity(block, i, free_velocity_)));
+            if (bilateral(block, i)) continue;
+            double own = 0.0;
+            if (block.first >= 0) {
+                Vec6 x = block.first_jacobian[i];
+                cholesky_solve(mass_factor[block.first], x);
+                own += dot(block.first_jacobian[i], x);
+            }
+            if (block.second >= 0) {
+                Vec6 x = block.second_jacobian[i];
+                cholesky_solve(mass_factor[block.second], x);
+                own += dot(block.second_jacobian[i], x);
+            }
+            bounded_.push_back({static_cast<int>(k), i, own});
         }
     }
 }
 
 bool PivotSolver::factor(const MixedSystem& system) {
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
-    factored_free_.resize(row_start_.back());
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         const int n = block.size;
         double* diagonal = matrix_.diagonal(bodies_ + static_cast<int>(k));
         std::fill_n(diagonal, n * n, 0.0);
-        for (int i = 0; i < n; ++i) {
-            const bool free = is_free(block, i);
-            const double relieved = bilateral(block, i) ? 0.0 : relief * own_[row_start_[k] + i];
-            diagonal[i * n + i] = free ? -(block.softness[i] + relieved) : -1.0;
-            factored_free_[row_start_[k] + i] = free;
-        }
-        for (const auto& [edge, jacobian] : {std::pair{first_edge_[k], &block.first_jacobian}, std::pair{second_edge_[k], &block.second_jacobian}}) {
+        for (int i = 0; i < n; ++i) diagonal[i * n + i] = is_free(block, i) ? -block.softness[i] : -1.0;
+        for (int end = 0; end < 2; ++end) {
+            const int edge = end == 0 ? first_edge_[k] : second_edge_[k];
             if (edge < 0) continue;
+            const auto& jacobian = end == 0 ? block.first_jacobian : block.second_jacobian;
             double* coupling = matrix_.coupling(edge);
             for (int a = 0; a < 6; ++a)
-                for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? (*jacobian)[i][a] : 0.0;
+                for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? jacobian[i][a] : 0.0;
         }
     }
-    return matrix_.factor(floor);
-}
-
-/// residual_ ← right side − true matrix × (velocity, multipliers); the largest entry relative to its scale.
-double PivotSolver::residual(const MixedSystem& system) {
-    double largest = 0.0, force = 0.0;
-    for (int b = 0; b < bodies_; ++b)
-        for (int a = 0; a < 6; ++a) {
-            double sum = system.momentum[b][a];
-            for (int c = 0; c < 6; ++c) sum -= system.mass[b][6 * a + c] * system.velocity[b][c];
-            residual_[6 * b + a] = sum;
-            force = std::max(force, std::abs(system.momentum[b][a]));
-        }
-    double slip = 0.0;
-    for (std::size_t k = 0; k < system.rows.size(); ++k) {
-        const RowBlock& block = system.rows[k];
-        double* r = residual_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
-        for (int i = 0; i < block.size; ++i) {
-            const double z = block.multiplier[i];
-            for (int a = 0; a < 6; ++a) {
-                if (block.first >= 0) residual_[6 * block.first + a] += block.first_jacobian[i][a] * z;
-                if (block.second >= 0) residual_[6 * block.second + a] += block.second_jacobian[i][a] * z;
-            }
-            r[i] = is_free(block, i) ? -row_residual(block, i, system.velocity) : 0.0;
-            slip = std::max(slip, std::abs(r[i]));
-        }
+    factored_free_.resize(bounded_.size());
+    for (std::size_t b = 0; b < bounded_.size(); ++b) {
+        const auto [k, i, own] = bounded_[b];
+        const bool free = is_free(system.rows[k], i);
+        factored_free_[b] = free;
+        if (free) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] -= relief * own;
     }
-    for (int i = 0; i < 6 * bodies_; ++i) largest = std::max(largest, std::abs(residual_[i]));
-    return std::max(force > 0.0 ? largest / force : largest, speed_ > 0.0 ? slip / speed_ : slip);
+    const bool finite = matrix_.factor(floor);
+    for (const auto& [k, i, own] : bounded_)  // the factor keeps its relief; residuals are of the true equations
+        if (is_free(system.rows[k], i)) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] = -system.rows[k].softness[i];
+    return finite;
 }
 
-void PivotSolver::correct(MixedSystem& system, const std::vector<double>& direction, double length) {
-    for (int b = 0; b < bodies_; ++b)
-        for (int a = 0; a < 6; ++a) system.velocity[b][a] += length * direction[6 * b + a];
-    for (std::size_t k = 0; k < system.rows.size(); ++k) {
-        RowBlock& block = system.rows[k];
-        const double* y = direction.data() + matrix_.offset(bodies_ + static_cast<int>(k));
-        for (int i = 0; i < block.size; ++i)
-            if (is_free(block, i)) block.multiplier[i] -= length * y[i];  // the unknown is −z
-    }
+/// residual_ ← right side − true matrix × state_; the largest entry relative to its scale.
+double PivotSolver::residual() {
+    matrix_.residual(right_.data(), state_.data(), residual_.data());
+    double force = 0.0, slip = 0.0;
+    for (int i = 0; i < 6 * bodies_; ++i) force = std::max(force, std::abs(residual_[i]));
+    for (int i = 6 * bodies_; i < matrix_.unknowns(); ++i) slip = std::max(slip, std::abs(residual_[i]));
+    return std::max(force_ > 0.0 ? force / force_ : force, speed_ > 0.0 ? slip / speed_ : slip);
 }
 
-double PivotSolver::refine(MixedSystem& system, int rounds) {
-    double before = unbounded, now = residual(system);
+double PivotSolver::refine(int rounds) {
+    double before = unbounded, now = residual();
     for (int round = 0; round < rounds && now > 1e-16 && now < 0.25 * before; ++round) {
         before = now;
-        solution_ = residual_;
-        matrix_.solve(solution_.data());
-        correct(system, solution_, 1.0);
-        now = residual(system);
+        matrix_.solve(residual_.data());
+        for (int i = 0; i < matrix_.unknowns(); ++i) state_[i] += residual_[i];
+        now = residual();
     }
     return now;
 }
 
 void PivotSolver::solve_free(MixedSystem& system, bool refined) {
-    // Start from zero velocities and free multipliers, the bound ones in place: the first residual is the right side.
-    for (Vec6& v : system.velocity) v.fill(0.0);
-    for (RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i)
-            block.multiplier[i] = is_free(block, i) ? 0.0 : block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
-    refine(system, refined ? 3 : 1);
-    if (refined && conjugate_directions(system)) refine(system, 2);
+    force_ = 0.0;
+    for (int b = 0; b < bodies_; ++b)
+        for (int a = 0; a < 6; ++a) {
+            right_[6 * b + a] = system.momentum[b][a];
+            force_ = std::max(force_, std::abs(system.momentum[b][a]));
+        }
+    for (std::size_t k = 0; k < system.rows.size(); ++k)
+        std::copy_n(system.rows[k].right.data(), system.rows[k].size, right_.data() + matrix_.offset(bodies_ + static_cast<int>(k)));
+    relieved_.clear();
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        const int at = matrix_.offset(bodies_ + k) + i;
+        if (is_free(block, i)) {
+            relieved_.push_back({at, relief * own});
+            continue;
+        }
+        const double z = block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
+        right_[at] = z;
+        if (z == 0.0) continue;
+        for (int a = 0; a < 6; ++a) {
+            if (block.first >= 0) right_[6 * block.first + a] += block.first_jacobian[i][a] * z;
+            if (block.second >= 0) right_[6 * block.second + a] += block.second_jacobian[i][a] * z;
+        }
+    }
+    state_ = right_;
+    matrix_.solve(state_.data());
+    if (refined) {
+        refine(refinements + 1);
+        if (conjugate_directions()) refine(refinements + 1);
+    }
+    for (int b = 0; b < bodies_; ++b) std::copy_n(state_.data() + 6 * b, 6, system.velocity[b].data());
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const double* y = state_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
+        for (int i = 0; i < system.rows[k].size; ++i) system.rows[k].multiplier[i] = -y[i];
+    }
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        if (!is_free(block, i)) block.multiplier[i] = block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
+    }
 }
 
 /// Takes the relief out of the solution. In the multipliers of relieved rows, all else eliminated, the true equations
 /// read S z = b and the factor solves with P = S + relief: conjugate gradients with P as preconditioner need one
 /// solve per round and about as many rounds as S has eigenvalues below the relief (a heavy body on a light one).
-bool PivotSolver::conjugate_directions(MixedSystem& system) {
-    relieved_.clear();
-    for (std::size_t k = 0; k < system.rows.size(); ++k) {
-        const RowBlock& block = system.rows[k];
-        const int offset = matrix_.offset(bodies_ + static_cast<int>(k));
-        for (int i = 0; i < block.size; ++i)
-            if (is_free(block, i) && !bilateral(block, i)) relieved_.push_back({offset + i, relief * own_[row_start_[k] + i]});
-    }
-    auto only_relieved = [&] {  // the rest is rounding; directions are scaled, so leave it to refine()
-        solution_.assign(residual_.size(), 0.0);
+bool PivotSolver::conjugate_directions() {
+    const auto only_relieved = [this] {  // the rest is rounding; directions are scaled, so leave it to refine()
+        gradient_.resize(relieved_.size());
         double largest = 0.0;
-        for (const Relieved& row : relieved_) {
-            solution_[row.at] = residual_[row.at];
-            largest = std::max(largest, std::abs(residual_[row.at]));
+        for (std::size_t k = 0; k < relieved_.size(); ++k) {
+            gradient_[k] = residual_[relieved_[k].at];
+            largest = std::max(largest, std::abs(gradient_[k]));
         }
         return largest;
     };
-    double residual_before = only_relieved(), product_before = 0.0;
+    residual();
+    double before = only_relieved(), product_before = 0.0;
     const double small = 1e-15 * speed_;
     int round = 0, stalled = 0;
-    for (; round < max_directions && residual_before > small && stalled < 8; ++round) {
-        gradient_.resize(relieved_.size());
-        for (std::size_t k = 0; k < relieved_.size(); ++k) gradient_[k] = residual_[relieved_[k].at];
+    for (; round < max_directions && before > small && stalled < 8; ++round) {
+        solution_.assign(residual_.size(), 0.0);
+        for (std::size_t k = 0; k < relieved_.size(); ++k) solution_[relieved_[k].at] = gradient_[k];
         matrix_.solve(solution_.data());
         double product = 0.0;
         for (std::size_t k = 0; k < relieved_.size(); ++k) product -= gradient_[k] * solution_[relieved_[k].at];
         if (!(product > 0.0)) break;
-        const double turn = round == 0 ? 0.0 : product / product_before;
         if (round == 0) {
             direction_ = solution_;
             image_ = gradient_;
         } else {
+            const double turn = product / product_before;
             for (std::size_t i = 0; i < direction_.size(); ++i) direction_[i] = solution_[i] + turn * direction_[i];
             for (std::size_t k = 0; k < relieved_.size(); ++k) image_[k] = gradient_[k] + turn * image_[k];
         }
@@ -229,11 +235,12 @@ bool PivotSolver::conjugate_directions(MixedSystem& system) {
             curvature += p * (image_[k] - relieved_[k].relief * p);
         }
         if (!(curvature > 1e-14 * product)) break;  // a direction of equal solutions: nothing to gain
-        correct(system, direction_, product / curvature);
-        residual(system);
+        const double length = product / curvature;
+        for (std::size_t i = 0; i < state_.size(); ++i) state_[i] += length * direction_[i];
+        residual();
         const double now = only_relieved();
-        stalled = now < 0.5 * residual_before ? 0 : stalled + 1;
-        residual_before = now;
+        stalled = now < 0.5 * before ? 0 : stalled + 1;
+        before = now;
         product_before = product;
     }
     return round > 0;
@@ -256,25 +263,23 @@ void PivotSolver::guess_by_sweeps(MixedSystem& system, int sweeps) {
 int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
     const double slip = tolerance_ * speed_;
     int count = 0, last = -1;
-    std::fill(offends_.begin(), offends_.end(), 0);
-    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+    offends_.assign(bounded_.size(), 0);
+    for (std::size_t b = 0; b < bounded_.size(); ++b) {
+        const auto& [k, i, own] = bounded_[b];
         const RowBlock& block = system.rows[k];
-        for (int i = 0; i < block.size; ++i) {
-            if (bilateral(block, i) || block.lower[i] == block.upper[i]) continue;
-            const int row = row_start_[k] + i;
-            bool offends;
-            if (is_free(block, i)) {
-                const double slack = slip / (own_[row] + block.softness[i]);
-                offends = block.multiplier[i] < block.lower[i] - slack || block.multiplier[i] > block.upper[i] + slack;
-            } else {
-                const double w = row_residual(block, i, system.velocity);
-                offends = block.state[i] == RowState::at_lower ? w < -slip : w > slip;
-            }
-            if (!offends) continue;
-            ++count;
-            last = row;
-            if (mark_all) offends_[row] = 1;
+        if (block.lower[i] == block.upper[i]) continue;
+        bool offends;
+        if (is_free(block, i)) {
+            const double slack = slip / (own + block.softness[i]);
+            offends = block.multiplier[i] < block.lower[i] - slack || block.multiplier[i] > block.upper[i] + slack;
+        } else {
+            const double w = row_residual(block, i, system.velocity);
+            offends = block.state[i] == RowState::at_lower ? w < -slip : w > slip;
         }
+        if (!offends) continue;
+        ++count;
+        last = static_cast<int>(b);
+        if (mark_all) offends_[b] = 1;
     }
     if (!mark_all && last >= 0) offends_[last] = 1;
     return count;
@@ -286,33 +291,35 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     tolerance_ = tightest;
     system.velocity.resize(system.mass.size());
     if (analyse(system)) same_matrix = false;
-    measure(system);
+    if (!same_matrix) measure(system);
 
     int bounded = 0;
     for (RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i) {
+        for (int i = 0; i < block.size; ++i)
             if (bilateral(block, i)) block.state[i] = RowState::free;
-            else if (block.lower[i] == block.upper[i]) block.state[i] = RowState::at_lower;
-            else if (block.state[i] == RowState::at_lower && block.lower[i] == -unbounded) block.state[i] = RowState::free;
-            else if (block.state[i] == RowState::at_upper && block.upper[i] == unbounded) block.state[i] = RowState::free;
-            bounded += !bilateral(block, i) && block.lower[i] != block.upper[i];
-        }
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        const RowState state = block.state[i];
+        if (block.lower[i] == block.upper[i]) block.state[i] = RowState::at_lower;
+        else if (state == RowState::at_lower && block.lower[i] == -unbounded) block.state[i] = RowState::free;
+        else if (state == RowState::at_upper && block.upper[i] == unbounded) block.state[i] = RowState::free;
+        bounded += block.lower[i] != block.upper[i];
+    }
 
     // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
     const int refined_rounds = 50 + 4 * bounded;
     const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
     int best = 1 << 30, left = patience;
     for (int round = 0; round < last_round; ++round) {
-        bool stale = !same_matrix || factored_free_.empty();
-        for (std::size_t k = 0; k < system.rows.size() && !stale; ++k)
-            for (int i = 0; i < system.rows[k].size; ++i)
-                stale = stale || is_free(system.rows[k], i) != static_cast<bool>(factored_free_[row_start_[k] + i]);
+        bool stale = !same_matrix || !factored_;
+        for (std::size_t b = 0; b < bounded_.size() && !stale; ++b)
+            stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) != static_cast<bool>(factored_free_[b]);
         if (stale && !factor(system)) {
             report.finite = false;
-            factored_free_.clear();
+            factored_ = false;
             break;
         }
-        same_matrix = true;
+        factored_ = same_matrix = true;
         const bool refined = round < refined_rounds;
         solve_free(system, refined);
         ++report.rounds;
@@ -334,14 +341,13 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         }
         const bool all = left > 0 && refined;
         if (!all) offenders(system, false);
-        for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        for (std::size_t b = 0; b < bounded_.size(); ++b) {
+            if (!offends_[b]) continue;
+            const auto& [k, i, own] = bounded_[b];
             RowBlock& block = system.rows[k];
-            for (int i = 0; i < block.size; ++i) {
-                if (!offends_[row_start_[k] + i]) continue;
-                ++report.flips;
-                if (!is_free(block, i)) block.state[i] = RowState::free;
-                else block.state[i] = block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
-            }
+            ++report.flips;
+            if (!is_free(block, i)) block.state[i] = RowState::free;
+            else block.state[i] = block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
         }
     }
     const BlockLdlt::Counters now = matrix_.counters();

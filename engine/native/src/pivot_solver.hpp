@@ -34,6 +34,7 @@ class PivotSolver {
 public:
     double floor = 1e-12;   // of BlockLdlt::factor
     double relief = 1e-6;   // of bounded rows, in the factor only
+    int refinements = 1;    // against the true equations, after each solve
     int max_directions = 30;
     int round_limit = 1 << 30;  // give up after so many rounds; without it the search ends by itself
 
@@ -49,13 +50,16 @@ private:
     void measure(const MixedSystem& system);
     bool factor(const MixedSystem& system);
     void solve_free(MixedSystem& system, bool refined);
-    double refine(MixedSystem& system, int rounds);
-    bool conjugate_directions(MixedSystem& system);
-    void correct(MixedSystem& system, const std::vector<double>& direction, double length);
-    double residual(const MixedSystem& system);
+    double refine(int rounds);
+    bool conjugate_directions();
+    double residual();
     void guess_by_sweeps(MixedSystem& system, int sweeps);
     int offenders(const MixedSystem& system, bool mark_all);
 
+    struct Bounded {  // a row that is not bilateral
+        int block, row;
+        double own;  // its (G M⁻¹ Gᵀ)ᵢᵢ
+    };
     struct Relieved {
         int at;  // in the vectors of matrix_
         double relief;
@@ -70,14 +74,13 @@ private:
     int bodies_ = -1;
     std::vector<Pattern> pattern_;
     std::vector<int> first_edge_, second_edge_;  // per row block, −1 if there is none
-    std::vector<std::uint8_t> factored_free_;    // per row
-    std::vector<int> row_start_;                 // per row block, index of its first row
-    std::vector<double> own_;                    // per row, (G M⁻¹ Gᵀ)ᵢᵢ
+    std::vector<Bounded> bounded_;
+    bool factored_ = false;
+    std::vector<std::uint8_t> factored_free_, offends_;  // per bounded row
     double tolerance_ = 0.0;                     // of this solve
-    double speed_ = 0.0;                         // the scale of velocities in this system, m/s
-    std::vector<double> solution_, residual_, direction_, image_, gradient_;
+    double speed_ = 0.0, force_ = 0.0;           // the scales of this system, m/s and N s
+    std::vector<double> right_, state_, residual_, solution_, direction_, image_, gradient_;
     std::vector<Relieved> relieved_;
-    std::vector<std::uint8_t> offends_;
     std::vector<Mat6> mass_factor_;
     std::vector<Vec6> free_velocity_;  // M⁻¹ p
 };

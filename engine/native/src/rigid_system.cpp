@@ -19,7 +19,7 @@ RigidSystem::RigidSystem(const RigidScene& scene)
     std::vector<char> dynamic;
     for (const BodyConstants& body : constants_) dynamic.push_back(body.moves());
     Detection detection(scene.colliders, dynamic, scene.no_contact);
-    const bool touching = detection.possible();
+    const bool touching = detection.possible() || method_.force_collision;
 
     slot_.assign(constants_.size(), -1);
     bool bounded = false;
@@ -47,7 +47,7 @@ RigidSystem::RigidSystem(const RigidScene& scene)
         for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
         fresh_contacts_.emplace(std::move(detection), materials, slot_,
                                 ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
-                                               method_.residual_tolerance, method_.floor});
+                                               method_.residual_tolerance, method_.floor, method_.refinements});
     }
     if (method_.solver == SolverKind::iterative)
         solver_ = joints_.blocks().empty() ? RigidSolver::none : RigidSolver::iterative;
@@ -68,6 +68,7 @@ void RigidSystem::reset(StageClock* clock) {
     residual_ = 0.0;
     pivot_ = PivotSolver{};
     pivot_.floor = method_.floor;
+    pivot_.refinements = method_.refinements;
     contacts_ = fresh_contacts_;
     matrix_.clear_counters();
     mixed_ = MixedSystem{};

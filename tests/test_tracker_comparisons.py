@@ -1,0 +1,66 @@
+"""Comparisons on the page are those of the command, made once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.synthetic_history import DocumentHistory, document, history
+from tracker import comparisons as module
+from tracker.comparisons import chosen, comparisons, page_data
+from tracker.events import all_events
+from tracker.nights import book
+
+
+def made(nights: DocumentHistory, known: dict[str, Any] | None = None) -> module.Comparisons:
+    told = book(nights)
+    return comparisons(nights, told, all_events(told), (), known or {})
+
+
+def test_every_ordered_pair_of_the_newest_versions_is_there() -> None:
+    told = made(history(4))
+
+    assert len(told.pairs) == 12
+    assert set(page_data(told)["pairs"]) == {f"{i},{j}" for i in range(4) for j in range(4) if i != j}
+
+
+def test_the_choice_is_bounded_and_keeps_releases() -> None:
+    from msgspec.structs import replace
+
+    runs = [document(n) for n in range(30)]
+    runs[3] = replace(runs[3], engine=replace(runs[3].engine, version="1.0.0"))
+
+    nights = chosen(book(DocumentHistory(runs)))
+
+    assert [night.index for night in nights] == [3, *range(20, 30)]
+
+
+def test_a_regression_names_its_first_bad_commit() -> None:
+    runs = history(6, broken=3)
+    told = made(runs)
+    bad = runs.runs()[3].engine.git_hash[:10]
+
+    pair = told.pairs["run-spook-0002/run-spook-0005"]
+    friction = next(c for c in pair["changes"] if c[3] == "Friction" and c[1] == "red")
+    assert (pair["verdict"], pair["code"]) == ("regressed", 1)
+    assert friction[-1] == f"first bad commit {bad}"
+
+
+def test_what_was_compared_before_is_not_compared_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = made(history(5))
+    asked = []
+
+    def counting(before: Any, after: Any, *rest: Any) -> Any:
+        asked.append((before.side.run, after.side.run))
+        return original(before, after, *rest)
+
+    original = module.compare
+    monkeypatch.setattr(module, "compare", counting)
+    second = made(history(6), first.pairs)
+
+    newest = "run-spook-0005"
+    assert all(newest in pair for pair in asked)
+    assert {k: v for k, v in second.pairs.items() if newest not in k} == {
+        k: v for k, v in first.pairs.items() if newest not in k
+    }

@@ -1,0 +1,76 @@
+"""Numbers as files: nothing lost, nothing that runs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.synthetic_history import HOSTILE
+from tracker.data_files import inert, records, table
+from tracker.templates import embedded, environment
+
+
+@pytest.mark.parametrize("formula", ["=cmd()", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])
+def test_a_spreadsheet_takes_no_text_for_a_formula(formula: str) -> None:
+    assert inert(formula) == f"'{formula}"
+    assert inert(-1.5) == "-1.5"
+    assert inert("a=b") == "a=b"
+
+
+@given(st.lists(st.floats(), min_size=1))
+def test_numbers_in_a_csv_file_keep_every_bit(values: list[float]) -> None:
+    (line,) = list(csv.reader(io.StringIO(table(["v"] * len(values), [values]).decode())))[1:]
+
+    back = [float(cell) for cell in line]
+    assert all(a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(values, back, strict=True))
+    assert [math.copysign(1.0, v) for v in values if v == 0.0] == [
+        math.copysign(1.0, b) for b in back if b == 0.0
+    ]
+
+
+@given(st.lists(st.text(), min_size=1, max_size=4))
+def test_any_text_survives_a_csv_file_but_for_its_apostrophe(texts: list[str]) -> None:
+    whole = table([str(i) for i in range(len(texts))], [texts]).decode()
+    (line,) = list(csv.reader(io.StringIO(whole, newline="")))[1:]
+
+    assert [cell.removeprefix("'") for cell in line] == [
+        t.replace("\x00", "�").encode("utf-8", "replace").decode().removeprefix("'") for t in texts
+    ]
+
+
+def test_a_table_as_json_says_what_is_not_finite_in_words() -> None:
+    assert json.loads(records(["a", "b"], [[math.nan, "x"], [1.0, None]])) == [
+        {"a": "nan", "b": "x"},
+        {"a": 1.0, "b": None},
+    ]
+
+
+def test_data_in_a_page_cannot_end_its_element() -> None:
+    text = str(embedded({"name": HOSTILE, "more": "</script><!--\u2028&"}))
+
+    assert not set("<>&\u2028") & set(text)
+    assert json.loads(text)["name"] == HOSTILE
+
+
+def test_a_template_escapes_and_never_forgets_a_name() -> None:
+    made = environment()
+
+    assert made.from_string("{{ x }}").render(x="<b>&") == "&lt;b&gt;&amp;"
+    with pytest.raises(Exception, match="undefined"):
+        made.from_string("{{ missing }}").render()
+
+
+def test_no_template_marks_anything_safe() -> None:
+    from tracker.resources import resource
+
+    for template in (resource("site") / "templates").iterdir():
+        text = template.read_text()
+        assert "|safe" not in text.replace(" ", "")
+        assert "autoescape" not in text
+        assert "{% include" not in text
