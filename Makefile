@@ -67,10 +67,11 @@ $(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
 	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e .
 	@touch $@
 
-$(VENV)/developed: $(VENV)/installed
-	@version="$$(sh .ci/version 2>/dev/null)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
-	    echo "installing the tools of development into $(VENV)" && $(BIN)/pip install -q -e '.[dev]'
-	@touch $@
+# The same with the tools of development; one installation does for both.
+$(VENV)/developed: $(VENV)/source-state | $(BIN)/pip
+	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
+	    echo "installing into $(VENV), with the tools of development" && $(BIN)/pip install -q -e '.[dev]'
+	@touch $(VENV)/installed $@
 
 install: $(VENV)/installed
 develop: $(VENV)/developed

@@ -12,7 +12,7 @@ from engine.method import PLAIN, Method
 from engine.observe import Observable
 from engine.particle_program import compile_particles
 from engine.program import Program, StageChoice
-from engine.rigid_program import compile_rigid
+from engine.rigid_program import compile_rigid, lacking
 from engine.scene import Scene
 
 NOTHING: Mapping[str, Observable] = MappingProxyType({})
@@ -38,7 +38,7 @@ def compile(
         raise MethodError(f"time_step must be a number of seconds, not {time_step!r}")
     if not (math.isfinite(time_step) and time_step > 0.0):
         raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
-    if all(isinstance(body, Particle) for body in scene.bodies):
+    if all(isinstance(body, Particle) for body in scene.bodies) and not _forces_rigid_stages(method):
         return compile_particles(scene, float(time_step), method, observe)
     return compile_rigid(scene, float(time_step), method, observe)
 
@@ -52,3 +52,9 @@ def explain(
 ) -> tuple[StageChoice, ...]:
     """Every stage of the step, kept or left out for this scene, with the reason; nothing is run."""
     return compile(scene, time_step=time_step, method=method, observe=observe).explain()
+
+
+def _forces_rigid_stages(method: Method) -> bool:
+    """Whether a stage only rigid bodies have is to be measured, and nothing is asked that they lack."""
+    wanted = not {"rotation", "collision"}.isdisjoint(method.force_stages)
+    return wanted and lacking(method) is None

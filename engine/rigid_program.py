@@ -42,7 +42,9 @@ def compile_rigid(
     scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable]
 ) -> Program:
     """The Program of a scene with at least one rigid body."""
-    _refuse_what_rigid_bodies_lack(method)
+    field = lacking(method)
+    if field is not None:
+        raise MethodError(f"method: {field} is for scenes of particles only; leave it out for rigid bodies")
     requests, shapes = [], {}
     for quantity in distinct_quantities(observe):
         wanted, shapes[quantity] = request(quantity, scene)
@@ -89,7 +91,7 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             springs.append((*points[0], *points[1], force.stiffness, force.rest_length, force.viscosity))
     body_kinds, body_rows = [], []
     for body, push in zip(scene.bodies, pushes, strict=True):
-        kind, row = _body(body, push, step)
+        kind, row = _body(body, push, step, turning="rotation" in method.force_stages)
         body_kinds.append(kind)
         body_rows.append(row)
     joint_kinds, joint_rows = [], []
@@ -128,11 +130,14 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "friction": _FRICTION[method.friction],
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
+            "force_collision": "collision" in method.force_stages,
         },
     }
 
 
-def _refuse_what_rigid_bodies_lack(method: Method) -> None:
+def lacking(method: Method) -> str | None:
+    """The first option that scenes with rigid bodies do not have and that is not at its default; None if all is
+    well."""
     for field, plain in (
         ("corrections", 0),
         ("half_step_velocities", False),
@@ -140,15 +145,18 @@ def _refuse_what_rigid_bodies_lack(method: Method) -> None:
         ("composition", "none"),
     ):
         if getattr(method, field) != plain:
-            raise MethodError(
-                f"method: {field} is for scenes of particles only; leave it at {plain!r} for rigid bodies"
-            )
+            return field
+    return None
 
 
-def _body(body: Particle | RigidBody, push: Any, step: float) -> tuple[tuple[int, int], tuple[float, ...]]:
+def _body(
+    body: Particle | RigidBody, push: Any, step: float, *, turning: bool
+) -> tuple[tuple[int, int], tuple[float, ...]]:
+    """`turning` gives a particle an inertia, to measure what its rotation would cost."""
     if isinstance(body, Particle):
         place = (*body.position, *_UPRIGHT, *body.velocity, *_ORIGIN)
-        return (0, 1), (body.mass, *_ORIGIN, *place, *push, 0.0, 0.0, 0.0, 4.5 * step, 0.0)
+        inertia = (body.mass,) * 3 if turning else _ORIGIN
+        return (0, int(not turning)), (body.mass, *inertia, *place, *push, 0.0, 0.0, 0.0, 4.5 * step, 0.0)
     material = body.material
     surface = (
         material.friction,

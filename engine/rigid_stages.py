@@ -41,7 +41,13 @@ def _choices(
     no_rows = "no joints and no contacts, so nothing to solve"
     particles_only = "rigid scenes do not have it"
 
-    yield choice("collision", contacts, "surfaces may touch", no_contact)
+    forced = "forced by the method"
+    yield choice(
+        "collision",
+        contacts or "collision" in method.force_stages,
+        "surfaces may touch" if contacts else forced,
+        no_contact,
+    )
     yield choice("apply_gravity", any(scene.gravity), "uniform gravity acts", "gravity is zero")
     yield choice(
         "apply_central_gravity",
@@ -96,7 +102,12 @@ def _choices(
     yield StageChoice("correct_curvature", False, particles_only)
     yield StageChoice("half_step", False, "velocities live at whole steps")
     yield choice("integrate_positions", moving, "bodies can move", "nothing can move")
-    yield choice("integrate_rotations", turning, "rigid bodies can turn", "no rigid body can turn")
+    yield choice(
+        "integrate_rotations",
+        turning or "rotation" in method.force_stages,
+        "rigid bodies can turn" if turning else forced,
+        "no rigid body can turn",
+    )
     yield choice(
         "observe",
         observes_each_step(observe),

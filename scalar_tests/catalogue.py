@@ -12,6 +12,7 @@ from scalar_tests import (
     friction,
     hanging_chain,
     lock_ring,
+    motor,
     n_pendulum,
     oscillator_damped,
     oscillator_filter,
@@ -23,6 +24,7 @@ from scalar_tests import (
     rolling_sphere,
     rotating_box,
     slip_angle,
+    spinning_top,
     swinging_door,
 )
 from scalar_tests.case import ScalarTest
@@ -52,4 +54,6 @@ CATALOGUE: dict[str, ScalarTest] = {
     "resting_stack": resting_stack.TEST,
     "rolling_sphere": rolling_sphere.TEST,
     "hanging_chain": hanging_chain.TEST,
+    "spinning_top": spinning_top.TEST,
+    "motor": motor.TEST,
 }

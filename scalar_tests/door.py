@@ -187,6 +187,8 @@ TEST = ScalarTest(
                     role="gate",
                     limit=0.02,
                     limit_source="thesis, section 4.2",
+                    set_point=(-5e-7, 5e-7),
+                    set_point_source="4.3e-7 % in the first step (prototype), rounding from then on",
                     reference=0.0,
                     tolerance=1e-11,
                 ),

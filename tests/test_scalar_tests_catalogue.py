@@ -114,6 +114,10 @@ def test_the_seven_stand_first_with_the_limits_as_printed() -> None:
         assert all(m.time_step == 1.0 / 60.0 for m, _ in gates)
         assert all((metric.limit, metric.unit) == PRINTED[name] for _, metric in gates)
         assert all("section 4.2" in metric.limit_source for _, metric in gates)
+    assert all(
+        metric.set_point for test in seven.values() for _, metric in test.metrics() if metric.role == "gate"
+    )
+    assert len(seven) == 7
     flags = [test.seven for test in CATALOGUE.values()]
     assert flags == sorted(flags, reverse=True)
 
@@ -124,3 +128,20 @@ def test_a_falling_object_needs_gravity_and_positions_only() -> None:
     choices = explain(example.scene, time_step=example.time_step, observe=example.observe)
 
     assert [choice.stage for choice in choices if choice.kept] == ["apply_gravity", "integrate_positions"]
+
+
+def test_every_figure_of_the_thesis_with_data_is_redrawn() -> None:
+    """Chapters 2 and 3: all figures but the sketches of models and the flow charts."""
+    wanted = {
+        *(f"2.{n}" for n in (4, 5, 6, 7, 8)),
+        *(f"3.{n}" for n in (2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 16, 17, 18, 20, 21, 22, 23, 24)),
+        *(f"3.{n}" for n in (26, 27, 28, 29, 30, 32, 33, 34, 35, 37)),
+    }
+    drawn = {
+        figure.thesis.removeprefix("Fig ").split(",")[0]
+        for test in CATALOGUE.values()
+        for figure in test.figures
+        if figure.thesis
+    }
+
+    assert drawn == wanted

@@ -31,6 +31,8 @@ RIGID_TESTS = [
         "lock_ring",
         "resting_stack",
         "rolling_sphere",
+        "spinning_top",
+        "motor",
     )
 ]
 SLOW = {("beam", 2000.0)}  # a beam of 250 m takes seconds; every night runs it
@@ -139,6 +141,14 @@ def much_lighter(scene: Scene) -> Scene:
     return replace(scene, gravity=(0.97 * x, 0.97 * y, 0.97 * z))
 
 
+def overdriven(scene: Scene) -> Scene:
+    rows = []
+    for row in scene.constraints:
+        motor = getattr(row, "motor", None)
+        rows.append(replace(row, motor=replace(motor, speed=motor.speed * (1 + 1e-6))) if motor else row)
+    return replace(scene, constraints=tuple(rows))
+
+
 def lopsided(scene: Scene) -> Scene:
     """Every inertia 1 % off along x."""
     bodies = [
@@ -160,6 +170,8 @@ BROKEN: dict[str, Simulate] = {
     "bouncing_ball": with_scene(dull),
     "rotating_box": with_scene(lopsided),
     "swinging_door": with_scene(much_lighter),
+    "spinning_top": with_scene(much_lighter),
+    "motor": with_scene(overdriven),
     "lock_ring": with_joints(compliance=1e-6),
     "resting_stack": with_scene(lighter),
     "rolling_sphere": with_scene(lighter),

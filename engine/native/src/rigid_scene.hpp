@@ -71,6 +71,7 @@ struct RigidMethod {
     FrictionModel friction = FrictionModel::cone;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
+    bool force_collision = false;       // look for contacts even where none are possible, to measure what it costs
 };
 
 struct RigidScene {

@@ -19,7 +19,7 @@ RigidSystem::RigidSystem(const RigidScene& scene)
     std::vector<char> dynamic;
     for (const BodyConstants& body : constants_) dynamic.push_back(body.moves());
     Detection detection(scene.colliders, dynamic, scene.no_contact);
-    const bool touching = detection.possible();
+    const bool touching = detection.possible() || method_.force_collision;
 
     slot_.assign(constants_.size(), -1);
     bool bounded = false;

@@ -41,7 +41,7 @@ public:
     void reset(StageClock* clock);
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
-    bool contacts_possible() const noexcept { return contacts_.has_value(); }
+    bool contacts_possible() const noexcept { return contacts_ && contacts_->possible(); }
     void count(RunReport& report, std::int64_t steps) const;
     std::vector<double> final_state() const;
 

@@ -1,0 +1,151 @@
+"""What a rigid scene leaves out, what forcing it in changes (nothing), and how a rigid run says it failed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import engine
+from engine import (
+    WORLD,
+    Distance,
+    Final,
+    Hinge,
+    Limit,
+    Lock,
+    Material,
+    Method,
+    Motor,
+    Particle,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Sphere,
+    simulate,
+)
+
+TIME_STEP = 1.0 / 60.0
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+def body(name: str = "body", **changes: object) -> RigidBody:
+    return RigidBody(
+        name=name, **{"mass": 1.0, "inertia": (1.0, 1.5, 2.0), "position": (0.0, 0.0, 0.0)} | changes
+    )  # type: ignore[arg-type]
+
+
+def hinge(name: str, **changes: object) -> Hinge:
+    return Hinge(name=name, between=(WORLD, "body"), compliance=0.0, **changes)  # type: ignore[arg-type]
+
+
+def kept(scene: Scene, **options: object) -> tuple[str, ...]:
+    return engine.compile(scene, time_step=TIME_STEP, method=Method(**options)).stages  # type: ignore[arg-type]
+
+
+def test_a_free_body_only_moves_and_turns() -> None:
+    assert kept(Scene(bodies=(body(),))) == ("integrate_positions", "integrate_rotations")
+
+
+def test_bilateral_joints_need_one_factorisation_and_no_pivoting() -> None:
+    scene = Scene(bodies=(body(),), constraints=(hinge("hinge", motor=Motor(speed=1.0)),))
+
+    assert kept(scene) == ("assemble_rows", "solve_block", "integrate_positions", "integrate_rotations")
+
+
+@pytest.mark.parametrize(
+    "bound", [{"motor": Motor(speed=1.0, max_force=2.0)}, {"limit": Limit(lower=-1.0, upper=1.0)}]
+)
+def test_a_bound_on_a_joint_needs_pivoting(bound: dict[str, object]) -> None:
+    scene = Scene(bodies=(body(),), constraints=(hinge("hinge", **bound),))
+
+    assert "pivot" in kept(scene)
+    assert "solve_block" not in kept(scene)
+
+
+def test_surfaces_that_may_touch_bring_collision_impact_and_pivoting_and_friction_only_if_they_rub() -> None:
+    def scene(mu: float) -> Scene:
+        material = Material(friction=mu)
+        ground = RigidBody(
+            name="ground", motion="static", shape=Plane(), position=(0, 0, -2), material=material
+        )
+        return Scene(bodies=(ground, body(shape=Sphere(1.0), material=material)), gravity=GRAVITY)
+
+    assert {"collision", "impact", "pivot"} <= set(kept(scene(0.0)))
+    assert {"tangents", "friction"}.isdisjoint(kept(scene(0.0)))
+    assert {"tangents", "friction"} <= set(kept(scene(0.5)))
+
+
+def test_every_stage_has_its_reason() -> None:
+    scene = Scene(bodies=(body(),), constraints=(Lock(name="lock", between=(WORLD, "body")),))
+
+    choices = engine.explain(scene, time_step=TIME_STEP)
+
+    assert len(choices) == 19
+    assert all(choice.reason for choice in choices)
+
+
+@pytest.mark.parametrize("stages", [("collision",), ("rotation",), ("collision", "rotation")])
+def test_forcing_a_stage_in_changes_the_work_and_not_the_motion(stages: tuple[str, ...]) -> None:
+    pendulum = Scene(
+        bodies=(Particle(name="bob", mass=1.0, position=(1.0, 0.0, 0.0)),),
+        constraints=(Distance(name="rod", between=((0.0, 0.0, 0.0), "bob")),),
+        gravity=GRAVITY,
+    )
+    observe = {"x": Final(quantity=Position("bob"))}
+    plain = simulate(pendulum, time_step=TIME_STEP, steps=300, observe=observe)
+
+    forced = simulate(
+        pendulum, time_step=TIME_STEP, steps=300, observe=observe, method=Method(force_stages=stages)
+    )
+
+    assert ("collision" in forced.stages) == ("collision" in stages)
+    assert ("integrate_rotations" in forced.stages) == ("rotation" in stages)
+    np.testing.assert_allclose(forced["x"], plain["x"], rtol=0.0, atol=1e-12)
+
+
+def test_a_body_that_turns_too_fast_is_named() -> None:
+    result = simulate(
+        Scene(bodies=(body(), body("top", angular_velocity=(1.0, 1.0, 40.0)))), time_step=0.1, steps=10
+    )
+
+    assert (result.status, result.failed_body, result.failed_step) == ("diverged", "top", 1)
+    assert "turns too fast" in result.failure
+
+
+def test_rows_that_cannot_hold_together_are_named_and_a_compliance_lets_them() -> None:
+    def scene(compliance: float) -> Scene:
+        # The rods ask for 1 m and 1.1 m between the same two points.
+        rods = tuple(
+            Distance(
+                name=f"rod {length}",
+                between=((0.0, 0.0, 1.0), "body"),
+                rest_length=length,
+                compliance=compliance,
+            )
+            for length in (1.0, 1.1)
+        )
+        return Scene(bodies=(body(),), constraints=rods)
+
+    rigid = simulate(scene(0.0), time_step=TIME_STEP, steps=10)
+    soft = simulate(
+        scene(1e-6), time_step=TIME_STEP, steps=600, observe={"x": Final(quantity=Position("body"))}
+    )
+
+    assert (rigid.status, rigid.failed_body) == ("diverged", "body")
+    assert "contradict each other" in rigid.failure
+    assert soft["x"][2] == pytest.approx(-0.05, abs=1e-6)
+
+
+def test_a_singular_system_without_a_floor_is_reported() -> None:
+    scene = Scene(bodies=(body(),), constraints=(hinge("one"), hinge("two")), gravity=GRAVITY)
+
+    result = simulate(scene, time_step=TIME_STEP, steps=10, method=Method(floor=0.0))
+
+    assert result.status == "not_finite"
+    assert "cannot be solved" in result.failure
+
+
+def test_options_of_particles_are_refused_for_rigid_bodies() -> None:
+    with pytest.raises(engine.MethodError, match="corrections is for scenes of particles only"):
+        engine.compile(Scene(bodies=(body(),)), time_step=TIME_STEP, method=Method(corrections=1))
