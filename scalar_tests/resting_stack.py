@@ -258,6 +258,8 @@ TEST = ScalarTest(
             definition="2 s with every load right to 1e-6 and nothing moved by more than 1e-6 of an edge",
             study=heaviest_on_light,
             unit="1",
+            expected=(1e9, 1e12),
+            expected_source="the contact solve is refined against the true equations; the search ends at 1e12",
         ),
         StabilityStudy(
             name="tallest-stack",

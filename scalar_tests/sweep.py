@@ -24,16 +24,3 @@ def sweep(values: Iterable[float], measure: Callable[[float], float]) -> tuple[f
 def line(name: str, x: Iterable[Any], y: Iterable[Any], style: Any = "line") -> Curve:
     """A curve from anything that gives numbers."""
     return Curve(name=name, x=tuple(map(float, x)), y=tuple(map(float, y)), style=style)
-
-
-def largest_magnitude(values: Any) -> float:
-    """The largest |value| of an array; NaN if any value is, 0 of an empty one."""
-    return max((math.nan if math.isnan(v) else abs(v) for v in _flat(values)), key=_nan_last, default=0.0)
-
-
-def _flat(values: Any) -> list[float]:
-    return [float(v) for v in values.ravel()] if hasattr(values, "ravel") else [float(v) for v in values]
-
-
-def _nan_last(value: float) -> float:
-    return math.inf if math.isnan(value) else value

@@ -10,7 +10,8 @@ velocities and the row impulses lambda:
     [ M   −Gᵀ  ] [ v₊     ]   [ M v + h f                                              ]
     [ G    Sig ] [ lambda ] = [ Ups (G v − (4/h) g) − (4/h) Ups ((c₋ + c₊)/4 + theta c₊) ]
 
-with theta = tau/h, Ups = 1/(1 + 4 theta), Sig = 4 eps Ups/h², and then x₊ = x + h v₊.
+with theta = tau/h, Ups = 1/(1 + 4 theta), Sig = 4 eps Ups/h², and then x₊ = x + h v₊. String stiffness puts
+M + (h²/4) Σ (T/l) (I − u uᵀ) for M, T the tension of the step before (its damping above T h²/(m l) = .3 is left out).
 """
 
 from __future__ import annotations
@@ -109,20 +110,36 @@ class Oracle:
                         total[self.index[end]] += sign * pull
         return total
 
+    def inertia(self) -> Array:
+        """(3 n, 3 n): M, with the transverse stiffness of taut rows if the method asks for it."""
+        n = len(self.mass)
+        heavy = np.zeros((n, 3, n, 3))
+        heavy[range(n), :, range(n), :] = self.mass[:, None, None] * np.eye(3)
+        if self.method.string_stiffness:
+            for row, d, impulse in zip(self.rows, self.apart(self.x), self.impulse, strict=True):
+                length = float(np.linalg.norm(d))
+                across = np.eye(3) - np.outer(d, d) / length**2
+                held = 0.25 * self.h**2 * max(0.0, -impulse / self.h) / length * across
+                bodies = [self.index[end] for end in row.between if isinstance(end, str)]
+                for i in bodies:
+                    for j in bodies:
+                        heavy[i, :, j, :] += held if i == j else -held
+        return heavy.reshape(3 * n, 3 * n)
+
     # --- the step ---
     def solve(self, extra: Array) -> tuple[Array, Array]:
         """v₊ (n, 3) and lambda of the linear system, `extra` added to the right side of the rows."""
         n, rows, h = self.x.size, len(self.rows), self.h
         upsilon = 1.0 / (1.0 + 4.0 * self.theta)
-        jacobian, mass = self.jacobian(self.x), np.repeat(self.mass, 3)
+        jacobian, mass = self.jacobian(self.x), self.inertia()
         matrix = np.zeros((n + rows, n + rows))
-        matrix[:n, :n] = np.diag(mass)
+        matrix[:n, :n] = mass
         matrix[:n, n:] = -jacobian.T
         matrix[n:, :n] = jacobian
         matrix[n:, n:] = np.diag(4.0 * self.eps * upsilon / h**2)
         right = np.concatenate(
             [
-                mass * self.v.ravel() + h * self.force(self.x, self.v).ravel(),
+                mass @ self.v.ravel() + h * self.force(self.x, self.v).ravel(),
                 upsilon * (jacobian @ self.v.ravel() - 4.0 / h * self.violation(self.x)) + extra,
             ]
         )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine import (
+    ConstraintForce,
     Distance,
     Energy,
     MaximumAbsolute,
@@ -17,9 +18,12 @@ from engine import (
     Result,
     Scene,
     Trace,
+    Velocity,
     Violation,
     simulate,
 )
+from tests.oracle import Oracle
+from tests.particle_scenes import KINDS
 
 GRAVITY = 9.81  # m/s²
 H = 1 / 60  # s
@@ -71,6 +75,24 @@ def test_with_string_stiffness_it_holds(ratio: float) -> None:
 
     assert sideways(result) < 1e-5
     assert result["g"].max() < 1e-13 * GRAVITY * (ratio + 10.0) * 1.1 + 1e-9
+
+
+@pytest.mark.parametrize("kind", ["chain", "tree", "loop"])
+def test_string_stiffness_is_the_averaged_law_across_the_rows(kind: str) -> None:
+    """The dense solve with (h²/4) (T/l) (I − u uᵀ) beside M, from the state after a first step on."""
+    h, scene = 0.002, KINDS[kind](np.random.default_rng(1))
+    observe = {
+        "x": Trace(quantity=Position()),
+        "v": Trace(quantity=Velocity()),
+        "f": Trace(quantity=ConstraintForce()),
+    }
+    run = simulate(scene, time_step=h, steps=30, method=STRINGS, observe=observe)
+    dense = Oracle(scene, h, STRINGS)
+    dense.x, dense.v, dense.impulse = run["x"][1], run["v"][1], -h * run["f"][1]
+    for k in range(2, 31):
+        dense.step()
+        assert np.abs(run["x"][k] - dense.x).max() < 1e-12
+    assert run["f"].max() * h**2 < 0.3 * min(dense.mass) * 0.5  # no damping here
 
 
 def test_string_stiffness_costs_next_to_nothing_where_it_is_not_needed() -> None:

@@ -305,3 +305,20 @@ def test_a_value_that_is_no_number_is_never_green(tmp_path: Path) -> None:
     text = " ".join(" ".join(Reader((tmp_path / "public" / "index.html").read_text()).texts).split())
 
     assert "diverged ≤ 4.9×10⁻⁹ % no value FAIL" in text
+
+
+def test_the_first_page_does_not_say_that_all_is_well_when_a_companion_is_red(tmp_path: Path) -> None:
+    """The command ends with 1 then, so the page must not be green."""
+    runs = [msgspec.structs.replace(document(n, broken=1), trigger="nightly") for n in range(2)]
+    quiet = [
+        msgspec.structs.replace(
+            run,
+            series=tuple(s for s in run.series if s.test == "door"),
+            samples=tuple(s for s in run.samples if s.series.startswith("door/")),
+            tests=tuple(t for t in run.tests if t.name == "door"),
+        )
+        for run in runs
+    ]
+    publish(DocumentHistory(quiet), tmp_path / "public")
+
+    assert "Every gate is kept; one other series is red" in (tmp_path / "public" / "index.html").read_text()

@@ -29,6 +29,7 @@ FAMILY = {
     "time": "sweep",
     "break_point": "stability",
 }
+GROSS = 0.3  # decades: a time read off one session that doubled is worth a line, though it proves nothing
 ORDER = (
     "missing",
     "regressed",
@@ -171,12 +172,12 @@ def _time_scalar(
     if not same_machine:
         return Verdict(word="not_comparable", sentence="run times of another machine")
     verdict = judge(new[0], old[1], new[1], same_definition=old[0].test_version == new[0].test_version)
-    if verdict.word in ("regressed", "improved") and old[1].outcome == new[1].outcome:
+    if verdict.word in ("regressed", "improved", "changed") and old[1].outcome == new[1].outcome:
         if usual is not None:
             return judge_time(usual, from_number(new[1].value), new[0].better == "larger")
-        return Verdict(
-            word="changed", sentence=f"{verdict.sentence}, of one timing session", decades=verdict.decades
-        )
+        gross = abs(verdict.decades or 0.0) > GROSS
+        words = f"{verdict.sentence}, of one timing session"
+        return Verdict(word="changed" if gross else "same", sentence=words, decades=verdict.decades)
     return verdict
 
 

@@ -108,9 +108,7 @@ def _ladder_pairs(
     points: ErrorPoints,
     timed: list[Timing | None],
 ) -> Iterator[Pair]:
-    version = definition_hash(
-        ladder.error, (ladder.name, ladder.unit, configuration.name, configuration.method)
-    )
+    version = _version(ladder, configuration)
     common = _series(name, test, ladder, configuration, version)
     for point, timing in zip(points.points, timed, strict=True):
         series = replace_series(
@@ -135,6 +133,12 @@ def _ladder_pairs(
             ),
         )
     yield from _scalars(ladder, configuration, common, points, timed)
+
+
+def _version(ladder: Ladder, configuration: Configuration, *more: object) -> str:
+    """Version of what a series of the ladder measures; `more` is what its rungs do not depend on."""
+    facts = (ladder.name, ladder.unit, configuration.name, configuration.method, *more)
+    return definition_hash(ladder.error, facts)
 
 
 def _series(
@@ -195,7 +199,7 @@ def _scalars(
             limit=band,
             limit_source=f"the method's order, {expected:g}, within {ORDER_BAND:g}",
             reference=expected,
-            test_version=f"{common.test_version}",
+            test_version=_version(ladder, configuration, ladder.time_steps, configuration.order_range),
         )
         used = [p for p in points.points if in_range(p.time_step, configuration.order_range)]
         order = observed_order([p.time_step for p in used], [p.error for p in used])
@@ -215,6 +219,7 @@ def _scalars(
             better="smaller",
             kind="time",
             parameters={"target_error": ladder.target_error},
+            test_version=_version(ladder, configuration, ladder.time_steps, ladder.target_error),
         )
         value = time_at_error(seconds, errors, ladder.target_error)
         yield series, _scalar(series, value, f"no step reaches {ladder.target_error:g} {ladder.unit}")
@@ -225,6 +230,7 @@ def _scalars(
             description=f"error reached in {ladder.target_seconds:g} s: {ladder.description}",
             kind="time",
             parameters={"target_seconds": ladder.target_seconds},
+            test_version=_version(ladder, configuration, ladder.time_steps, ladder.target_seconds),
         )
         value = error_in_time(seconds, errors, ladder.target_seconds)
         yield series, _scalar(series, value, f"every step takes longer than {ladder.target_seconds:g} s")

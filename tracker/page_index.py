@@ -85,9 +85,8 @@ def _headline(state: State, red: int, watched: int) -> str:
         return "Every limit is kept tonight"
     if state == "fail":
         return "One limit is broken tonight" if red == 1 else f"{red} limits are broken tonight"
-    return "Every limit is kept; " + (
-        "one set point is not" if watched == 1 else f"{watched} set points or companions are not"
-    )
+    others = "one other series is red" if watched == 1 else f"{watched} other series are red"
+    return f"Every gate is kept; {others}"
 
 
 def summary(book: Book) -> str:

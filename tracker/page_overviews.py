@@ -18,6 +18,7 @@ from tracker.svg import grid_picture, picture
 from tracker.wording import slug, web_address
 
 MOST_CLOSED = 100  # events on the page; the file has all
+MOST_CHANGES = 100  # of a comparison read without scripts
 MOST_NIGHTS = 120
 
 
@@ -99,7 +100,8 @@ def compare(told: Comparisons) -> Page:
             "after": choice(after),
             "headline": headline.get(pair["verdict"], "Not comparable"),
             "counts": f"{counts}.",
-            "changes": pair["changes"],
+            "changes": pair["changes"][:MOST_CHANGES],
+            "left_out": max(0, len(pair["changes"]) - MOST_CHANGES),
         }
     context = {"versions": choices, "first": first, "comparisons": page_data(told)}
     return Page("compare.html", "compare.html", "Compare two versions", "Two versions side by side.", context)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import click
@@ -25,7 +24,6 @@ MARK = {
 }
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
 QUIET = {"identical", "same", "not_measured"}
-TOLD = 0.05  # relative change of a ladder worth a line
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
 
 
@@ -116,7 +114,7 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
         lines += [*table(columns, rows, room or width(), {0: _paint}), ""]
     reds = [click.style(line, fg="red") for line in red_lines(document.changes)]
     lines += [*reds, ""] if reds else []
-    lines += _frontier_lines(document.frontiers, room or width())
+    lines += _frontier_lines(_moved(document), room or width())
     lines += [f"note: {clean(note)}" for note in document.notes]
     lines.append(_verdict(document))
     return "\n".join(lines)
@@ -141,8 +139,19 @@ def _paint(_row: int, text: str) -> str:
     return click.style(text, fg=COLOUR.get(text[:1]))
 
 
-def _frontier_lines(frontiers: Sequence[Frontier], room: int) -> list[str]:
-    told = [f for f in frontiers if any(r and abs(math.log(r)) > TOLD for r in _ratios(f))]
+def _moved(document: CompareDocument) -> list[Frontier]:
+    """Ladders on which an error or the run time changed; what is inside the noise is not told."""
+    moved = {
+        (change.test, change.metric.split(":")[1], change.configuration)
+        for change in document.changes
+        if change.metric.startswith("ladder:")
+        and change.kind in ("ladder", "run_time")
+        and change.word not in QUIET
+    }
+    return [f for f in document.frontiers if (f.test, f.ladder, f.configuration) in moved]
+
+
+def _frontier_lines(told: Sequence[Frontier], room: int) -> list[str]:
     if not told:
         return []
     rows = [
@@ -196,6 +205,13 @@ def compare_markdown(document: CompareDocument) -> str:
         lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
     if len(shown) > MOST_ROWS:
         lines.append(f"\nand {len(shown) - MOST_ROWS} more")
+    moved = _moved(document)
+    if moved:
+        lines += ["", "| later / earlier, above 1 is worse | time at equal error | error at equal time |"]
+        lines += ["|---|---:|---:|"]
+    for f in moved[:MOST_ROWS]:
+        ratios = [f"{ratio:.3g}" if ratio else "-" for ratio in _ratios(f)[:2]]
+        lines.append(f"| {_escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
     lines += ["", *(f"- {_escape(note)}" for note in document.notes)]
     return "\n".join(lines).rstrip() + "\n"
 

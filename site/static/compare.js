@@ -11,6 +11,7 @@
     identical: ["pass", "Identical"], same: ["pass", "No regression"],
     regressed: ["fail", "Regressed"], not_comparable: ["none", "Not comparable"],
   };
+  const MOST = 100;  // lines shown before the reader asks for all
   const STATES = { improved: "pass", fixed: "pass", not_comparable: "none", accepted: "none", new: "none", changed: "none" };
 
   function make(tag, attributes, ...children) {
@@ -60,7 +61,13 @@
     const shown = pair.changes.filter((c) => !what.value || texts[c[1]] === what.value);
     if (shown.length) {
       parts.push(table("What is not the same, the worst first.",
-        [["Series"], ["Before", "num"], ["After", "num"], ["Verdict"]], shown.map(line)));
+        [["Series"], ["Before", "num"], ["After", "num"], ["Verdict"]], shown.slice(0, MOST).map(line)));
+    }
+    if (shown.length > MOST) {
+      const body = parts[parts.length - 1].querySelector("tbody");
+      const more = make("button", { class: "button", type: "button" }, "Show all " + shown.length);
+      more.addEventListener("click", () => { body.append(...shown.slice(MOST).map(line)); more.remove(); });
+      parts.push(make("p", { class: "buttons" }, more));
     }
     if (pair.frontiers.length) {
       const lines = pair.frontiers.map((f) => {
