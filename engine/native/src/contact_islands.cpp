@@ -52,7 +52,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         const int island = islands.of_body[b];
         if (island < 0) {
             system.velocity[b] = system.momentum[b];
-            cholesky_solve(cholesky(system.mass[b]), system.velocity[b]);
+            solve_six(factor_six(system.mass[b]), system.velocity[b]);
             continue;
         }
         if (first_body[island] < 0) first_body[island] = b;

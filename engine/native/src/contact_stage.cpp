@@ -197,7 +197,7 @@ void ContactStage::impact(MixedSystem& system) {
     const std::size_t joints = system.rows.size();
     std::vector<FrictionPoint> none;
     std::vector<Vec6> before = hit.momentum;
-    for (std::size_t b = 0; b < before.size(); ++b) cholesky_solve(cholesky(hit.mass[b]), before[b]);
+    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
     run(hit, none, impact_solver_);
 
     // Newton's law with different restitutions at once can raise the energy; blend with the plastic impact then.

@@ -26,7 +26,7 @@ void bound_tangents(RowBlock& block, double bound) noexcept {
 /// Turns first tangents along the slip that would be without any constraint force.
 void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPoint>& points) {
     std::vector<Vec6> free_velocity = system.momentum;
-    for (std::size_t b = 0; b < system.mass.size(); ++b) cholesky_solve(cholesky(system.mass[b]), free_velocity[b]);
+    for (std::size_t b = 0; b < system.mass.size(); ++b) solve_six(factor_six(system.mass[b]), free_velocity[b]);
     for (const FrictionPoint& point : points) {
         RowBlock& block = system.rows[point.block];
         const double s1 = row_velocity(block, 1, free_velocity) - block.right[1];
@@ -42,9 +42,9 @@ double tangent_scale(const RowBlock& block, const FrictionPoint& point, const st
     for (int i = 1; i <= 2; ++i) {
         sum += point.slip_softness;
         Vec6 x = block.first_jacobian[i];
-        if (block.first >= 0) cholesky_solve(mass_factor[block.first], x), sum += dot(block.first_jacobian[i], x);
+        if (block.first >= 0) solve_six(mass_factor[block.first], x), sum += dot(block.first_jacobian[i], x);
         x = block.second_jacobian[i];
-        if (block.second >= 0) cholesky_solve(mass_factor[block.second], x), sum += dot(block.second_jacobian[i], x);
+        if (block.second >= 0) solve_six(mass_factor[block.second], x), sum += dot(block.second_jacobian[i], x);
     }
     return sum;
 }
@@ -79,22 +79,27 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
     return law;
 }
 
-/// Few systems have no fixed point the rounds can find (wedged bodies); sweeps may, from where the rounds stopped.
-void finish_by_sweeps(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionReport& report) {
-    MixedSystem swept = system;
-    std::vector<FrictionPoint> swept_points = points;
+/// Few systems have no fixed point the rounds can find (wedged bodies); sweeps may. A poor end of the rounds is
+/// replaced in any case: what sweeps leave obeys every bound, so it cannot throw bodies about.
+void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<FrictionPoint>& points, FrictionModel model,
+                      FrictionReport& report) {
+    if (start.rows.empty()) return;
+    constexpr double poor = 1e-4;
     double speed = 0.0;
-    for (const FrictionPoint& point : points) {
-        RowBlock& block = swept.rows[point.block];
-        block.softness[1] = block.softness[2] = point.slip_softness;
+    for (std::size_t b = 0; b < start.mass.size(); ++b) {
+        Vec6 v = start.momentum[b];
+        solve_six(factor_six(start.mass[b]), v);
+        speed = std::max(speed, std::hypot(v[0], v[1], v[2]));
     }
-    for (const Vec6& v : system.velocity) speed = std::max(speed, std::hypot(v[0], v[1], v[2]));
-    const FrictionReport sweeps = solve_iterative(swept, swept_points, FrictionModel::cone, 1000, 1e-10 * speed);
+    std::vector<FrictionPoint> swept_points = points;
+    const FrictionReport sweeps = solve_iterative(start, swept_points, model, 1000, 1e-10 * speed);
     report.sweeps += sweeps.sweeps;
-    if (!sweeps.converged) return;
-    system = std::move(swept);
+    report.finite = report.finite || sweeps.finite;
+    if (!sweeps.converged && report.residual <= poor) return;
+    report.converged = sweeps.converged;
+    report.residual = sweeps.residual;
+    system = std::move(start);
     points = std::move(swept_points);
-    report.converged = true;
 }
 
 }  // namespace
@@ -102,6 +107,9 @@ void finish_by_sweeps(MixedSystem& system, std::vector<FrictionPoint>& points, F
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                                      PivotSolver& solver, int max_rounds) {
     FrictionReport report;
+    MixedSystem start;
+    if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(), [](const RowBlock& block) { return block.lower[0] == 0.0; }))
+        start = system;
     auto solve = [&](bool same_matrix) {
         const PivotReport pivots = solver.solve(system, same_matrix);
         ++report.rounds;
@@ -123,7 +131,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     std::vector<double> scale(points.size(), 1.0);
     if (model == FrictionModel::cone) {
         turn_along_predicted_slip(system, points);
-        for (const Mat6& mass : system.mass) mass_factor.push_back(cholesky(mass));
+        for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
         for (std::size_t k = 0; k < points.size(); ++k)
             scale[k] = tangent_scale(system.rows[points[k].block], points[k], mass_factor);
     }
@@ -168,12 +176,16 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
         }
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
         if (report.residual <= accepted && report.converged) return report;
+        if (points.empty() || model == FrictionModel::box) {
+            report.residual = unbounded;  // the pivoting itself gave up
+            break;
+        }
         if (round < plain_rounds) continue;
         const std::vector<double> next = acceleration.next(used, given);
         for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
     }
     report.converged = false;
-    if (model == FrictionModel::cone) finish_by_sweeps(system, points, report);
+    finish_by_sweeps(system, start, points, model, report);
     return report;
 }
 

@@ -24,10 +24,10 @@ public:
         for (std::size_t k = 0; k < points.size(); ++k) blocks_[points[k].block].point = static_cast<int>(k);
         std::vector<Mat6> mass_factor;
         mass_factor.reserve(system.mass.size());
-        for (const Mat6& mass : system.mass) mass_factor.push_back(cholesky(mass));
+        for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
         for (std::size_t k = 0; k < blocks_.size(); ++k) prepare(system.rows[k], blocks_[k], mass_factor);
         system.velocity = system.momentum;
-        for (std::size_t b = 0; b < system.mass.size(); ++b) cholesky_solve(mass_factor[b], system.velocity[b]);
+        for (std::size_t b = 0; b < system.mass.size(); ++b) solve_six(mass_factor[b], system.velocity[b]);
         for (std::size_t k = 0; k < blocks_.size(); ++k)
             for (int i = 0; i < system.rows[k].size; ++i) push(k, i, system.rows[k].multiplier[i]);
     }
@@ -58,8 +58,8 @@ private:
         for (int i = 0; i < n; ++i) {
             prepared.first[i] = block.first_jacobian[i];
             prepared.second[i] = block.second_jacobian[i];
-            if (block.first >= 0) cholesky_solve(mass_factor[block.first], prepared.first[i]);
-            if (block.second >= 0) cholesky_solve(mass_factor[block.second], prepared.second[i]);
+            if (block.first >= 0) solve_six(mass_factor[block.first], prepared.first[i]);
+            if (block.second >= 0) solve_six(mass_factor[block.second], prepared.second[i]);
             prepared.bilateral = prepared.bilateral && block.lower[i] == -unbounded && block.upper[i] == unbounded;
         }
         for (int i = 0; i < n; ++i)
@@ -77,7 +77,7 @@ private:
             // A body tied twice to the world makes no singular block; a rigid joint without inertia would.
             Mat6 guarded = prepared.schur;
             for (int i = 0; i < n; ++i) guarded[7 * i] *= 1.0 + 1e-12;
-            prepared.factor = cholesky(guarded);
+            prepared.factor = factor_six(guarded);
         }
     }
 
@@ -107,7 +107,7 @@ private:
             change[i] = -row_residual(block, i, system_.velocity);
             largest = std::max(largest, std::abs(change[i]));
         }
-        cholesky_solve(blocks_[k].factor, change);
+        solve_six(blocks_[k].factor, change);
         for (int i = 0; i < block.size; ++i) {
             block.multiplier[i] += change[i];
             push(k, i, change[i]);

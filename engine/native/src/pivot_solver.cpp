@@ -19,26 +19,23 @@ bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == R
 
 }  // namespace
 
-Mat6 cholesky(const Mat6& m) noexcept {
+Mat6 factor_six(const Mat6& m) noexcept {
     Mat6 l{};
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j <= i; ++j) {
             double sum = m[6 * i + j];
-            for (int k = 0; k < j; ++k) sum -= l[6 * i + k] * l[6 * j + k];
-            l[6 * i + j] = i == j ? std::sqrt(sum) : sum / l[6 * j + j];
+            for (int k = 0; k < j; ++k) sum -= l[6 * i + k] * l[7 * k] * l[6 * j + k];
+            l[6 * i + j] = i == j ? sum : sum / l[7 * j];
         }
     return l;
 }
 
-void cholesky_solve(const Mat6& l, Vec6& x) noexcept {
-    for (int i = 0; i < 6; ++i) {
+void solve_six(const Mat6& l, Vec6& x) noexcept {
+    for (int i = 1; i < 6; ++i)
         for (int k = 0; k < i; ++k) x[i] -= l[6 * i + k] * x[k];
-        x[i] /= l[6 * i + i];
-    }
-    for (int i = 5; i >= 0; --i) {
+    for (int i = 0; i < 6; ++i) x[i] /= l[7 * i];
+    for (int i = 4; i >= 0; --i)
         for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
-        x[i] /= l[6 * i + i];
-    }
 }
 
 bool PivotSolver::analyse(const MixedSystem& system) {
@@ -78,9 +75,9 @@ void PivotSolver::measure(const MixedSystem& system) {
     mass_factor.resize(system.mass.size());
     free_velocity_.resize(system.mass.size());
     for (std::size_t b = 0; b < system.mass.size(); ++b) {
-        mass_factor[b] = cholesky(system.mass[b]);
+        mass_factor[b] = factor_six(system.mass[b]);
         free_velocity_[b] = system.momentum[b];
-        cholesky_solve(mass_factor[b], free_velocity_[b]);
+        solve_six(mass_factor[b], free_velocity_[b]);
     }
     speed_ = 0.0;
     bounded_.clear();
@@ -92,12 +89,12 @@ void PivotSolver::measure(const MixedSystem& system) {
             double own = 0.0;
             if (block.first >= 0) {
                 Vec6 x = block.first_jacobian[i];
-                cholesky_solve(mass_factor[block.first], x);
+                solve_six(mass_factor[block.first], x);
                 own += dot(block.first_jacobian[i], x);
             }
             if (block.second >= 0) {
                 Vec6 x = block.second_jacobian[i];
-                cholesky_solve(mass_factor[block.second], x);
+                solve_six(mass_factor[block.second], x);
                 own += dot(block.second_jacobian[i], x);
             }
             bounded_.push_back({static_cast<int>(k), i, own});

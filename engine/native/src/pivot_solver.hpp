@@ -85,8 +85,9 @@ private:
     std::vector<Vec6> free_velocity_;  // M⁻¹ p
 };
 
-/// Cholesky factor L (lower, row-major) of a symmetric positive definite 6×6, and x ← M⁻¹ x with it.
-Mat6 cholesky(const Mat6& m) noexcept;
-void cholesky_solve(const Mat6& factor, Vec6& x) noexcept;
+/// Factor of a symmetric positive definite 6×6, L D Lᵀ with D in place of L's unit diagonal, and x ← M⁻¹ x with it.
+/// No square roots: masses scaled by a power of two scale every result exactly.
+Mat6 factor_six(const Mat6& m) noexcept;
+void solve_six(const Mat6& factor, Vec6& x) noexcept;
 
 }  // namespace spook
