@@ -42,7 +42,7 @@ MUTANTS = (
             (
                 f"{SRC}/particle_kernels.cpp",
                 "                link[k].u = u;\n",
-                "                for (int i = 1; i < 6; ++i) { volatile double waste = 1.0 / (r.diagonal + i); (void)waste; }\n"
+                "                for (int i = 1; i < 30; ++i) { volatile double waste = 1.0 / (r.diagonal + i); (void)waste; }\n"
                 "                link[k].u = u;\n",
             ),
         ),
