@@ -14,7 +14,7 @@ struct PreparedBlock {
     bool bilateral = true;
     int point = -1;               // its friction point
     double step = 0.0;            // 1/lambda_max of the tangents' part
-    std::array<double, 36> factor{};  // Cholesky of schur, of a bilateral block
+    std::array<double, 36> factor{};  // of schur, of a bilateral block
 };
 
 class Sweeper {
