@@ -125,6 +125,7 @@ void ParticleSystem::reset(StageClock* clock) {
     for (Link& link : link_) link = {};
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
+    if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) find_tensions();
     if (composed_) start_composition();
     else if (scene_.method.half_step_velocities) half_kick_back();
     save();

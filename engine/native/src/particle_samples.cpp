@@ -10,7 +10,7 @@ namespace spook {
 
 void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->start();
-    for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = link_[k].lambda;
+    for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = sample > 0 ? link_[k].lambda : 0.0;
     seen_v_ = v_;
     if (composed_) {
         if (sample > 0) read_composition();

@@ -86,6 +86,7 @@ private:
     }
     void position_stage() noexcept;
     void half_kick_back();
+    void find_tensions();
 
     void apply_central_gravity() noexcept;
     void apply_springs() noexcept;
