@@ -76,7 +76,7 @@ def compile_particles(
     return Program(
         native,
         time_step=time_step,
-        choices=_choose(scene, method, observe, native.solver),
+        choices=_choose(scene, method, observe, native.solver, native.held_twice),
         bodies=tuple(bodies),
         observe=observe,
         shapes=[shapes[what.quantity] for what in observe.values()],
@@ -208,7 +208,7 @@ def _index(kind: str, name: str, known: Mapping[str, int]) -> int:
 
 
 def _choose(
-    scene: Scene, method: Method, observe: Mapping[str, Observable], solver: str
+    scene: Scene, method: Method, observe: Mapping[str, Observable], solver: str, held_twice: bool
 ) -> tuple[StageChoice, ...]:
     def has(kind: type) -> bool:
         return any(isinstance(force, kind) for force in scene.forces)
@@ -227,6 +227,8 @@ def _choose(
     not_path = "a body has more than two rows or a loop closes" if rows else no_rows
     if "solve_block" in method.force_stages and rows:
         not_path = "solve_block was forced"
+    elif held_twice:
+        not_path = "a path without compliance is held at both ends, so its rows may say the same"
     elif method.string_stiffness and rows:
         not_path = "string stiffness couples the bodies of a row"
     if solver == "iterative":

@@ -1,10 +1,12 @@
 """Rigid bodies: pack a scene for the native pipeline, choose the stages, say why.
 
 Conventions. The frame of a joint is fixed to its first body. Violations [m, rad] are measured in that frame:
-translations along the world axes of the start (ball, lock, universal) or along (axis, normal, normal); rotations of
-lock and prismatic are twice the vector part of the relative quaternion; those of a hinge are
-axis × (axis carried by the second body) along the normals; universal: axis · (cross axis carried by the second).
-The normals of an axis are `normals(axis)`. The order of rows is that of engine.joints.
+translations along the world axes of the start (ball, lock), along (axis, cross axis, their normal) (universal) or
+along (axis, normal, normal); rotations of lock and prismatic are twice the vector part of the relative quaternion;
+those of a hinge are axis × (axis carried by the second body) along the normals; universal: axis · (cross axis
+carried by the second). The normals of an axis are `normals(axis)`. The order of rows is that of engine.joints.
+The row that drives a hinge, its motor and spring, is (axis carried by the first body) · (w2 − w1) with the angular
+velocities w1, w2; that is the gradient of the angle only where the other rows of the hinge are not violated.
 """
 
 from __future__ import annotations

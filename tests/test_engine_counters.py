@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from engine import (
+    CentralGravity,
     Distance,
     Energy,
     Final,
@@ -13,6 +14,7 @@ from engine import (
     Method,
     Particle,
     Position,
+    RigidBody,
     Scene,
     SimulationFailed,
     Spring,
@@ -35,6 +37,27 @@ def test_counters_follow_the_size_of_the_work() -> None:
     assert thrice["substeps"] == 30
     assert thrice["rows_assembled"] == 3 * once["rows_assembled"]
     assert thrice["block_operations"] == 3 * once["block_operations"]
+
+
+def test_rigid_bodies_report_the_names_that_particles_report() -> None:
+    """What did not happen is 0, not left out: so counters can be compared from version to version."""
+    bodies = tuple(
+        RigidBody(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, 0.0))
+        for name, x in (("a", 1.0), ("b", 2.0))
+    )
+    forces = (
+        Spring(name="spring", between=("a", "b"), stiffness=1.0),
+        CentralGravity(name="sun", strength=1.0),
+    )
+    particles = simulate(chain(np.random.default_rng(1)), time_step=TIME_STEP, steps=1)
+    plain = simulate(Scene(bodies=bodies), time_step=TIME_STEP, steps=10).counters
+    pulled = simulate(
+        Scene(bodies=bodies, forces=forces), time_step=TIME_STEP, steps=10, method=Method(substeps=2)
+    ).counters
+
+    assert set(particles.counters) <= set(plain)
+    assert plain["contacts"] == plain["sweeps"] == plain["force_evaluations"] == 0
+    assert pulled["force_evaluations"] == 20 * (1 + 2)
 
 
 def test_each_correction_is_one_more_back_substitution() -> None:

@@ -92,7 +92,9 @@ void bind_particles(nb::module_& m) {
              "observations: (quantity, reduction, first, last or -1, from_start, every).")
         .def("run", &run, nb::arg("steps"), nb::arg("time_limit"), nb::arg("timed"),
              "Run from the start, the GIL released; a dict with status, recordings, counters, final_state, ...")
-        .def_prop_ro("solver", &ParticleProgram::solver, "none, path, block or iterative");
+        .def_prop_ro("solver", &ParticleProgram::solver, "none, path, block or iterative")
+        .def_prop_ro("held_twice", &ParticleProgram::held_twice,
+                     "whether a path of rows without compliance is held by the world at both ends");
 }
 
 }  // namespace spook

@@ -69,6 +69,7 @@ void ParticleSystem::analyse_blocks() {
     ldlt_.analyse(sizes, edges, is_constraint);
     saddle_rhs_.assign(static_cast<std::size_t>(ldlt_.unknowns()), 0.0);
     saddle_ = saddle_rhs_;
+    saddle_left_ = saddle_rhs_;
 }
 
 void ParticleSystem::factor_blocks() {
@@ -86,7 +87,13 @@ void ParticleSystem::factor_blocks() {
     }
     std::fill(saddle_rhs_.begin(), saddle_rhs_.end(), 0.0);
     if (scene_.method.string_stiffness) stiffen_strings();
+    factor_saddle();
+}
+
+void ParticleSystem::factor_saddle() {
+    const std::uint64_t floored = ldlt_.counters().floored_pivots;
     solvable_ = ldlt_.factor(scene_.method.floor);
+    redundant_ = ldlt_.counters().floored_pivots != floored;
 }
 
 /// Adds K̃ + D̃ to M and −K̃ kick − D̃ (v + kick) to the right side.
@@ -121,10 +128,74 @@ void ParticleSystem::stiffen_strings() {
 
 void ParticleSystem::substitute_blocks() {
     for (std::size_t k = 0; k < row_.size(); ++k) saddle_rhs_[ldlt_.offset(row_blocks_[k].row)] = link_[k].rhs;
-    ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
+    if (redundant_ || share_ > 0.0) solve_redundant();
+    else ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
     for (std::size_t k = 0; k < row_.size(); ++k)
         link_[k].lambda = solvable_ ? -saddle_[ldlt_.offset(row_blocks_[k].row)]
                                     : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// With a slight softness of all rows in the factor, refinement from zero tends to the impulses of least norm; fast,
+/// unless rows are nearly dependent as well. Then, and for good, the factor with floors does it.
+void ParticleSystem::solve_redundant() {
+    const int refinements = std::max(2, scene_.method.refinements);
+    if (share_ == 0.0) {
+        share_ = 1e-7 * ldlt_.largest_constraint_scale();
+        ldlt_.shift_constraints(share_);
+        factor_saddle();
+    }
+    if (share_ > 0.0) {
+        ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), refinements);
+        for (int round = 0; round < 6; ++round) {
+            if (saddle_is_solved()) return;
+            ldlt_.solve(saddle_left_.data());
+            for (std::size_t i = 0; i < saddle_.size(); ++i) saddle_[i] += saddle_left_[i];
+        }
+        if (saddle_is_solved()) return;
+        share_ = -1.0;
+        ldlt_.shift_constraints(0.0);
+        factor_saddle();
+    }
+    ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), refinements);
+    if (redundant_) find_contradiction();
+}
+
+/// Whether every row holds to rounding: of the speeds in the system, and of a length in a step.
+bool ParticleSystem::saddle_is_solved() {
+    ldlt_.residual(saddle_rhs_.data(), saddle_.data(), saddle_left_.data());
+    double speed = 0.0, left = 0.0, resolution = 0.0;
+    for (std::size_t node = 0; node < v_.size(); ++node) {
+        if (block_of_node_[node] < 0) continue;
+        const Vec3 change = vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
+        speed = std::max({speed, norm(v_[node]), norm(kick_[node]), norm(change)});
+    }
+    for (std::size_t k = 0; k < row_.size(); ++k) {
+        const double residual = std::fabs(saddle_left_[ldlt_.offset(row_blocks_[k].row)]);
+        if (!(residual <= left)) left = residual;
+        speed = std::max(speed, std::fabs(link_[k].rhs));
+        resolution = std::max(resolution, row_[k].violation_gain * row_[k].rest);
+    }
+    return left <= 1e-13 * speed + 1e-15 * resolution;
+}
+
+/// Redundant rows agree with the others, and refinement leaves them a residual of rounding. Rows that cannot hold
+/// together keep one of the size of the speeds they ask for.
+void ParticleSystem::find_contradiction() {
+    ldlt_.residual(saddle_rhs_.data(), saddle_.data(), saddle_left_.data());
+    double speed = 0.0, largest = 0.0, resolution = 0.0;
+    std::size_t worst = 0;
+    for (const Vec3& kick : kick_) speed = std::max(speed, norm(kick));
+    for (std::size_t k = 0; k < row_.size(); ++k) {
+        speed = std::max(speed, std::fabs(link_[k].rhs));
+        resolution = std::max(resolution, row_[k].violation_gain * row_[k].rest);
+        const double residual = std::fabs(saddle_left_[ldlt_.offset(row_blocks_[k].row)]);
+        if (residual <= largest) continue;
+        largest = residual;
+        worst = k;
+    }
+    if (!(largest > 1e-3 * speed && largest > 1e-9 * resolution)) return;
+    const int second = body_of_node_[row_[worst].b];
+    contradicted_ = second >= 0 ? second : body_of_node_[row_[worst].a];
 }
 
 }  // namespace spook

@@ -260,7 +260,7 @@ void ParticleSystem::shorten_blocks() {
 void ParticleSystem::factor_rigid_blocks() {
     factor_blocks();
     for (std::size_t k = 0; k < row_.size(); ++k) *ldlt_.diagonal(row_blocks_[k].row) = -0.0;
-    solvable_ = ldlt_.factor(scene_.method.floor);
+    factor_saddle();
 }
 
 /// λ such that G M⁻¹ Gᵀ λ = rhs, rigidly.

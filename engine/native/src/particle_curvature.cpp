@@ -34,6 +34,20 @@ void ParticleSystem::correct_curvature() {
     }
 }
 
+/// The tensions at the start, which the stiffness of strings in the first step is made of. The first round knows
+/// none and moves light bodies under a heavy load far too fast; its tensions are right all the same.
+void ParticleSystem::find_tensions() {
+    kick_ = steady_kick_;
+    if (!scene_.fields.empty()) apply_central_gravity();
+    if (!springs_.empty()) apply_springs();
+    for (int round = 0; round < 3; ++round) {
+        assemble_rows();
+        if (scene_.method.corrections > 0) bend_rows_back();
+        solve_rows();
+    }
+    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
+}
+
 /// v −= (h/2) a with the constrained acceleration. The row's right side gets −(2/h) c₋, c₋ the curvature on the
 /// way back; with v constant that is −h Ġ v, found first, and with curved constraints it is iterated.
 void ParticleSystem::half_kick_back() {
@@ -60,7 +74,8 @@ void ParticleSystem::half_kick_back() {
     } else {
         for (std::size_t node = 0; node < v_.size(); ++node) v_[node] -= 0.5 * kick_[node];
     }
-    for (Link& link : link_) link.lambda = 0.0;
+    if (!scene_.method.string_stiffness)
+        for (Link& link : link_) link.lambda = 0.0;
     sweeps_ = 0;
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
 }

@@ -8,11 +8,25 @@
 
 namespace spook {
 
+namespace {
+
+/// A path between two points of the world without any compliance: stretched out straight, each of its rows says
+/// what the others say. An open end, a bend or a compliance anywhere keeps the rows independent.
+bool rigid_between_anchors(const ParticleScene& scene, const Path& path) {
+    return path.nodes.front() < 0 && path.nodes.back() < 0 &&
+           std::all_of(path.rows.begin(), path.rows.end(),
+                       [&](int row) { return scene.rows[row].compliance == 0.0; });
+}
+
+}  // namespace
+
 ParticleSystem::ParticleSystem(const ParticleScene& scene)
     : scene_(scene), h_(scene.method.time_step / scene.method.substeps) {
     const std::vector<Path> paths = find_paths(scene);
     if (!scene.rows.empty()) {
-        solver_ = paths.empty() || scene.method.force_block || scene.method.string_stiffness
+        held_twice_ = std::any_of(paths.begin(), paths.end(),
+                                  [&](const Path& path) { return rigid_between_anchors(scene, path); });
+        solver_ = paths.empty() || held_twice_ || scene.method.force_block || scene.method.string_stiffness
                       ? ParticleSolver::block : ParticleSolver::path;
         if (scene.method.iterative) solver_ = ParticleSolver::iterative;
     }
@@ -117,6 +131,9 @@ void ParticleSystem::reset(StageClock* clock) {
     sweeps_ = 0;
     newton_iterations_ = 0;
     residual_ = 0.0;
+    contradicted_ = -1;
+    share_ = 0.0;
+    ldlt_.shift_constraints(0.0);
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
     for (int body = 0; body < bodies(); ++body) {
         x_[node_of_body_[body]] = scene_.bodies[body].position;
@@ -125,6 +142,7 @@ void ParticleSystem::reset(StageClock* clock) {
     for (Link& link : link_) link = {};
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
+    if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) find_tensions();
     if (composed_) start_composition();
     else if (scene_.method.half_step_velocities) half_kick_back();
     save();

@@ -24,6 +24,7 @@ public:
     /// Run from the start. time_limit in s, 0 for none; timed asks for seconds by stage.
     RunReport run(std::int64_t steps, double time_limit, bool timed);
     const char* solver() const noexcept;
+    bool held_twice() const noexcept { return system_.held_twice(); }
 
 private:
     ParticleSystem system_;

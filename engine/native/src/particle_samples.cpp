@@ -10,7 +10,7 @@ namespace spook {
 
 void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->start();
-    for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = link_[k].lambda;
+    for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = sample > 0 ? link_[k].lambda : 0.0;
     seen_v_ = v_;
     if (composed_) {
         if (sample > 0) read_composition();
@@ -26,6 +26,9 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
 }
 
 Health ParticleSystem::health() const noexcept {
+    if (contradicted_ >= 0)
+        return {Status::diverged, contradicted_,
+                "is held by rows that contradict each other; give one of them a compliance"};
     Health health;
     for (int body = 0; body < bodies(); ++body) {
         const Vec3 x = x_[node_of_body_[body]], v = v_[node_of_body_[body]];
@@ -50,6 +53,7 @@ void ParticleSystem::save() {
     saved_.halved_steps = halved_steps_;
     saved_.history = history_;
     saved_.residual = residual_;
+    saved_.share = share_;
 }
 
 void ParticleSystem::restore() {
@@ -65,6 +69,9 @@ void ParticleSystem::restore() {
     lost_ = false;
     history_ = saved_.history;
     residual_ = saved_.residual;
+    contradicted_ = -1;
+    share_ = saved_.share;
+    ldlt_.shift_constraints(std::max(0.0, share_));
 }
 
 void ParticleSystem::count(RunReport& report, std::int64_t steps) const {

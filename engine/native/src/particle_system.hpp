@@ -35,6 +35,8 @@ public:
 
     ParticleSolver solver() const noexcept { return solver_; }
     const std::vector<int>& node_of_body() const noexcept { return node_of_body_; }
+    /// Whether the rows form open paths, but one of them is rigid and held at both ends: it may be redundant.
+    bool held_twice() const noexcept { return held_twice_; }
 
     // --- what run_loop asks for ---
     void advance(std::int64_t steps);
@@ -86,6 +88,7 @@ private:
     }
     void position_stage() noexcept;
     void half_kick_back();
+    void find_tensions();
 
     void apply_central_gravity() noexcept;
     void apply_springs() noexcept;
@@ -107,6 +110,10 @@ private:
     void factor_blocks();
     void stiffen_strings();
     void substitute_blocks();
+    void factor_saddle();
+    void solve_redundant();
+    bool saddle_is_solved();
+    void find_contradiction();
 
     // particle_composition.cpp: symmetric compositions of higher order
     void start_composition();
@@ -155,9 +162,13 @@ private:
     BlockLdlt ldlt_;
     std::vector<int> block_of_node_;
     std::vector<RowBlocks> row_blocks_;
-    std::vector<double> saddle_rhs_, saddle_;
+    std::vector<double> saddle_rhs_, saddle_, saddle_left_;
     std::int64_t operations_at_start_ = 0;
     bool solvable_ = true;  // false: the factor met a value that is not finite, so nothing it gives is used
+    bool held_twice_ = false;
+    bool redundant_ = false;  // the last factor has floors: some row says what others say
+    double share_ = 0.0;      // how redundant rows share their load: a softness in the factor; −1: they do not
+    int contradicted_ = -1;   // a body held by rows that cannot hold together
     double residual_ = 0.0;
     std::int64_t sweeps_ = 0;
 
@@ -177,7 +188,7 @@ private:
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         bool velocity_ready = false;
         std::int64_t sweeps = 0;
-        double residual = 0.0;
+        double residual = 0.0, share = 0.0;
     } saved_;
     StageClock* clock_ = nullptr;
 };
