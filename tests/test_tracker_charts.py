@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tracker import charts
@@ -74,6 +74,7 @@ def test_ticks_are_few_round_and_inside(low: float, width: float) -> None:
     )
 
 
+@example(y=[2e295, 1e-38], x_scale="linear", y_scale="log", polar=False)  # padding left the doubles here
 @given(
     st.lists(NUMBERS, max_size=12),
     st.sampled_from(["linear", "log"]),

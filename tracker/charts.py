@@ -182,7 +182,7 @@ def ticks(low: float, high: float, scale: Scale, about: int = 6) -> list[float]:
     if not (math.isfinite(low) and math.isfinite(high)) or low >= high:
         return []
     if scale == "log":
-        first, last = math.ceil(low), math.floor(high)
+        first, last = max(math.ceil(low), -307), min(math.floor(high), 308)  # what a double can name
         step = max(1, math.ceil((last - first + 1) / about))
         found = [float(e) for e in range(first, last + 1) if e % step == 0]
         return found or [float(first)] if first <= last else []
