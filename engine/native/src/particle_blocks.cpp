@@ -156,8 +156,8 @@ void ParticleSystem::solve_redundant() {
         ldlt_.shift_constraints(0.0);
         factor_saddle();
     }
-    ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), refinements);
-    if (redundant_) find_contradiction();
+    ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
+    if (redundant_ && !composed_) find_contradiction();  // a composition starts with lengths that agree
 }
 
 /// Whether every row holds to rounding: of the speeds in the system, and of a length in a step.
@@ -178,22 +178,25 @@ bool ParticleSystem::saddle_is_solved() {
     return left <= 1e-13 * speed + 1e-15 * resolution;
 }
 
-/// Redundant rows agree with the others, and refinement leaves them a residual of rounding. Rows that cannot hold
-/// together keep one of the size of the speeds they ask for.
+/// Redundant rows agree with the others but for the curvature of their motion, which a linearised step leaves as
+/// violation: a few times (h v)²/l. Rows that cannot hold together keep a residual of the size of the speeds they ask
+/// for, and larger than that.
 void ParticleSystem::find_contradiction() {
     ldlt_.residual(saddle_rhs_.data(), saddle_.data(), saddle_left_.data());
-    double speed = 0.0, largest = 0.0, resolution = 0.0;
+    double speed = 0.0, largest = 0.0, curved = 0.0;
     std::size_t worst = 0;
     for (const Vec3& kick : kick_) speed = std::max(speed, norm(kick));
     for (std::size_t k = 0; k < row_.size(); ++k) {
         speed = std::max(speed, std::fabs(link_[k].rhs));
-        resolution = std::max(resolution, row_[k].violation_gain * row_[k].rest);
+        const Vec3 moved = h_ * (v_[row_[k].b] - v_[row_[k].a]);
+        const double unseen = 1e-9 * row_[k].rest + 10.0 * curvature(link_[k].u, link_[k].length, moved);
+        curved = std::max(curved, row_[k].violation_gain * unseen);
         const double residual = std::fabs(saddle_left_[ldlt_.offset(row_blocks_[k].row)]);
         if (residual <= largest) continue;
         largest = residual;
         worst = k;
     }
-    if (!(largest > 1e-3 * speed && largest > 1e-9 * resolution)) return;
+    if (!(largest > 1e-3 * speed && largest > curved)) return;
     const int second = body_of_node_[row_[worst].b];
     contradicted_ = second >= 0 ? second : body_of_node_[row_[worst].a];
 }
