@@ -7,7 +7,7 @@ from typing import Literal
 
 from engine.errors import MethodError
 
-STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "tangents", "rotation")
+STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "rotation")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
