@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from engine import CentralGravity, Distance, Method, Particle, Scene, compile
+from spook_tracker.engine import CentralGravity, Distance, Method, Particle, Scene, compile
 
 STEP = 1 / 60  # s
 REPEATS = 60  # short slices: the least of many is undisturbed even on a busy machine

@@ -12,8 +12,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from spook_tracker.tracker.publish import publish
 from tests.synthetic_history import decade
-from tracker.publish import publish
 
 
 def main() -> None:

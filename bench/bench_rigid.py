@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 
-from engine import WORLD, Box, Hinge, Lock, Plane, Program, RigidBody, Scene, compile
+from spook_tracker.engine import WORLD, Box, Hinge, Lock, Plane, Program, RigidBody, Scene, compile
 
 TIME_STEP = 1.0 / 60.0  # s
 EDGE = (0.125, 0.1, 0.1)  # m

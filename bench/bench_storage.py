@@ -18,10 +18,10 @@ from contextlib import contextmanager
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
-from tracker.database import open_database
-from tracker.document import EngineVersion, Machine, RunDocument, Sample, SeriesDefinition
-from tracker.record import record
-from tracker.series import History
+from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.document import EngineVersion, Machine, RunDocument, Sample, SeriesDefinition
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.series import History
 
 SERIES = 1000  # in one night
 

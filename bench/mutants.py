@@ -128,7 +128,9 @@ def tracker(clone: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     # -S leaves out the finder of an editable install, here and in the worker processes it starts.
     packages = sysconfig.get_path("purelib")
     search = os.pathsep.join([str(clone), packages])
-    return call(sys.executable, "-S", "-m", "tracker", *arguments, cwd=clone, check=False, PYTHONPATH=search)
+    return call(
+        sys.executable, "-S", "-m", "spook_tracker", *arguments, cwd=clone, check=False, PYTHONPATH=search
+    )
 
 
 def measure(clone: Path, database: str, tests: tuple[str, ...], sweep: bool) -> str:

@@ -3,7 +3,7 @@
 A scene is bodies, constraints and forces in SI units and world axes; it knows no time step. `simulate` compiles
 it for a time step, leaves out what the scene does not need, and runs the loop in native code.
 
-    >>> from engine import Distance, Energy, Final, MaximumAbsolute, Particle, Position, Scene, Violation, simulate
+    >>> from spook_tracker.engine import Distance, Energy, Final, MaximumAbsolute, Particle, Position, Scene, Violation, simulate
     >>> weight = Particle(name="weight", mass=2.0, position=(1.0, 0.0, 0.0))
     >>> rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=1e-12)
     >>> pendulum = Scene(bodies=(weight,), constraints=(rod,), gravity=(0.0, 0.0, -9.81))
@@ -25,13 +25,13 @@ it for a time step, leaves out what the scene does not need, and runs the loop i
 What is observed is reduced in the loop, so nothing is stored that was not asked for. `explain` says which stages
 the scene keeps, and why:
 
-    >>> from engine import explain
+    >>> from spook_tracker.engine import explain
     >>> [choice.stage for choice in explain(pendulum, time_step=1 / 240) if choice.kept]
     ['apply_gravity', 'assemble_rows', 'solve_path', 'integrate_positions']
 
 A scene of your own: add bodies and tie them. Here a second weight hangs from the first, with a better method:
 
-    >>> from engine import Method
+    >>> from spook_tracker.engine import Method
     >>> second = Particle(name="second", mass=1.0, position=(2.0, 0.0, 0.0))
     >>> link = Distance(name="link", between=("weight", "second"), compliance=1e-12)
     >>> double = Scene(bodies=(weight, second), constraints=(rod, link), gravity=(0.0, 0.0, -9.81))
@@ -47,15 +47,15 @@ What cannot be simulated is refused with one sentence, and a run that goes wrong
 
     >>> Particle(name="ghost", mass=0.0, position=(0.0, 0.0, 0.0))
     Traceback (most recent call last):
-    engine.errors.SceneError: particle 'ghost': mass must be positive, not 0
+    spook_tracker.engine.errors.SceneError: particle 'ghost': mass must be positive, not 0
 """
 
-from engine.bodies import WORLD, Body, Material, Particle, RigidBody
-from engine.build_info import BuildInfo, build_info
-from engine.compiler import compile, explain
-from engine.errors import EngineError, MethodError, SceneError, SimulationFailed
-from engine.forces import CentralGravity, Load, Spring
-from engine.joints import (
+from spook_tracker.engine.bodies import WORLD, Body, Material, Particle, RigidBody
+from spook_tracker.engine.build_info import BuildInfo, build_info
+from spook_tracker.engine.compiler import compile, explain
+from spook_tracker.engine.errors import EngineError, MethodError, SceneError, SimulationFailed
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.joints import (
     Ball,
     Distance,
     Hinge,
@@ -66,8 +66,8 @@ from engine.joints import (
     Prismatic,
     Universal,
 )
-from engine.method import PLAIN, Method
-from engine.observe import (
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
     ConstraintForce,
@@ -90,11 +90,11 @@ from engine.observe import (
     Velocity,
     Violation,
 )
-from engine.program import Program, StageChoice
-from engine.result import Result
-from engine.scene import Scene
-from engine.shapes import Box, Capsule, Compound, Part, Plane, Shape, Sphere
-from engine.simulation import simulate
+from spook_tracker.engine.program import Program, StageChoice
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Shape, Sphere
+from spook_tracker.engine.simulation import simulate
 
 __all__ = [
     "PLAIN",

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from engine import check
-from engine.check import Rotation, Vector
-from engine.errors import SceneError
-from engine.shapes import Plane, Shape
+from spook_tracker.engine import check
+from spook_tracker.engine.check import Rotation, Vector
+from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.shapes import Plane, Shape
 
 WORLD = "world"  # the name that stands for the fixed world at one end of a constraint
 

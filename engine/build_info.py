@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from engine import _core
+from spook_tracker.engine import _core
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from engine.errors import SceneError
+from spook_tracker.engine.errors import SceneError
 
 Vector = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), body to world

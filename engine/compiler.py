@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from engine.bodies import Particle
-from engine.errors import MethodError, SceneError
-from engine.method import PLAIN, Method
-from engine.observe import Observable
-from engine.particle_program import compile_particles
-from engine.program import Program, StageChoice
-from engine.rigid_program import compile_rigid, lacking
-from engine.scene import Scene
+from spook_tracker.engine.bodies import Particle
+from spook_tracker.engine.errors import MethodError, SceneError
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.particle_program import compile_particles
+from spook_tracker.engine.program import Program, StageChoice
+from spook_tracker.engine.rigid_program import compile_rigid, lacking
+from spook_tracker.engine.scene import Scene
 
 NOTHING: Mapping[str, Observable] = MappingProxyType({})
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from engine.result import Result
+    from spook_tracker.engine.result import Result
 
 
 class EngineError(Exception):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from engine import check
-from engine.check import Vector
-from engine.errors import SceneError
+from spook_tracker.engine import check
+from spook_tracker.engine.check import Vector
+from spook_tracker.engine.errors import SceneError
 
 End = str | Vector  # a body's name, or a fixed point of the world [m]
 

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from engine import check
-from engine.check import Vector
-from engine.errors import SceneError
-from engine.forces import End, check_ends
+from spook_tracker.engine import check
+from spook_tracker.engine.check import Vector
+from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.forces import End, check_ends
 
 PerDegree = float | tuple[float, ...]
 ORIGIN: Vector = (0.0, 0.0, 0.0)

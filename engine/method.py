@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from engine.errors import MethodError
+from spook_tracker.engine.errors import MethodError
 
 STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "rotation")
 

@@ -23,8 +23,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from engine.check import Vector
-from engine.errors import MethodError
+from spook_tracker.engine.check import Vector
+from spook_tracker.engine.errors import MethodError
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from engine import _core
-from engine.errors import MethodError
-from engine.forces import CentralGravity, End, Load, Spring
-from engine.joints import Distance
-from engine.method import Method
-from engine.observe import (
+from spook_tracker.engine import _core
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.forces import CentralGravity, End, Load, Spring
+from spook_tracker.engine.joints import Distance
+from spook_tracker.engine.method import Method
+from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
     ConstraintForce,
@@ -31,8 +31,14 @@ from engine.observe import (
     Velocity,
     Violation,
 )
-from engine.program import Program, StageChoice, distinct_quantities, observation_tuples, observes_each_step
-from engine.scene import Scene
+from spook_tracker.engine.program import (
+    Program,
+    StageChoice,
+    distinct_quantities,
+    observation_tuples,
+    observes_each_step,
+)
+from spook_tracker.engine.scene import Scene
 
 _ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}
 _SCALARS: dict[type[Quantity], str] = {

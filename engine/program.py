@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from engine.errors import MethodError
-from engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
-from engine.result import Array, Result
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
+from spook_tracker.engine.result import Array, Result
 
 STAGES = (
     "collision",

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from engine.errors import SimulationFailed
+from spook_tracker.engine.errors import SimulationFailed
 
 Status = Literal["completed", "diverged", "not_finite", "timed_out"]
 Array = npt.NDArray[np.float64]

@@ -17,19 +17,29 @@ from typing import Any
 
 import numpy as np
 
-from engine import _core
-from engine.bodies import Particle, RigidBody
-from engine.check import Vector
-from engine.errors import MethodError
-from engine.forces import CentralGravity, Load, Spring
-from engine.joints import AxialJoint, Ball, Constraint, Distance, Hinge, Joint, Lock, Prismatic, Universal
-from engine.method import Method
-from engine.observe import Observable
-from engine.program import Program, distinct_quantities, observation_tuples
-from engine.rigid_quantities import request
-from engine.rigid_stages import choose
-from engine.scene import Scene
-from engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.engine import _core
+from spook_tracker.engine.bodies import Particle, RigidBody
+from spook_tracker.engine.check import Vector
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.joints import (
+    AxialJoint,
+    Ball,
+    Constraint,
+    Distance,
+    Hinge,
+    Joint,
+    Lock,
+    Prismatic,
+    Universal,
+)
+from spook_tracker.engine.method import Method
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.program import Program, distinct_quantities, observation_tuples
+from spook_tracker.engine.rigid_quantities import request
+from spook_tracker.engine.rigid_stages import choose
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
 
 _MOTIONS = {"dynamic": 0, "static": 1, "kinematic": 2}
 _JOINTS: dict[type[Constraint], int] = {Distance: 0, Lock: 1, Ball: 2, Hinge: 3, Prismatic: 4, Universal: 5}

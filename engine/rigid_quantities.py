@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from engine.errors import MethodError
-from engine.joints import AxialJoint, Distance
-from engine.observe import (
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.joints import AxialJoint, Distance
+from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
     ConstraintForce,
@@ -24,7 +24,7 @@ from engine.observe import (
     Velocity,
     Violation,
 )
-from engine.scene import Scene
+from spook_tracker.engine.scene import Scene
 
 QuantityRequest = tuple[str, int, tuple[float, float, float]]  # name, index or -1, point
 

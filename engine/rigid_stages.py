@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from engine.bodies import Particle, RigidBody
-from engine.forces import CentralGravity, Load, Spring
-from engine.method import Method
-from engine.observe import Observable
-from engine.program import STAGES, StageChoice, observes_each_step
-from engine.scene import Scene
+from spook_tracker.engine.bodies import Particle, RigidBody
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.method import Method
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.program import STAGES, StageChoice, observes_each_step
+from spook_tracker.engine.scene import Scene
 
 
 def choose(

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from engine import check
-from engine.bodies import WORLD, Body, Particle, RigidBody
-from engine.check import Vector
-from engine.errors import SceneError
-from engine.forces import CentralGravity, Force, Load, Spring
-from engine.joints import Constraint, Distance, Joint
+from spook_tracker.engine import check
+from spook_tracker.engine.bodies import WORLD, Body, Particle, RigidBody
+from spook_tracker.engine.check import Vector
+from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.forces import CentralGravity, Force, Load, Spring
+from spook_tracker.engine.joints import Constraint, Distance, Joint
 
 
 def _unique(kind: str, names: Iterable[str]) -> None:

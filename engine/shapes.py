@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from engine import check
-from engine.check import Rotation, Vector
-from engine.errors import SceneError
+from spook_tracker.engine import check
+from spook_tracker.engine.check import Rotation, Vector
+from spook_tracker.engine.errors import SceneError
 
 
 class Shape:

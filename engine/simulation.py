@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from engine.compiler import NOTHING, compile
-from engine.errors import MethodError
-from engine.method import PLAIN, Method
-from engine.observe import Observable
-from engine.result import Result
-from engine.scene import Scene
+from spook_tracker.engine.compiler import NOTHING, compile
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
 
 
 def simulate(

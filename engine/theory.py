@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.result import Array
+from spook_tracker.engine.result import Array
 
 
 @dataclass(frozen=True, slots=True)

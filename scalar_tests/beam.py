@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import PLAIN, MaximumAbsolute, Method, Position, Result, Trace
-from scalar_tests.beam_scene import (
+from spook_tracker.engine import PLAIN, MaximumAbsolute, Method, Position, Result, Trace
+from spook_tracker.scalar_tests.beam_scene import (
     COUNT,
     SAG,
     SAG_COMPLIANCE,
@@ -22,8 +22,8 @@ from scalar_tests.beam_scene import (
     sag_of_compliant_beam,
     scene,
 )
-from scalar_tests.beam_stability import STUDIES
-from scalar_tests.case import (
+from spook_tracker.scalar_tests.beam_stability import STUDIES
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     Box,
     Capsule,
     Lock,
@@ -18,7 +18,7 @@ from engine import (
     Scene,
     Sphere,
 )
-from scalar_tests.case import Simulate
+from spook_tracker.scalar_tests.case import Simulate
 
 SIZE = (0.125, 0.1, 0.1)  # m, one box
 MASS = 2.5  # kg, one box

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     Box,
     Energy,
@@ -23,9 +23,9 @@ from engine import (
     Trace,
     Velocity,
 )
-from engine.bodies import Material
-from scalar_tests.bracket import break_point
-from scalar_tests.case import (
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
     Curve,

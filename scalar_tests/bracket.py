@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from engine import Result
-from scalar_tests.case import BreakPoint
+from spook_tracker.engine import Result
+from spook_tracker.scalar_tests.case import BreakPoint
 
 WALK = 12  # grid values between easy and hard
 GROWTH = 2.0  # a quantity that doubles from the middle third of a run to the last is growing

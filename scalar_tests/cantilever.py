@@ -12,7 +12,7 @@ import math
 import numpy as np
 from scipy.integrate import solve_bvp
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     WORLD,
     Box,
@@ -28,7 +28,7 @@ from engine import (
     Trace,
     Velocity,
 )
-from scalar_tests.case import (
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,

@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
-from engine.method import PLAIN, Method
-from engine.observe import Observable
-from engine.result import Result
-from engine.scene import Scene
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
 
 
 class Simulate(Protocol):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scalar_tests import (
+from spook_tracker.scalar_tests import (
     beam,
     bouncing_ball,
     cantilever,
@@ -27,7 +27,7 @@ from scalar_tests import (
     spinning_top,
     swinging_door,
 )
-from scalar_tests.case import ScalarTest
+from spook_tracker.scalar_tests.case import ScalarTest
 
 CATALOGUE: dict[str, ScalarTest] = {
     # the thesis' seven continuous tests, in its order

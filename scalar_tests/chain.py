@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.special import roots_laguerre
 
-from engine import Distance, Particle, Scene
+from spook_tracker.engine import Distance, Particle, Scene
 
 GRAVITY = 9.81  # m/s²
 LENGTH = 1.0  # m, each link

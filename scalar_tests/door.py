@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import PLAIN, ConstraintForce, Method, Result, Trace
-from scalar_tests.case import (
+from spook_tracker.engine import PLAIN, ConstraintForce, Method, Result, Trace
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,
@@ -21,8 +21,8 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.door_scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
-from scalar_tests.door_stability import STUDIES
+from spook_tracker.scalar_tests.door_scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
+from spook_tracker.scalar_tests.door_stability import STUDIES
 
 LADDER_COUNT = 5
 COUNTS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 40, 60, 80)

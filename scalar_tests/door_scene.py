@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import WORLD, Box, ConstraintForce, Hinge, RigidBody, Scene, Trace
-from scalar_tests.case import Simulate
+from spook_tracker.engine import WORLD, Box, ConstraintForce, Hinge, RigidBody, Scene, Trace
+from spook_tracker.scalar_tests.case import Simulate
 
 SIZE = (1.0, 0.06, 2.0)  # m
 MASS = 45.0  # kg

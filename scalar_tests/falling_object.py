@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     Final,
     Method,
@@ -15,8 +15,8 @@ from engine import (
     Trace,
     Velocity,
 )
-from engine.observe import Observable
-from scalar_tests.case import (
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -27,7 +27,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.sweep import line
 
 MASS = 1.0  # kg
 GRAVITY = 9.81  # m/s²

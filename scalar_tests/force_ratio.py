@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from engine import PLAIN, ContactForce, Final, Method, Result
-from scalar_tests.case import (
+from spook_tracker.engine import PLAIN, ContactForce, Final, Method, Result
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,
@@ -17,7 +17,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.inclined_plane import FRICTION, TIME_STEP, force_ratio, scene, slide
+from spook_tracker.scalar_tests.inclined_plane import FRICTION, TIME_STEP, force_ratio, scene, slide
 
 LADDER_SLOPE = 0.3
 MASSES = (1.0, 10.0, 1e2, 1e3, 1e4)  # kg

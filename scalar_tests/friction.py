@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from engine import ContactForce, Final, Method, Result
-from scalar_tests.case import (
+from spook_tracker.engine import ContactForce, Final, Method, Result
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,
@@ -21,7 +21,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.inclined_plane import (
+from spook_tracker.scalar_tests.inclined_plane import (
     BOX,
     CONE,
     FRICTION,

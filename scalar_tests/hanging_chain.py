@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Method, Position, Result, Trace
-from scalar_tests.case import (
+from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -18,8 +18,8 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.chain import LENGTH
-from scalar_tests.hanging_chain_scene import (
+from spook_tracker.scalar_tests.chain import LENGTH
+from spook_tracker.scalar_tests.hanging_chain_scene import (
     BELOW_BREAK,
     COUNT,
     HEAVY,
@@ -33,8 +33,8 @@ from scalar_tests.hanging_chain_scene import (
     lift,
     scene,
 )
-from scalar_tests.hanging_chain_stability import STUDIES
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.hanging_chain_stability import STUDIES
+from spook_tracker.scalar_tests.sweep import line
 
 LADDER_RATIO, LADDER_TILT = 1000.0, 1e-4  # rad: small motion to 1e-9
 STRING_HALF_STEP = Method(string_stiffness=True, half_step_velocities=True)

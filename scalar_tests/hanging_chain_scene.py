@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from engine import Energy, MaximumAbsolute, Method, Position, Scene, Trace, Violation
-from engine.observe import Observable
-from scalar_tests.chain import GRAVITY, LENGTH, MASS, hanging_chain, sideways_modes
+from spook_tracker.engine import Energy, MaximumAbsolute, Method, Position, Scene, Trace, Violation
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.chain import GRAVITY, LENGTH, MASS, hanging_chain, sideways_modes
 
 COUNT = 10
 TIME_STEP = 1.0 / 60.0  # s

@@ -6,12 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Energy, Method, Result, Trace, Violation
-from engine.observe import Observable
-from scalar_tests.bracket import break_point, cell, is_stable, table
-from scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from scalar_tests.chain import GRAVITY, LENGTH, MASS, sideways_modes
-from scalar_tests.hanging_chain_scene import COUNT, HEAVY, STEPS, STRING, TILT, TIME_STEP, lift, scene
+from spook_tracker.engine import PLAIN, Energy, Method, Result, Trace, Violation
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
+from spook_tracker.scalar_tests.chain import GRAVITY, LENGTH, MASS, sideways_modes
+from spook_tracker.scalar_tests.hanging_chain_scene import (
+    COUNT,
+    HEAVY,
+    STEPS,
+    STRING,
+    TILT,
+    TIME_STEP,
+    lift,
+    scene,
+)
 
 WIDE_TILT = 1.0  # rad, for the chain that swings far
 ZIGZAG = 1e-12  # m: wakes the fastest sideways mode

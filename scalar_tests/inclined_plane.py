@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import math
 
-from engine import Box, ContactForce, Final, Material, Method, Plane, RigidBody, Scene, Trace, Velocity
-from engine.result import Result
-from scalar_tests.case import Simulate
+from spook_tracker.engine import (
+    Box,
+    ContactForce,
+    Final,
+    Material,
+    Method,
+    Plane,
+    RigidBody,
+    Scene,
+    Trace,
+    Velocity,
+)
+from spook_tracker.engine.result import Result
+from spook_tracker.scalar_tests.case import Simulate
 
 EDGE = 1.0  # m
 MASS = 1.0  # kg

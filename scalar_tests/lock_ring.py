@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     WORLD,
     Box,
@@ -24,7 +24,7 @@ from engine import (
     Scene,
     Trace,
 )
-from scalar_tests.case import (
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     WORLD,
     AngularVelocity,
@@ -20,8 +20,8 @@ from engine import (
     Scene,
     Trace,
 )
-from engine.observe import Observable
-from scalar_tests.case import (
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -32,7 +32,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.sweep import line
 
 INERTIA = 2.0  # kg m², about the axle
 SPEED = 10.0  # rad/s, set point

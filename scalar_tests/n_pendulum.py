@@ -6,11 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Final, MaximumAbsolute, Method, Position, Result, Trace, Violation
-from engine.observe import Observable
-from scalar_tests.case import Configuration, Example, Ladder, Measurement, Metric, ScalarTest, Simulate
-from scalar_tests.chain import LENGTH, chain, exact_tip, level_chain, small_motion
-from scalar_tests.n_pendulum_figures import (
+from spook_tracker.engine import PLAIN, Final, MaximumAbsolute, Method, Position, Result, Trace, Violation
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.chain import LENGTH, chain, exact_tip, level_chain, small_motion
+from spook_tracker.scalar_tests.n_pendulum_figures import (
     COUNT,
     CURVED_TWICE,
     FIGURES,
@@ -19,7 +27,7 @@ from scalar_tests.n_pendulum_figures import (
     TWO_SUBSTEPS,
     swing,
 )
-from scalar_tests.n_pendulum_stability import STUDIES
+from spook_tracker.scalar_tests.n_pendulum_stability import STUDIES
 
 EARLY_STEPS = 240  # 4 s
 ENERGY_STEP = 600  # 10 s: later the chain is chaotic, and rounding decides the energy

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine import PLAIN, Energy, MaximumAbsolute, Method, Trace, Violation
-from engine.observe import Observable
-from scalar_tests.case import Drawing, Figure, Simulate
-from scalar_tests.chain import fall_to_hanging, level_chain
-from scalar_tests.sweep import line, sweep
+from spook_tracker.engine import PLAIN, Energy, MaximumAbsolute, Method, Trace, Violation
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker.scalar_tests.chain import fall_to_hanging, level_chain
+from spook_tracker.scalar_tests.sweep import line, sweep
 
 COUNT = 26
 DURATION = 22.0  # s

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from engine import Distance, Particle, Position, Scene, Spring, Trace, Velocity
-from engine.observe import Observable
-from engine.theory import one_row_matrix
-from scalar_tests.case import Simulate
+from spook_tracker.engine import Distance, Particle, Position, Scene, Spring, Trace, Velocity
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests.case import Simulate
 
 MASS = 1.0  # kg
 TIME_STEP = 1.0 / 60.0  # s

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Method, Position, Result, Trace
-from scalar_tests.case import (
+from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -19,7 +19,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator import (
     MASS,
     START,
     STEPS,
@@ -32,8 +32,8 @@ from scalar_tests.oscillator import (
     run_map,
     traced,
 )
-from scalar_tests.oscillator_stability import MAP_STUDY, growth_error
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.oscillator_stability import MAP_STUDY, growth_error
+from spook_tracker.scalar_tests.sweep import line
 
 DAMPING = 2.0 * TIME_STEP  # s
 MAP_STEPS = 8

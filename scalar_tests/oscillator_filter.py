@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from scalar_tests.case import Drawing, Example, Figure, Measurement, Metric, ScalarTest, Simulate
-from scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.case import (
+    Drawing,
+    Example,
+    Figure,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.oscillator import (
     START,
     TIME_STEP,
     decay,
@@ -15,7 +23,7 @@ from scalar_tests.oscillator import (
     stiffness_of_period,
     traced,
 )
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.sweep import line
 
 DAMPING = 2.0 * TIME_STEP  # s
 STEPS = 10

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from engine import PLAIN, Method, Position, Result, Trace
-from scalar_tests.case import (
+from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -18,7 +18,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator import (
     MASS,
     REST_LENGTH,
     START,
@@ -29,9 +29,9 @@ from scalar_tests.oscillator import (
     row_scene,
     traced,
 )
-from scalar_tests.oscillator_spring import verlet
-from scalar_tests.oscillator_stability import ROW_STUDY
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.oscillator_spring import verlet
+from spook_tracker.scalar_tests.oscillator_stability import ROW_STUDY
+from spook_tracker.scalar_tests.sweep import line
 
 FAST_STIFFNESS = 400.0 / TIME_STEP**2  # N/m: (h ω)² = 400, a hundred times beyond Verlet's bound
 LONG_STEPS = 100_000

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import PLAIN, Method, Position, Result, Trace
-from scalar_tests.case import (
+from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -16,9 +16,17 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.oscillator import MASS, START, STEPS, STIFFNESS, TIME_STEP, spring_scene, traced
-from scalar_tests.oscillator_stability import SPRING_STUDY
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.oscillator import (
+    MASS,
+    START,
+    STEPS,
+    STIFFNESS,
+    TIME_STEP,
+    spring_scene,
+    traced,
+)
+from spook_tracker.scalar_tests.oscillator_stability import SPRING_STUDY
+from spook_tracker.scalar_tests.sweep import line
 
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
 

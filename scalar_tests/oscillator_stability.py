@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from engine import MaximumAbsolute, Position, Trace
-from engine.observe import Observable
-from engine.theory import one_row_oscillates
-from scalar_tests.bracket import break_point, cell, table
-from scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from scalar_tests.oscillator import (
+from spook_tracker.engine import MaximumAbsolute, Position, Trace
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.theory import one_row_oscillates
+from spook_tracker.scalar_tests.bracket import break_point, cell, table
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
+from spook_tracker.scalar_tests.oscillator import (
     MASS,
     START,
     TIME_STEP,

@@ -6,11 +6,29 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, ConstraintForce, Energy, Maximum, MaximumAbsolute, Method, Result, Trace, Violation
-from engine.observe import Observable
-from scalar_tests.case import Configuration, Example, Ladder, Measurement, Metric, ScalarTest, Simulate
-from scalar_tests.pendulum_figures import FIGURES
-from scalar_tests.pendulum_scene import (
+from spook_tracker.engine import (
+    PLAIN,
+    ConstraintForce,
+    Energy,
+    Maximum,
+    MaximumAbsolute,
+    Method,
+    Result,
+    Trace,
+    Violation,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.pendulum_figures import FIGURES
+from spook_tracker.scalar_tests.pendulum_scene import (
     CURVED,
     CURVED_TWICE,
     GRAVITY,
@@ -24,7 +42,7 @@ from scalar_tests.pendulum_scene import (
     swing,
     traced_angle,
 )
-from scalar_tests.pendulum_stability import STUDIES
+from spook_tracker.scalar_tests.pendulum_stability import STUDIES
 
 LADDER_DURATION = 10.0  # s
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")

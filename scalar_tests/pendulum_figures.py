@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import PLAIN, Method
-from scalar_tests.case import Drawing, Figure, Simulate
-from scalar_tests.pendulum_scene import (
+from spook_tracker.engine import PLAIN, Method
+from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker.scalar_tests.pendulum_scene import (
     CURVED,
     CURVED_TWICE,
     GRAVITY,
@@ -17,7 +17,7 @@ from scalar_tests.pendulum_scene import (
     percent_of_length,
     swing,
 )
-from scalar_tests.sweep import line, sweep
+from spook_tracker.scalar_tests.sweep import line, sweep
 
 TIME_STEPS = tuple(float(h) for h in np.geomspace(10**-2.2, 0.07, 12))  # s, the range of Figs 3.20 to 3.23
 MASSES = (1.0, 5.0, 25.0, 100.0, 300.0, 600.0, 900.0, 1200.0)  # kg

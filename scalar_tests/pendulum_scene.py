@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ellipj, ellipk
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     Distance,
     Energy,
@@ -22,8 +22,8 @@ from engine import (
     Trace,
     Violation,
 )
-from engine.observe import Observable
-from scalar_tests.case import Simulate
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import Simulate
 
 MASS = 1.0  # kg
 LENGTH = 1.0  # m

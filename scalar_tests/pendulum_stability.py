@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from engine import PLAIN, Energy, MaximumAbsolute, Method, Result, Trace, Violation
-from engine.observe import Observable
-from engine.theory import one_row_matrix
-from scalar_tests.bracket import break_point, cell, is_stable, table
-from scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from scalar_tests.oscillator import growth
-from scalar_tests.pendulum_scene import (
+from spook_tracker.engine import PLAIN, Energy, MaximumAbsolute, Method, Result, Trace, Violation
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
+from spook_tracker.scalar_tests.oscillator import growth
+from spook_tracker.scalar_tests.pendulum_scene import (
     COMPLIANCE,
     CURVED,
     CURVED_TWICE,

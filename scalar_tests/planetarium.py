@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     AngularMomentum,
     Energy,
@@ -20,9 +20,9 @@ from engine import (
     Result,
     Trace,
 )
-from engine.observe import Observable
-from scalar_tests.bracket import break_point
-from scalar_tests.case import (
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
     Example,
@@ -33,8 +33,8 @@ from scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
-from scalar_tests.planetarium_figures import FIGURES
-from scalar_tests.planetarium_scene import (
+from spook_tracker.scalar_tests.planetarium_figures import FIGURES
+from spook_tracker.scalar_tests.planetarium_scene import (
     DURATION,
     GAUSS,
     HALF_STEP,

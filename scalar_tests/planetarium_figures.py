@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import Position, Trace
-from scalar_tests.case import Drawing, Figure, Simulate
-from scalar_tests.planetarium_scene import (
+from spook_tracker.engine import Position, Trace
+from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker.scalar_tests.planetarium_scene import (
     DURATION,
     HALF_STEP,
     TIME_STEP,
@@ -15,7 +15,7 @@ from scalar_tests.planetarium_scene import (
     orbit_radius,
     scene,
 )
-from scalar_tests.sweep import line, sweep
+from spook_tracker.scalar_tests.sweep import line, sweep
 
 TIME_STEPS = (TIME_STEP, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)  # s
 EVERY = 120  # samples apart in the figures, 2 s

@@ -8,9 +8,18 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from engine import PLAIN, CentralGravity, KineticEnergy, Method, Particle, PotentialEnergy, Scene, Trace
-from engine.observe import Observable
-from scalar_tests.case import Simulate
+from spook_tracker.engine import (
+    PLAIN,
+    CentralGravity,
+    KineticEnergy,
+    Method,
+    Particle,
+    PotentialEnergy,
+    Scene,
+    Trace,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import Simulate
 
 GAUSS = 2.0 * math.pi / 365.0  # k, 1/s
 ECCENTRICITY = 0.017  # ξ; r = 1 at the start is the semi-latus rectum

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     Box,
     ContactForce,
@@ -22,10 +22,10 @@ from engine import (
     Scene,
     Trace,
 )
-from engine.bodies import Material
-from engine.observe import Observable
-from scalar_tests.bracket import break_count, break_point
-from scalar_tests.case import (
+from spook_tracker.engine.bodies import Material
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_count, break_point
+from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
     Curve,

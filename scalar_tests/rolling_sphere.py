@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     AngularVelocity,
     Final,
@@ -17,8 +17,8 @@ from engine import (
     Sphere,
     Velocity,
 )
-from engine.bodies import Material
-from scalar_tests.case import (
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,

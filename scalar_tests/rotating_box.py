@@ -11,7 +11,7 @@ import functools
 import numpy as np
 from scipy.special import ellipk
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     AngularMomentum,
     AngularVelocity,
@@ -24,8 +24,8 @@ from engine import (
     Scene,
     Trace,
 )
-from scalar_tests.bracket import break_point
-from scalar_tests.case import (
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
     Curve,

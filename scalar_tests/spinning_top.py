@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     WORLD,
     Ball,
@@ -21,8 +21,8 @@ from engine import (
     Trace,
     Violation,
 )
-from engine.observe import Observable
-from scalar_tests.case import (
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
     Example,
@@ -33,7 +33,7 @@ from scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from scalar_tests.sweep import line
+from spook_tracker.scalar_tests.sweep import line
 
 MASS = 1.0  # kg
 ARM = 0.5  # m, from the tip to the centre of mass

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from engine.errors import SimulationFailed
-from scalar_tests.case import Curve
+from spook_tracker.engine.errors import SimulationFailed
+from spook_tracker.scalar_tests.case import Curve
 
 
 def sweep(values: Iterable[float], measure: Callable[[float], float]) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from scipy.special import ellipj, ellipk
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     WORLD,
     Box,
@@ -26,7 +26,7 @@ from engine import (
     Trace,
     Violation,
 )
-from scalar_tests.case import (
+from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,
     Drawing,

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker.database import open_database
 from tests import postgresql
-from tracker.database import open_database
 
 
 @pytest.fixture(scope="session")

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from engine import PLAIN, CentralGravity, Distance, Load, Method, Particle, Scene, Spring
-from engine.forces import End
+from spook_tracker.engine import PLAIN, CentralGravity, Distance, Load, Method, Particle, Scene, Spring
+from spook_tracker.engine.forces import End
 
 Array = npt.NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     Ball,
     CentralGravity,
@@ -33,7 +33,7 @@ from engine import (
     Spring,
     Universal,
 )
-from engine.joints import AxialJoint, Constraint, Joint
+from spook_tracker.engine.joints import AxialJoint, Constraint, Joint
 
 Array = npt.NDArray[Any]
 TINY = 1e-40  # of a complex step

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     PLAIN,
     AngularMomentum,
     CentralGravity,
@@ -31,7 +31,7 @@ from engine import (
     Velocity,
     Violation,
 )
-from engine.observe import Observable, Quantity
+from spook_tracker.engine.observe import Observable, Quantity
 from tests.oracle import Array, Oracle, Sample
 
 REDUCTIONS: dict[type[Observable], Callable[[Array], Array]] = {

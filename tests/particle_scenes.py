@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine import CentralGravity, Distance, Load, Particle, Scene, Spring
+from spook_tracker.engine import CentralGravity, Distance, Load, Particle, Scene, Spring
 
 TIME_STEP = 0.01  # s
 GRAVITY = (0.3, -0.2, -9.81)  # m/s²

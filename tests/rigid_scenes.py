@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     Ball,
     CentralGravity,
@@ -23,8 +23,8 @@ from engine import (
     Spring,
     Universal,
 )
-from engine.bodies import Body
-from engine.joints import Constraint
+from spook_tracker.engine.bodies import Body
+from spook_tracker.engine.joints import Constraint
 
 TIME_STEP = 0.01  # s
 GRAVITY = (0.4, -0.3, -9.81)  # m/s²

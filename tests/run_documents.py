@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-from tracker.document import (
+from spook_tracker.tracker.document import (
     Curve,
     EngineVersion,
     FigureData,

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from tracker.document import (
+from spook_tracker.tracker.document import (
     Curve,
     DrawnLink,
     DrawnSolid,

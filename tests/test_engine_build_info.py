@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.build_info import _version
+from spook_tracker.engine.build_info import _version
 
 NATIVE = Path(__file__).parent.parent / "engine" / "native"
 KNOWN = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
-from engine import (
+from spook_tracker.engine import (
     AngularMomentum,
     ConstraintForce,
     Distance,

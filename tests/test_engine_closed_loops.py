@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     AngularMomentum,
     Energy,

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from engine import (
+from spook_tracker.engine import (
     AngularMomentum,
     CentralGravity,
     ConstraintForce,

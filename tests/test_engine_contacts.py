@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     Box,
     Capsule,

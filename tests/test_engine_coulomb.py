@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     AngularVelocity,
     Box,
     ContactForce,

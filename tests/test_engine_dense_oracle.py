@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import engine
-from engine import (
+from spook_tracker import engine
+from spook_tracker.engine import (
     AngularMomentum,
     ConstraintForce,
     Distance,

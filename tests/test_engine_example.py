@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import doctest
 
-import engine
+from spook_tracker import engine
 
 
 def test_the_documented_example_runs() -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     AngularVelocity,
     Box,
     ContactForce,

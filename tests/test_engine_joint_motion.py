@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     AngularMomentum,
     AngularVelocity,
@@ -37,7 +37,7 @@ from engine import (
     Universal,
     simulate,
 )
-from engine.observe import Quantity
+from spook_tracker.engine.observe import Quantity
 from tests.oracle import Array
 from tests.oracle_rigid import conjugate, product, rotation
 

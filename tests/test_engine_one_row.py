@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine import Distance, Particle, Position, Result, Scene, Trace, Velocity, simulate
+from spook_tracker.engine import Distance, Particle, Position, Result, Scene, Trace, Velocity, simulate
 from tests.oracle import Array
 
 LENGTH = 1.0  # m

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 
-from engine import (
+from spook_tracker.engine import (
     AngularMomentum,
     CentralGravity,
     Distance,

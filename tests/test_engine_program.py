@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     CentralGravity,
     Distance,
     Energy,
@@ -33,7 +33,7 @@ from engine import (
     explain,
     simulate,
 )
-from engine.observe import JointCoordinate
+from spook_tracker.engine.observe import JointCoordinate
 
 GRAVITY = (0.0, 0.0, -9.81)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     ConstraintForce,
     Distance,
     KineticEnergy,
@@ -18,7 +18,7 @@ from engine import (
     compile,
     simulate,
 )
-from engine.forces import End
+from spook_tracker.engine.forces import End
 
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1 / 240  # s

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     Ball,
     Box,

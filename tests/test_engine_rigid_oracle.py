@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     AngularVelocity,
     ConstraintForce,
     Distance,
@@ -21,7 +21,7 @@ from engine import (
     Violation,
     simulate,
 )
-from engine.observe import Observable
+from spook_tracker.engine.observe import Observable
 from tests.oracle_rigid import RigidOracle
 from tests.rigid_scenes import JOINTS, TIME_STEP, everything, loop, one_joint, tree
 

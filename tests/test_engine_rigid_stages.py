@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import engine
-from engine import (
+from spook_tracker import engine
+from spook_tracker.engine import (
     WORLD,
     Distance,
     Final,

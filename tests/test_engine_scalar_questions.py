@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-import engine
-from scalar_tests.case import Measurement
-from scalar_tests.catalogue import CATALOGUE
+from spook_tracker import engine
+from spook_tracker.scalar_tests.case import Measurement
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests import oracle_simulate
 
 ASKED = ("falling_object", "pendulum", "oscillator_row", "oscillator_damped", "oscillator_filter")

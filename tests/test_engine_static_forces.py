@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     WORLD,
     Box,
     ConstraintForce,

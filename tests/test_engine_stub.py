@@ -6,7 +6,7 @@ import ast
 import inspect
 from pathlib import Path
 
-from engine import _core
+from spook_tracker.engine import _core
 
 STUB = Path(__file__).parent.parent / "engine" / "_core.pyi"
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine import (
+from spook_tracker.engine import (
     Box,
     Capsule,
     CentralGravity,
@@ -33,8 +33,8 @@ from engine import (
     Spring,
     simulate,
 )
-from engine.bodies import Body
-from engine.joints import Constraint
+from spook_tracker.engine.bodies import Body
+from spook_tracker.engine.joints import Constraint
 from tests import particle_scenes, rigid_scenes
 from tests.oracle import Array
 from tests.oracle_rigid import product, rotation

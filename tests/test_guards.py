@@ -12,10 +12,9 @@ from types import FunctionType
 
 import pytest
 
-import engine
-import scalar_tests
-from engine.observe import Quantity
-from scalar_tests.catalogue import CATALOGUE
+from spook_tracker import engine, scalar_tests
+from spook_tracker.engine.observe import Quantity
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 ROOT = Path(__file__).parent.parent
 PYTHON_FILES = sorted(
@@ -97,7 +96,7 @@ def test_no_file_names_the_machine_it_was_written_on() -> None:
 def test_help_is_quick_because_it_imports_nothing_heavy() -> None:
     """`tracker --help` must not pay for pandas, SciPy, SQLAlchemy or Plotly."""
     done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "tracker", "--help"],
+        [sys.executable, "-X", "importtime", "-m", "spook_tracker", "--help"],
         capture_output=True,
         text=True,
         cwd=ROOT,

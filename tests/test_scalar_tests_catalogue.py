@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from engine import explain
-from scalar_tests.case import Metric, ScalarTest
-from scalar_tests.catalogue import CATALOGUE
+from spook_tracker.engine import explain
+from spook_tracker.scalar_tests.case import Metric, ScalarTest
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 PRINTED = {  # thesis, section 4.2: limit and unit of the seven continuous tests
     "beam": (4.9e-9, "%"),

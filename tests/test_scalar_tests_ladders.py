@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from engine import PLAIN, simulate
-from scalar_tests.case import Configuration, Ladder, Simulate
-from scalar_tests.catalogue import CATALOGUE
-from tracker.order import in_range, observed_order
+from spook_tracker.engine import PLAIN, simulate
+from spook_tracker.scalar_tests.case import Configuration, Ladder, Simulate
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.order import in_range, observed_order
 
 BAND = 0.1
 LADDERS = [

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import PLAIN, Distance, Final, Position, Scene, SimulationFailed, Spring, simulate
-from scalar_tests import chain, oscillator, pendulum_scene, planetarium_scene
-from scalar_tests.case import Metric, Simulate
-from scalar_tests.catalogue import CATALOGUE
+from spook_tracker.engine import PLAIN, Distance, Final, Position, Scene, SimulationFailed, Spring, simulate
+from spook_tracker.scalar_tests import chain, oscillator, pendulum_scene, planetarium_scene
+from spook_tracker.scalar_tests.case import Metric, Simulate
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 # test, configuration, metric, value known from an independent prototype or a closed form, |difference| allowed
 KNOWN = (

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from engine import PLAIN, Load, RigidBody, Scene, simulate
-from engine.joints import Joint
-from scalar_tests import beam_scene, cantilever
-from scalar_tests.case import Measurement, Simulate
-from scalar_tests.catalogue import CATALOGUE
+from spook_tracker.engine import PLAIN, Load, RigidBody, Scene, simulate
+from spook_tracker.engine.joints import Joint
+from spook_tracker.scalar_tests import beam_scene, cantilever
+from spook_tracker.scalar_tests.case import Measurement, Simulate
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 RIGID_TESTS = [
     name

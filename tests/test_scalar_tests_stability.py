@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import PLAIN, Distance, simulate
-from engine.theory import one_row_matrix
-from scalar_tests.bracket import break_count, break_point, cell, is_stable
-from scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from scalar_tests.catalogue import CATALOGUE
-from scalar_tests.oscillator_stability import growth_error, measured_growth, predicted_growth
+from spook_tracker.engine import PLAIN, Distance, simulate
+from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, is_stable
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.oscillator_stability import growth_error, measured_growth, predicted_growth
 
 KINDS = {"settled", "bounded", "growing", "diverged", "not_finite"}
 SLOW = {"map-string", "longest-beam"}  # seconds each; every night runs them

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
+from spook_tracker.tracker.analyse import commit_of
+from spook_tracker.tracker.compare import Measured, compare, side_of
+from spook_tracker.tracker.publish import publish
 from tests.browser import MISSING, browser, look, programs
 from tests.synthetic_history import SEVEN, history
-from tracker.analyse import commit_of
-from tracker.compare import Measured, compare, side_of
-from tracker.publish import publish
 
 PAGES = (
     "index.html", "tests/pendulum.html", "tests/friction.html", "error-time.html", "stability.html",

@@ -8,10 +8,18 @@ from dataclasses import dataclass
 
 import msgspec
 
-from tracker.accepted import Accepted
-from tracker.analyse import Night, judge_history, judge_run, telling
-from tracker.document import EngineVersion, Machine, MapData, Sample, SeriesDefinition, Timing, to_number
-from tracker.tonight import run_time_histories
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.analyse import Night, judge_history, judge_run, telling
+from spook_tracker.tracker.document import (
+    EngineVersion,
+    Machine,
+    MapData,
+    Sample,
+    SeriesDefinition,
+    Timing,
+    to_number,
+)
+from spook_tracker.tracker.tonight import run_time_histories
 
 SERIES = SeriesDefinition(
     key="t/c/m",
@@ -244,7 +252,7 @@ def test_nights_between_equal_nights_say_nothing():
 
 
 def test_maps_are_judged_cell_by_cell():
-    from tracker.analyse import judge_maps
+    from spook_tracker.tracker.analyse import judge_maps
 
     facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
     before = MapData(

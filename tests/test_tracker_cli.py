@@ -13,10 +13,10 @@ import jsonschema
 import pytest
 from click.testing import CliRunner, Result
 
-from tracker.cli import main
-from tracker.cli_options import OneLineErrors
-from tracker.compare_document import compare_schema
-from tracker.schema import document_schema
+from spook_tracker.tracker.cli import main
+from spook_tracker.tracker.cli_options import OneLineErrors
+from spook_tracker.tracker.compare_document import compare_schema
+from spook_tracker.tracker.schema import document_schema
 
 ROOT = Path(__file__).resolve().parents[1]
 GOOD, BAD = "a" * 40, "b" * 40
@@ -90,7 +90,7 @@ def test_every_command_of_db_has_help_with_an_example():
 
 def test_help_imports_nothing_heavy():
     timed = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "tracker", "--help"],
+        [sys.executable, "-X", "importtime", "-m", "spook_tracker", "--help"],
         capture_output=True,
         text=True,
         cwd=ROOT,
@@ -197,7 +197,7 @@ def test_compare_ends_with_2_for_an_unknown_version_and_for_no_data(two_versions
 
 
 def test_compare_ends_with_3_where_nothing_can_be_compared(monkeypatch, two_versions):
-    monkeypatch.setattr("tracker.machine.float_environment", lambda: "another")
+    monkeypatch.setattr("spook_tracker.tracker.machine.float_environment", lambda: "another")
     measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
     shown = tracker("compare", "1.1.0", "1.2.0")
 
@@ -281,7 +281,7 @@ def test_errors_are_one_line_that_names_what_to_do(arguments, hint):
 
 
 def test_a_defect_is_one_line_too(monkeypatch):
-    monkeypatch.setattr("tracker.report_catalogue.catalogue_table", lambda tests: 1 / 0)
+    monkeypatch.setattr("spook_tracker.tracker.report_catalogue.catalogue_table", lambda tests: 1 / 0)
     shown = tracker("list")
 
     assert shown.exit_code == 2
@@ -332,7 +332,7 @@ def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypa
 
 def test_plain_letters_do_where_the_terminal_has_no_others(monkeypatch):
     done = subprocess.run(
-        [sys.executable, "-m", "tracker", "run", "--no-record", "--workers", "1"],
+        [sys.executable, "-m", "spook_tracker", "run", "--no-record", "--workers", "1"],
         capture_output=True,
         check=False,
         env={

@@ -8,10 +8,10 @@ import random
 import msgspec
 import pytest
 
-from tracker.accepted import Accepted
-from tracker.compare import Measured, compare
-from tracker.compare_document import CompareDocument, Side
-from tracker.document import MapData, Sample, SeriesDefinition, Timing, to_number
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.compare import Measured, compare
+from spook_tracker.tracker.compare_document import CompareDocument, Side
+from spook_tracker.tracker.document import MapData, Sample, SeriesDefinition, Timing, to_number
 
 STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
+from spook_tracker.tracker import comparisons as module
+from spook_tracker.tracker.comparisons import chosen, comparisons, page_data
+from spook_tracker.tracker.events import all_events
+from spook_tracker.tracker.nights import book
 from tests.synthetic_history import DocumentHistory, document, history
-from tracker import comparisons as module
-from tracker.comparisons import chosen, comparisons, page_data
-from tracker.events import all_events
-from tracker.nights import book
 
 
 def made(nights: DocumentHistory, known: dict[str, Any] | None = None) -> module.Comparisons:

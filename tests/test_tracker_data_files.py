@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from spook_tracker.tracker.data_files import inert, records, table
+from spook_tracker.tracker.templates import embedded, environment
 from tests.synthetic_history import HOSTILE
-from tracker.data_files import inert, records, table
-from tracker.templates import embedded, environment
 
 
 @pytest.mark.parametrize("formula", ["=cmd()", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])
@@ -67,7 +67,7 @@ def test_a_template_escapes_and_never_forgets_a_name() -> None:
 
 
 def test_no_template_marks_anything_safe() -> None:
-    from tracker.resources import resource
+    from spook_tracker.tracker.resources import resource
 
     for template in (resource("site") / "templates").iterdir():
         text = template.read_text()

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from tracker.definition import definition_hash
+from spook_tracker.tracker.definition import definition_hash
 
 MODULE = '''"""A question."""
-from engine.method import Method
+from spook_tracker.engine.method import Method
 
 MASS = 2.0  # kg
 WHY = "because"
@@ -105,7 +105,7 @@ def test_an_option_the_engine_gains_is_not_another_version():
         corrections: int = 0
         sweeps: int = 50
 
-    Method.__module__ = Grown.__module__ = "engine.method"
+    Method.__module__ = Grown.__module__ = "spook_tracker.engine.method"
     Method.__qualname__ = Grown.__qualname__ = "Method"
 
     assert definition_hash(abs, Grown(corrections=1)) == definition_hash(abs, Method(corrections=1))

@@ -11,19 +11,19 @@ import time
 import pytest
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.database_check import check
+from spook_tracker.tracker.errors import DatabaseError
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.series import History
 from tests.run_documents import figure, run, run_of
-from tracker.database import open_database
-from tracker.database_check import check
-from tracker.errors import DatabaseError
-from tracker.record import record
-from tracker.series import History
 
 WRITER = """
 import sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run_of
-from tracker.database import open_database
-from tracker.record import record
+from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.record import record
 engine = open_database(sys.argv[1])
 name, count = sys.argv[2], int(sys.argv[3])
 with Session(engine) as session:
@@ -97,9 +97,9 @@ FULL_DISK = """
 import resource, signal, sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run
-from tracker.database import open_database
-from tracker.errors import DatabaseError
-from tracker.record import record
+from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.errors import DatabaseError
+from spook_tracker.tracker.record import record
 engine = open_database(sys.argv[1])
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -148,7 +148,7 @@ def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
 
 def test_a_failure_in_the_middle_leaves_nothing(session, monkeypatch):
     """Samples are written before figures: an error there takes everything back."""
-    from tracker import rows
+    from spook_tracker.tracker import rows
 
     def broken(part):
         raise RuntimeError("the power went")

@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
+from spook_tracker.tracker import events
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.events import all_events, events_of, telling_nights
+from spook_tracker.tracker.nights import Book, book
 from tests.synthetic_history import DocumentHistory, document, engine, sample, series
-from tracker.accepted import Accepted
-from tracker.events import all_events, events_of, telling_nights
-from tracker.nights import Book, book
 
 GATE = series("t", "m", role="gate", limit=1.0, unit="m")
 
@@ -93,15 +94,14 @@ def test_leaving_out_nights_that_stand_still_changes_no_verdict(values: tuple[fl
     short = events_of(trend, made.nights)
 
     original = telling_nights
-    import tracker.events
 
     try:
-        tracker.events.telling_nights = lambda trend: list(range(len(trend.nights)))
+        events.telling_nights = lambda trend: list(range(len(trend.nights)))
         assert [(e.first, e.last, e.standing) for e in events_of(trend, made.nights)] == [
             (e.first, e.last, e.standing) for e in short
         ]
     finally:
-        tracker.events.telling_nights = original
+        events.telling_nights = original
 
 
 def test_a_build_with_local_changes_is_tonight_only_while_it_is_the_newest() -> None:

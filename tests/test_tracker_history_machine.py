@@ -14,16 +14,16 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker.database import open_database, upgrade
+from spook_tracker.tracker.database_check import check
+from spook_tracker.tracker.database_copy import copy_database
+from spook_tracker.tracker.document import to_number
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.retention import drop_old_figures
+from spook_tracker.tracker.revisions import revert
+from spook_tracker.tracker.series import History
+from spook_tracker.tracker.transfer import export_runs, import_files
 from tests.run_documents import engine, run_of
-from tracker.database import open_database, upgrade
-from tracker.database_check import check
-from tracker.database_copy import copy_database
-from tracker.document import to_number
-from tracker.record import record
-from tracker.retention import drop_old_figures
-from tracker.revisions import revert
-from tracker.series import History
-from tracker.transfer import export_runs, import_files
 
 COMMITS = [f"{number:x}" * 40 for number in range(1, 7)]  # each the parent of the next
 KEYS = ["a", "b", "c"]

@@ -9,15 +9,15 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import DateTime, create_engine, inspect, select, text
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker import models
+from spook_tracker.tracker.database import database_url, head, open_database, upgrade
+from spook_tracker.tracker.database_copy import digest
+from spook_tracker.tracker.errors import DatabaseError
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.resources import resource
+from spook_tracker.tracker.revisions import configuration, differences, revert
+from spook_tracker.tracker.series import History
 from tests.run_documents import definition, run, run_of, sample
-from tracker import models
-from tracker.database import database_url, head, open_database, upgrade
-from tracker.database_copy import digest
-from tracker.errors import DatabaseError
-from tracker.record import record
-from tracker.resources import resource
-from tracker.revisions import configuration, differences, revert
-from tracker.series import History
 
 SCRIPTS = ScriptDirectory.from_config(configuration())
 REVISIONS = [script.revision for script in reversed(list(SCRIPTS.walk_revisions()))]
@@ -107,8 +107,8 @@ def pretend_a_newer_tracker(monkeypatch, tmp_path, body):
         f"revision = {number!r}\ndown_revision = {REVISIONS[-1]!r}\n\n"
         f"def upgrade():\n{body}\n\ndef downgrade():\n    pass\n"
     )
-    monkeypatch.setattr("tracker.database.resource", lambda name: folder)
-    monkeypatch.setattr("tracker.revisions.resource", lambda name: folder)
+    monkeypatch.setattr("spook_tracker.tracker.database.resource", lambda name: folder)
+    monkeypatch.setattr("spook_tracker.tracker.revisions.resource", lambda name: folder)
     return number
 
 

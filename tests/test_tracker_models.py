@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from sqlalchemy import insert, select
 from sqlalchemy.exc import IntegrityError
 
+from spook_tracker.tracker import models
+from spook_tracker.tracker.border import checked, clean_text
+from spook_tracker.tracker.document import RunDocument, from_number, to_number
+from spook_tracker.tracker.errors import DatabaseError
+from spook_tracker.tracker.models import identity
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.rows import joined, split
+from spook_tracker.tracker.series import History
 from tests.run_documents import KEY, definition, run, sample
-from tracker import models
-from tracker.border import checked, clean_text
-from tracker.document import RunDocument, from_number, to_number
-from tracker.errors import DatabaseError
-from tracker.models import identity
-from tracker.record import record
-from tracker.rows import joined, split
-from tracker.series import History
 
 ANY_TEXT = st.text(st.characters(), max_size=60)
 ANY_FLOAT = st.floats(allow_nan=True, allow_infinity=True, width=64)

@@ -17,11 +17,11 @@ import plotly.graph_objects as go
 import plotly.offline
 import pytest
 
+from spook_tracker.tracker.document import to_number
+from spook_tracker.tracker.folder import MARKER, FolderError, replacing
+from spook_tracker.tracker.publish import publish
+from spook_tracker.tracker.resources import resource
 from tests.synthetic_history import SEVEN, DocumentHistory, decade, document, history
-from tracker.document import to_number
-from tracker.folder import MARKER, FolderError, replacing
-from tracker.publish import publish
-from tracker.resources import resource
 
 
 class Reader(HTMLParser):
@@ -240,7 +240,7 @@ def test_the_site_can_be_swapped_without_exchanging_folders(
     """Where the system cannot exchange two folders in one step, the old one steps aside."""
     out = tmp_path / "public"
     publish(history(1), out)
-    monkeypatch.setattr("tracker.folder._exchange", lambda one, other: False)
+    monkeypatch.setattr("spook_tracker.tracker.folder._exchange", lambda one, other: False)
     publish(history(2), out)
 
     assert (out / MARKER).is_file()

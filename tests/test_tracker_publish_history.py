@@ -6,11 +6,11 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.publish import publish
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.series import History
 from tests.synthetic_history import DocumentHistory, document
-from tracker.database import open_database
-from tracker.publish import publish
-from tracker.record import record
-from tracker.series import History
 
 
 def test_a_recorded_history_gives_the_same_pages_as_its_documents(tmp_path: Path) -> None:

@@ -9,13 +9,13 @@ import msgspec
 import pytest
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker import document
+from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.document import from_number
+from spook_tracker.tracker.errors import DatabaseError, DocumentError
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.series import History
 from tests.run_documents import KEY, definition, figure, run, run_of, sample, stability_map
-from tracker import document
-from tracker.database import open_database
-from tracker.document import from_number
-from tracker.errors import DatabaseError, DocumentError
-from tracker.record import record
-from tracker.series import History
 
 
 def bits(value: float) -> bytes:

@@ -6,10 +6,10 @@ import subprocess
 
 import pytest
 
+from spook_tracker.tracker.ancestry import commit_order
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.series import History
 from tests.run_documents import KEY, definition, engine, run, run_of, sample
-from tracker.ancestry import commit_order
-from tracker.record import record
-from tracker.series import History
 
 A, B, C, D = ("1a" * 20, "2b" * 20, "3c" * 20, "4d" * 20)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from spook_tracker.tracker.nights import book
+from spook_tracker.tracker.stage_times import stage_times
 from tests.synthetic_history import history
-from tracker.nights import book
-from tracker.stage_times import stage_times
 
 
 def test_shares_are_of_the_longest_run_and_add_up() -> None:

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from tracker.document import MapData, Sample, SeriesDefinition, to_number
-from tracker.verdict import RANK, Verdict, judge, judge_map, ulp_distance
+from spook_tracker.tracker.document import MapData, Sample, SeriesDefinition, to_number
+from spook_tracker.tracker.verdict import RANK, Verdict, judge, judge_map, ulp_distance
 
 
 def series(**facts) -> SeriesDefinition:

@@ -7,9 +7,9 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from spook_tracker.tracker.errors import UnknownName
+from spook_tracker.tracker.versions import RunInfo, resolve
 from tests.run_documents import engine, machine
-from tracker.errors import UnknownName
-from tracker.versions import RunInfo, resolve
 
 A, B, C = "1a" * 20, "2b" * 20, "3c" * 20
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from spook_tracker.tracker import wording
 from tests.synthetic_history import engine, series
-from tracker import wording
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from engine.method import PLAIN, Method
-from engine.result import Result
-from engine.scene import Scene
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
 
 
 class _BuildInfo:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from engine.bodies import Particle
-from engine.method import PLAIN, Method
-from engine.observe import Final, Position
-from engine.scene import Scene
-from scalar_tests.case import (
+from spook_tracker.engine.bodies import Particle
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import Final, Position
+from spook_tracker.engine.scene import Scene
+from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
     Curve,

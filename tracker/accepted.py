@@ -23,7 +23,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from tracker.errors import TrackerError
+from spook_tracker.tracker.errors import TrackerError
 
 KNOWN = {"series", "range", "who", "why", "until"}
 

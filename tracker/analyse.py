@@ -14,10 +14,17 @@ from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal, Protocol
 
-from tracker.accepted import Accepted, acceptance
-from tracker.document import EngineVersion, Machine, MapData, Sample, SeriesDefinition, from_number
-from tracker.noise import judge_noisy
-from tracker.verdict import Verdict, judge, judge_map
+from spook_tracker.tracker.accepted import Accepted, acceptance
+from spook_tracker.tracker.document import (
+    EngineVersion,
+    Machine,
+    MapData,
+    Sample,
+    SeriesDefinition,
+    from_number,
+)
+from spook_tracker.tracker.noise import judge_noisy
+from spook_tracker.tracker.verdict import Verdict, judge, judge_map
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
 NOISY_NIGHTS = 400  # how far back run times are judged again

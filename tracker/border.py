@@ -12,10 +12,10 @@ from typing import Any
 
 import msgspec
 
-from tracker import document
-from tracker.document import RunDocument
-from tracker.errors import DocumentError
-from tracker.rows import moment
+from spook_tracker.tracker import document
+from spook_tracker.tracker.document import RunDocument
+from spook_tracker.tracker.errors import DocumentError
+from spook_tracker.tracker.rows import moment
 
 MAX_BYTES = 32 * 1024 * 1024  # of one document
 MAX_SAMPLES = 100_000  # of one document, and as many series

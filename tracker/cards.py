@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from scalar_tests.case import ScalarTest
-from tracker.document import EngineVersion, StageChoice, TestCard
-from tracker.measure import ask, sentence
-from tracker.scene_drawing import drawing
+from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.document import EngineVersion, StageChoice, TestCard
+from spook_tracker.tracker.measure import ask, sentence
+from spook_tracker.tracker.scene_drawing import drawing
 
 
 def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> TestCard:

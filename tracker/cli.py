@@ -7,9 +7,16 @@ from typing import Any
 
 import click
 
-from tracker.cli_history import compare, explain, list_tests, show, trend
-from tracker.cli_options import RED, OneLineErrors, database_option, example, source_options, workers_option
-from tracker.cli_storage import db, export, import_files, schema
+from spook_tracker.tracker.cli_history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli_options import (
+    RED,
+    OneLineErrors,
+    database_option,
+    example,
+    source_options,
+    workers_option,
+)
+from spook_tracker.tracker.cli_storage import db, export, import_files, schema
 
 FIRST_STEPS = """\
 Tracks whether a physics engine became less accurate, less stable or slower.
@@ -38,7 +45,7 @@ def main(context: click.Context, version: bool) -> None:
 
 
 def _print_versions() -> None:
-    from tracker.run import Source, present_version, tracker_version
+    from spook_tracker.tracker.run import Source, present_version, tracker_version
 
     engine = present_version(Source())
     click.echo(
@@ -77,7 +84,7 @@ def run_command(
     database: str,
 ) -> None:
     """Run scalar tests (all, or those named), print the pass table and record one run."""
-    from tracker.run import Request
+    from spook_tracker.tracker.run import Request
 
     request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
     document = _measure(request, engine, catalogue, None if no_record else database)
@@ -85,7 +92,7 @@ def run_command(
     if json_file:
         _write(json_file, _json(document))
     if junit_file:
-        from tracker.report_junit import junit_of_run
+        from spook_tracker.tracker.report_junit import junit_of_run
 
         _write(junit_file, junit_of_run(document))
     _exit_red_if(document)
@@ -114,7 +121,7 @@ def nightly(
     database: str,
 ) -> None:
     """Run everything, record it, judge it against the history and publish the website."""
-    from tracker.run import Request
+    from spook_tracker.tracker.run import Request
 
     request = Request(figures=True, sweep=not quick, stability=not quick, workers=workers, trigger="nightly")
     document = _measure(request, engine, catalogue, database)
@@ -122,7 +129,7 @@ def nightly(
     if json_file:
         _write(json_file, _json(document))
     if junit_file:
-        from tracker.report_junit import junit_of_run
+        from spook_tracker.tracker.report_junit import junit_of_run
 
         _write(junit_file, junit_of_run(document))
     regressed = _judge_and_publish(database, document.id, out)
@@ -138,7 +145,7 @@ def nightly(
 @database_option
 def publish(out: Path, database: str) -> None:
     """Build the website from what is recorded."""
-    from tracker.cli_history import history_of
+    from spook_tracker.tracker.cli_history import history_of
 
     with history_of(database) as history:
         _publish(history, out)
@@ -154,7 +161,7 @@ def serve(folder: Path, port: int) -> None:
     from functools import partial
     from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
-    from tracker.errors import TrackerError
+    from spook_tracker.tracker.errors import TrackerError
 
     if not (folder / "index.html").is_file():
         raise TrackerError(f"{folder} holds no website; make one with: tracker publish --out {folder}")
@@ -180,8 +187,8 @@ for command in (compare, trend, list_tests, show, explain, export, import_files,
 
 def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
-    from tracker.console import watching
-    from tracker.run import Source, run
+    from spook_tracker.tracker.console import watching
+    from spook_tracker.tracker.run import Source, run
 
     source = Source(catalogue=catalogue, engine=engine)
     if database is None:
@@ -189,8 +196,8 @@ def _measure(request: Any, engine: str, catalogue: str, database: str | None) ->
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
     from sqlalchemy.orm import Session
 
-    from tracker.database import open_database
-    from tracker.record import record
+    from spook_tracker.tracker.database import open_database
+    from spook_tracker.tracker.record import record
 
     opened = open_database(database)
     try:
@@ -204,14 +211,14 @@ def _measure(request: Any, engine: str, catalogue: str, database: str | None) ->
 
 
 def _print_run(document: Any, everything: bool) -> None:
-    from tracker.console import say
-    from tracker.report_table import pass_table
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.report_table import pass_table
 
     say(pass_table(document, everything))
 
 
 def _exit_red_if(document: Any) -> None:
-    from tracker.report_table import red
+    from spook_tracker.tracker.report_table import red
 
     if red(document):
         click.get_current_context().exit(RED)
@@ -219,10 +226,10 @@ def _exit_red_if(document: Any) -> None:
 
 def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
     """Whether tonight is worse than the history, having said so and published the site."""
-    from tracker.cli_history import accepted_levels, history_of
-    from tracker.console import say
-    from tracker.report_compare import finding_lines
-    from tracker.tonight import tonight
+    from spook_tracker.tracker.cli_history import accepted_levels, history_of
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.report_compare import finding_lines
+    from spook_tracker.tracker.tonight import tonight
 
     with history_of(database) as history:
         findings = tonight(history, history.run(run_id), accepted_levels())
@@ -237,9 +244,9 @@ def _retain(database: str) -> None:
     """Drop figures and maps that the retention rule no longer keeps, once they have been compared."""
     from sqlalchemy.orm import Session
 
-    from tracker.database import open_database
-    from tracker.retention import drop_old_figures
-    from tracker.series import History
+    from spook_tracker.tracker.database import open_database
+    from spook_tracker.tracker.retention import drop_old_figures
+    from spook_tracker.tracker.series import History
 
     opened = open_database(database)
     try:
@@ -250,9 +257,9 @@ def _retain(database: str) -> None:
 
 
 def _publish(history: Any, out: Path) -> None:
-    from tracker.cli_history import accepted_levels
-    from tracker.console import say
-    from tracker.publish import publish as build
+    from spook_tracker.tracker.cli_history import accepted_levels
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.publish import publish as build
 
     report = build(history, out, accepted_levels())
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from tracker.cli_options import RED, database_option, example, source_options
+from spook_tracker.tracker.cli_options import RED, database_option, example, source_options
 
 ACCEPTED = "accepted.toml"
 
@@ -19,8 +19,8 @@ def history_of(database: str) -> Iterator[Any]:
     """The history in a database, for reading."""
     from sqlalchemy.orm import Session
 
-    from tracker.database import open_database
-    from tracker.series import History
+    from spook_tracker.tracker.database import open_database
+    from spook_tracker.tracker.series import History
 
     opened = open_database(database, readonly=True)
     try:
@@ -32,7 +32,7 @@ def history_of(database: str) -> Iterator[Any]:
 
 def accepted_levels(file: Path | None = None) -> Any:
     """Entries of accepted.toml in the folder one works in."""
-    from tracker.accepted import read_accepted
+    from spook_tracker.tracker.accepted import read_accepted
 
     return read_accepted(file or Path(ACCEPTED))
 
@@ -71,7 +71,7 @@ def compare(
 
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green.
     """
-    from tracker.console import say
+    from spook_tracker.tracker.console import say
 
     levels = accepted_levels(accepted)
     with history_of(database) as history:
@@ -81,15 +81,15 @@ def compare(
 
         click.echo(msgspec.json.format(msgspec.json.encode(document), indent=1).decode())
     elif form == "junit":
-        from tracker.report_junit import junit_of_comparison
+        from spook_tracker.tracker.report_junit import junit_of_comparison
 
         click.echo(junit_of_comparison(document), nl=False)
     elif form == "markdown":
-        from tracker.report_compare import compare_markdown
+        from spook_tracker.tracker.report_compare import compare_markdown
 
         say(compare_markdown(document).rstrip("\n"))
     else:
-        from tracker.report_compare import compare_table
+        from spook_tracker.tracker.report_compare import compare_table
 
         say(compare_table(document, everything))
     _exit_as(document, fail_on)
@@ -106,8 +106,8 @@ def _exit_as(document: Any, fail_on: str) -> None:
 
 def _compared(history: Any, before: str, after: str, levels: Any) -> Any:
     """The comparison, with what history knows: the noise of run times, the first bad commit of what is red."""
-    from tracker.compare import Measured, side_of
-    from tracker.compare import compare as compared
+    from spook_tracker.tracker.compare import Measured, side_of
+    from spook_tracker.tracker.compare import compare as compared
 
     old, new = history.resolve(before), history.resolve(after)
     earlier, later = (
@@ -123,8 +123,8 @@ def _compared(history: Any, before: str, after: str, levels: Any) -> Any:
 
 def _usual_times(history: Any, run: Any, samples: Any) -> dict[str, tuple[float, float]]:
     """Level and noise of each series of run times up to a run, on its machine and under its definition."""
-    from tracker.document import from_number
-    from tracker.noise import usual_of
+    from spook_tracker.tracker.document import from_number
+    from spook_tracker.tracker.noise import usual_of
 
     timed = {key: definition for key, (definition, _) in samples.items() if definition.kind == "time"}
     found = {}
@@ -143,7 +143,7 @@ def _usual_times(history: Any, run: Any, samples: Any) -> dict[str, tuple[float,
 
 def _first_bad(history: Any, run: Any, series: list[str]) -> dict[str, tuple[str, str]]:
     """Last good and first bad commit of red series, as far as the history knows them."""
-    from tracker.analyse import commit_of, judge_history, nights
+    from spook_tracker.tracker.analyse import commit_of, judge_history, nights
 
     known = {}
     for key, stored in history.series(series).items():
@@ -170,10 +170,10 @@ def trend(test: str, metric: str | None, last: int, accepted: Path | None, datab
     """Show the series of a test over versions: sparkline, change points, last values."""
     import difflib
 
-    from tracker.analyse import nights
-    from tracker.console import say
-    from tracker.errors import UnknownName
-    from tracker.report_trend import trend_lines
+    from spook_tracker.tracker.analyse import nights
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.errors import UnknownName
+    from spook_tracker.tracker.report_trend import trend_lines
 
     levels = accepted_levels(accepted)
     with history_of(database) as history:
@@ -199,9 +199,9 @@ def trend(test: str, metric: str | None, last: int, accepted: Path | None, datab
 @source_options
 def list_tests(engine: str, catalogue: str) -> None:
     """List the scalar tests: what is asked, and against which limit."""
-    from tracker.console import say
-    from tracker.report_catalogue import catalogue_table
-    from tracker.run import Source
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.report_catalogue import catalogue_table
+    from spook_tracker.tracker.run import Source
 
     say(catalogue_table(Source(catalogue=catalogue, engine=engine).tests()))
 
@@ -211,9 +211,9 @@ def list_tests(engine: str, catalogue: str) -> None:
 @source_options
 def show(test: str, engine: str, catalogue: str) -> None:
     """Show one test: question, model, theory, limits and their sources."""
-    from tracker.console import say
-    from tracker.report_catalogue import card
-    from tracker.run import Source, select
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.report_catalogue import card
+    from spook_tracker.tracker.run import Source, select
 
     tests = select(Source(catalogue=catalogue, engine=engine).tests(), [test])
     say(card(test, tests[test]))
@@ -227,10 +227,10 @@ def show(test: str, engine: str, catalogue: str) -> None:
 @source_options
 def explain(test: str, cost: bool, engine: str, catalogue: str) -> None:
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
-    from tracker.console import say
-    from tracker.ladder import saved_by_leaving_out, stage_costs
-    from tracker.report_catalogue import stage_table
-    from tracker.run import Source, select
+    from spook_tracker.tracker.console import say
+    from spook_tracker.tracker.ladder import saved_by_leaving_out, stage_costs
+    from spook_tracker.tracker.report_catalogue import stage_table
+    from spook_tracker.tracker.run import Source, select
 
     source = Source(catalogue=catalogue, engine=engine)
     tests = select(source.tests(), [test])

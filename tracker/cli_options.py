@@ -45,7 +45,7 @@ def source_options(command: Command) -> Command:
             "--catalogue",
             metavar="MODULE:NAME",
             envvar="TRACKER_CATALOGUE",
-            default="scalar_tests.catalogue:CATALOGUE",
+            default="spook_tracker.scalar_tests.catalogue:CATALOGUE",
             help="Another table of scalar tests; also TRACKER_CATALOGUE.",
         ),
     ):
@@ -97,7 +97,7 @@ def _unusable(error: Exception) -> int:
     """Say what went wrong and return the exit code."""
     if os.environ.get("TRACKER_DEBUG"):
         raise error
-    from tracker.errors import TrackerError
+    from spook_tracker.tracker.errors import TrackerError
 
     if isinstance(error, TrackerError):
         complain(str(error))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tracker.cli_options import database_option, example
+from spook_tracker.tracker.cli_options import database_option, example
 
 
 @click.command(epilog=example("tracker export latest --out runs/"))
@@ -17,8 +17,8 @@ from tracker.cli_options import database_option, example
 @database_option
 def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
     """Write runs (all, or those named) as JSON documents."""
-    from tracker.cli_history import history_of
-    from tracker.transfer import encoded, export_runs
+    from spook_tracker.tracker.cli_history import history_of
+    from spook_tracker.tracker.transfer import encoded, export_runs
 
     with history_of(database) as history:
         if out is not None:
@@ -35,8 +35,8 @@ def import_files(files: tuple[Path, ...], database: str) -> None:
     """Record runs from JSON documents; what is there already is left as it is."""
     from sqlalchemy.orm import Session
 
-    from tracker.database import open_database
-    from tracker.transfer import import_files as read_in
+    from spook_tracker.tracker.database import open_database
+    from spook_tracker.tracker.transfer import import_files as read_in
 
     opened = open_database(database)
     try:
@@ -53,8 +53,8 @@ def schema(document: str) -> None:
     """Print the JSON Schema of a run document, or of a comparison."""
     import json
 
-    from tracker.compare_document import compare_schema
-    from tracker.schema import document_schema
+    from spook_tracker.tracker.compare_document import compare_schema
+    from spook_tracker.tracker.schema import document_schema
 
     found = document_schema() if document == "run" else compare_schema()
     click.echo(json.dumps(found, indent=1, ensure_ascii=False))
@@ -69,7 +69,7 @@ def db() -> None:
 @database_option
 def upgrade(database: str) -> None:
     """Bring the schema to the newest revision; of an older SQLite file a copy is kept."""
-    from tracker.database import head, open_database
+    from spook_tracker.tracker.database import head, open_database
 
     open_database(database).dispose()
     click.echo(f"the schema is at revision {head()}, the newest")
@@ -79,9 +79,9 @@ def upgrade(database: str) -> None:
 @database_option
 def check(database: str) -> None:
     """Read everything and say what is wrong; exit code 1 if anything is."""
-    from tracker.cli_options import RED
-    from tracker.database import open_database
-    from tracker.database_check import check as faults_of
+    from spook_tracker.tracker.cli_options import RED
+    from spook_tracker.tracker.database import open_database
+    from spook_tracker.tracker.database_check import check as faults_of
 
     opened = open_database(database, readonly=True)
     try:
@@ -100,7 +100,7 @@ def check(database: str) -> None:
 @click.argument("target", metavar="TO")
 def copy(source: str, target: str) -> None:
     """Copy a whole history into an empty database, of the other kind as well, without loss."""
-    from tracker.database_copy import copy_database
+    from spook_tracker.tracker.database_copy import copy_database
 
     digests = copy_database(source, target)
     click.echo(
@@ -112,8 +112,8 @@ def copy(source: str, target: str) -> None:
 @database_option
 def stats(database: str) -> None:
     """Say how much is stored."""
-    from tracker.database import open_database
-    from tracker.statistics import statistics
+    from spook_tracker.tracker.database import open_database
+    from spook_tracker.tracker.statistics import statistics
 
     opened = open_database(database, readonly=True)
     try:

@@ -13,13 +13,13 @@ from typing import Any, Literal
 
 import msgspec
 
-from tracker.accepted import Accepted, acceptance
-from tracker.compare_document import Change, CompareDocument, Side
-from tracker.compare_ladders import frontiers, run_times
-from tracker.document import MapData, Sample, SeriesDefinition, from_number
-from tracker.noise import Usual, judge_time
-from tracker.verdict import RED, Verdict, judge, judge_map
-from tracker.wording import slug
+from spook_tracker.tracker.accepted import Accepted, acceptance
+from spook_tracker.tracker.compare_document import Change, CompareDocument, Side
+from spook_tracker.tracker.compare_ladders import frontiers, run_times
+from spook_tracker.tracker.document import MapData, Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.noise import Usual, judge_time
+from spook_tracker.tracker.verdict import RED, Verdict, judge, judge_map
+from spook_tracker.tracker.wording import slug
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 FAMILY = {

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from tracker.document import Name, Number, OutcomeClass, Struct, Text
+from spook_tracker.tracker.document import Name, Number, OutcomeClass, Struct, Text
 
 COMPARE_SCHEMA_VERSION = 1
 Word = Literal[

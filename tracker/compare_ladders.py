@@ -7,12 +7,12 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from statistics import median
 
-from tracker.compare_document import Change, Frontier
-from tracker.document import Sample, SeriesDefinition, Timing, from_number
-from tracker.order import error_in_time, time_at_error
-from tracker.timing_statistics import compare_times
-from tracker.verdict import Word
-from tracker.wording import slug
+from spook_tracker.tracker.compare_document import Change, Frontier
+from spook_tracker.tracker.document import Sample, SeriesDefinition, Timing, from_number
+from spook_tracker.tracker.order import error_in_time, time_at_error
+from spook_tracker.tracker.timing_statistics import compare_times
+from spook_tracker.tracker.verdict import Word
+from spook_tracker.tracker.wording import slug
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 Rung = tuple[SeriesDefinition, Sample, Sample]

@@ -12,14 +12,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tracker.accepted import Accepted
-from tracker.analyse import is_release
-from tracker.compare import Measured, compare, side_of
-from tracker.compare_document import Change, CompareDocument
-from tracker.document import Number, from_number
-from tracker.events import Event
-from tracker.nights import Book, Night, Source
-from tracker.wording import clean, conditions, day, named, number, quantity, short_hash, slug, version
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.analyse import is_release
+from spook_tracker.tracker.compare import Measured, compare, side_of
+from spook_tracker.tracker.compare_document import Change, CompareDocument
+from spook_tracker.tracker.document import Number, from_number
+from spook_tracker.tracker.events import Event
+from spook_tracker.tracker.nights import Book, Night, Source
+from spook_tracker.tracker.wording import (
+    clean,
+    conditions,
+    day,
+    named,
+    number,
+    quantity,
+    short_hash,
+    slug,
+    version,
+)
 
 NEWEST = 10  # versions to choose from
 RELEASES = 6  # and the newest releases before them

@@ -18,7 +18,7 @@ from sqlalchemy import URL, Engine, create_engine, event, exc, make_url
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
-from tracker.errors import DatabaseError
+from spook_tracker.tracker.errors import DatabaseError
 
 DEFAULT = "sqlite:///tracker.db"
 LOCK_TIMEOUT = 30.0  # s to wait for another writer

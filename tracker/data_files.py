@@ -14,9 +14,9 @@ from typing import Any
 
 import msgspec
 
-from tracker.document import to_number
-from tracker.events import Event
-from tracker.nights import Book, Night, TestHistory, Trend
+from spook_tracker.tracker.document import to_number
+from spook_tracker.tracker.events import Event
+from spook_tracker.tracker.nights import Book, Night, TestHistory, Trend
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 COLUMNS = (

@@ -8,9 +8,9 @@ from typing import Any
 
 from sqlalchemy import URL, Engine, inspect, text
 
-from tracker.connection import connected, database_url, in_words, is_file, shown
-from tracker.errors import DatabaseError
-from tracker.resources import resource
+from spook_tracker.tracker.connection import connected, database_url, in_words, is_file, shown
+from spook_tracker.tracker.errors import DatabaseError
+from spook_tracker.tracker.resources import resource
 
 __all__ = ["database_url", "head", "in_words", "open_database", "shown", "upgrade"]
 
@@ -58,7 +58,9 @@ def _revisions() -> list[str]:
 
 def upgrade(engine: Engine, target: str = "head", *, keep_copy: bool = True) -> None:
     """Bring the schema to `target` in one transaction. An older SQLite file is copied beside itself first."""
-    from tracker.revisions import migrate  # Alembic is imported only when there is something to do
+    from spook_tracker.tracker.revisions import (
+        migrate,  # Alembic is imported only when there is something to do
+    )
 
     with engine.connect() as connection:
         sqlite = engine.dialect.name == "sqlite"

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from sqlalchemy import Connection, Engine, func, select, text
 from sqlalchemy.orm import Session
 
-from tracker import models, rows
-from tracker.border import checked
-from tracker.database import in_words
-from tracker.errors import TrackerError
-from tracker.models import identity
-from tracker.series import History
+from spook_tracker.tracker import models, rows
+from spook_tracker.tracker.border import checked
+from spook_tracker.tracker.database import in_words
+from spook_tracker.tracker.errors import TrackerError
+from spook_tracker.tracker.models import identity
+from spook_tracker.tracker.series import History
 
 SHOWN = 5  # of the faults of one kind
 
@@ -37,7 +37,7 @@ def _damage(connection: Connection) -> Iterator[str]:
 
 
 def _schema(connection: Connection) -> Iterator[str]:
-    from tracker.revisions import differences
+    from spook_tracker.tracker.revisions import differences
 
     for difference in differences(connection)[:SHOWN]:
         yield f"the tables differ from the models: {difference!s:.200}"

@@ -10,9 +10,9 @@ from typing import Any
 
 from sqlalchemy import Connection, Engine, Table, func, insert, select
 
-from tracker import models
-from tracker.database import in_words, open_database, shown
-from tracker.errors import DatabaseError
+from spook_tracker.tracker import models
+from spook_tracker.tracker.database import in_words, open_database, shown
+from spook_tracker.tracker.errors import DatabaseError
 
 CHUNK = 5000  # rows held in memory
 

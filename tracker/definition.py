@@ -22,6 +22,7 @@ from collections.abc import Callable, Mapping, Set
 from typing import Any
 
 OWN_PACKAGES = ("scalar_tests",)
+INSTALLED = "spook_tracker."
 WORDING = {
     "conclusion",
     "definition",
@@ -83,7 +84,12 @@ class _Seen:
 
 
 def _package(module: str) -> str:
-    return module.partition(".")[0]
+    return _inside(module).partition(".")[0]
+
+
+def _inside(module: str) -> str:
+    """A module's name below the one that is installed: what the whole is called changes no definition."""
+    return module.removeprefix(INSTALLED)
 
 
 def _describe(thing: Any, seen: _Seen) -> Any:
@@ -111,7 +117,7 @@ def _describe(thing: Any, seen: _Seen) -> Any:
     if isinstance(thing, type):
         return _describe_class(thing, seen)
     if isinstance(thing, types.ModuleType):
-        return ("module", thing.__name__)
+        return ("module", _inside(thing.__name__))
     if dataclasses.is_dataclass(thing):
         chosen = dataclasses.fields(thing) if seen.owns(type(thing).__module__) else _chosen(thing)
         named = [f.name for f in chosen if not _is_wording(type(thing), f.name)]
@@ -135,12 +141,12 @@ def _chosen(thing: Any) -> list[dataclasses.Field[Any]]:
 
 def _is_wording(kind: type, field: str) -> bool:
     """A text for the reader, or what judges a value, in a class of the questions' own vocabulary."""
-    return kind.__module__ == "scalar_tests.case" and field in WORDING
+    return _inside(kind.__module__) == "scalar_tests.case" and field in WORDING
 
 
 def _describe_class(kind: type, seen: _Seen) -> Any:
     if not seen.owns(kind.__module__):
-        return ("class", kind.__module__, kind.__qualname__)
+        return ("class", _inside(kind.__module__), kind.__qualname__)
     tree = _module_tree(kind.__module__)
     for node in ast.walk(tree) if tree else ():
         if isinstance(node, ast.ClassDef) and node.name == kind.__name__:
@@ -150,7 +156,7 @@ def _describe_class(kind: type, seen: _Seen) -> Any:
 
 def _describe_function(function: types.FunctionType, seen: _Seen) -> Any:
     if not seen.owns(function.__module__ or ""):
-        return ("function", function.__module__, function.__qualname__)
+        return ("function", _inside(function.__module__ or ""), function.__qualname__)
     code = function.__code__
     nodes = _nodes_of(function)
     body: Any = tuple(_canonical(node) for node in nodes) or ("bytecode", code.co_code.hex(), _plain(code))

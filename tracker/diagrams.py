@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tracker.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
-from tracker.document import FigureData, MapData, Sample, from_number
-from tracker.events import Event
-from tracker.figures import figure, grid_figure
-from tracker.nights import Night, TestHistory, Trend
-from tracker.svg import Picture, grid_picture, picture
-from tracker.wording import (
+from spook_tracker.tracker.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
+from spook_tracker.tracker.document import FigureData, MapData, Sample, from_number
+from spook_tracker.tracker.events import Event
+from spook_tracker.tracker.figures import figure, grid_figure
+from spook_tracker.tracker.nights import Night, TestHistory, Trend
+from spook_tracker.tracker.svg import Picture, grid_picture, picture
+from spook_tracker.tracker.wording import (
     clean,
     conditions,
     day,

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
-from tracker import analyse
-from tracker.accepted import Accepted
-from tracker.document import MapData
-from tracker.nights import Book, Night, State, TestHistory, Trend
-from tracker.verdict import Verdict, same_bits
+from spook_tracker.tracker import analyse
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.document import MapData
+from spook_tracker.tracker.nights import Book, Night, State, TestHistory, Trend
+from spook_tracker.tracker.verdict import Verdict, same_bits
 
 NOISY_NIGHTS = 400  # how far back run times are judged again on every publication
 Standing = Literal["detected", "accepted", "recovered"]

@@ -7,9 +7,18 @@ import json
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
-from tracker.events import Event
-from tracker.nights import Book, Night
-from tracker.wording import clean, conditions, instant, limit, named, quantity, short_hash, version
+from spook_tracker.tracker.events import Event
+from spook_tracker.tracker.nights import Book, Night
+from spook_tracker.tracker.wording import (
+    clean,
+    conditions,
+    instant,
+    limit,
+    named,
+    quantity,
+    short_hash,
+    version,
+)
 
 ATOM = "http://www.w3.org/2005/Atom"
 MOST_ENTRIES = 100

@@ -11,9 +11,19 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, names_on_lines, thinned, ticks
-from tracker.svg import CELL_WORDS, describe
-from tracker.wording import clean, number
+from spook_tracker.tracker.charts import (
+    Chart,
+    Grid,
+    Line,
+    Scale,
+    drawable,
+    flattened,
+    names_on_lines,
+    thinned,
+    ticks,
+)
+from spook_tracker.tracker.svg import CELL_WORDS, describe
+from spook_tracker.tracker.wording import clean, number
 
 DASHES = {"reference": "dash", "limit": "dot", "front": "longdash"}
 SYMBOLS = (

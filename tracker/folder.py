@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tracker.errors import TrackerError
+from spook_tracker.tracker.errors import TrackerError
 
 MARKER = ".tracker-site.json"
 AT_FDCWD, RENAME_EXCHANGE = -100, 2

@@ -11,13 +11,13 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from engine.method import STAGES_THAT_CAN_BE_FORCED
-from scalar_tests.case import Configuration, Example, Ladder, ScalarTest, Simulate
-from tracker.definition import definition_hash
-from tracker.document import OutcomeClass, Sample, SeriesDefinition, Timing, to_number
-from tracker.measure import Witness, ask, series_key
-from tracker.order import error_in_time, in_range, observed_order, time_at_error
-from tracker.timing import Timed, interleaved, once, stage_seconds
+from spook_tracker.engine.method import STAGES_THAT_CAN_BE_FORCED
+from spook_tracker.scalar_tests.case import Configuration, Example, Ladder, ScalarTest, Simulate
+from spook_tracker.tracker.definition import definition_hash
+from spook_tracker.tracker.document import OutcomeClass, Sample, SeriesDefinition, Timing, to_number
+from spook_tracker.tracker.measure import Witness, ask, series_key
+from spook_tracker.tracker.order import error_in_time, in_range, observed_order, time_at_error
+from spook_tracker.tracker.timing import Timed, interleaved, once, stage_seconds
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
 ORDER_BAND = 0.1

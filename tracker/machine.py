@@ -14,7 +14,7 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-from tracker.document import Machine
+from spook_tracker.tracker.document import Machine
 
 PROBES = (0.1, 0.7, 1.3, 2.9, 11.0, 123.456, 600.1)
 LIBRARY: tuple[Callable[[float], float], ...] = (

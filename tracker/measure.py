@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from engine.errors import SimulationFailed
-from engine.result import Result
-from scalar_tests.case import (
+from spook_tracker.engine.errors import SimulationFailed
+from spook_tracker.engine.result import Result
+from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Figure,
     Measurement,
@@ -26,8 +26,8 @@ from scalar_tests.case import (
     StabilityMap,
     StabilityStudy,
 )
-from tracker.definition import definition_hash
-from tracker.document import (
+from spook_tracker.tracker.definition import definition_hash
+from spook_tracker.tracker.document import (
     Curve,
     FigureData,
     MapData,

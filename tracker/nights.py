@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal, Protocol
 
-from tracker.document import (
+from spook_tracker.tracker.document import (
     EngineVersion,
     FigureData,
     Machine,
@@ -22,7 +22,7 @@ from tracker.document import (
     TestCard,
     from_number,
 )
-from tracker.wording import instant, version
+from spook_tracker.tracker.wording import instant, version
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
 MapKey = tuple[str, str, str]  # test, configuration, name

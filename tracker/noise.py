@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Literal
 
-from tracker.verdict import Verdict
+from spook_tracker.tracker.verdict import Verdict
 
 WINDOW = 30  # nights that say what is usual
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts

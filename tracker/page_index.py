@@ -7,10 +7,10 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any
 
-from tracker.events import Event, judged
-from tracker.nights import Book, State, TestHistory, Trend
-from tracker.page_rows import Page, address, event_row, row
-from tracker.wording import clean, day, quantity, short_hash, version
+from spook_tracker.tracker.events import Event, judged
+from spook_tracker.tracker.nights import Book, State, TestHistory, Trend
+from spook_tracker.tracker.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.wording import clean, day, quantity, short_hash, version
 
 HEAT_NIGHTS = 60
 ORDER: dict[State, int] = {"fail": 0, "watch": 1, "none": 2, "pass": 3}

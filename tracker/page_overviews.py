@@ -6,16 +6,16 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from tracker.comparisons import Comparisons, choice, page_data
-from tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, trend_chart, view
-from tracker.events import Event, map_key, map_verdicts
-from tracker.feed import badge_words
-from tracker.nights import Book, TestHistory
-from tracker.page_index import gates_at, health, summary
-from tracker.page_rows import Page, address, event_row, row
-from tracker.scenery import scenery
-from tracker.svg import grid_picture, picture
-from tracker.wording import slug, web_address
+from spook_tracker.tracker.comparisons import Comparisons, choice, page_data
+from spook_tracker.tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, trend_chart, view
+from spook_tracker.tracker.events import Event, map_key, map_verdicts
+from spook_tracker.tracker.feed import badge_words
+from spook_tracker.tracker.nights import Book, TestHistory
+from spook_tracker.tracker.page_index import gates_at, health, summary
+from spook_tracker.tracker.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.scenery import scenery
+from spook_tracker.tracker.svg import grid_picture, picture
+from spook_tracker.tracker.wording import slug, web_address
 
 MOST_CLOSED = 100  # events on the page; the file has all
 MOST_CHANGES = 100  # of a comparison read without scripts

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tracker.events import Event, judged
-from tracker.nights import Book, Night, State, TestHistory, Trend
-from tracker.svg import sparkline
-from tracker.wording import (
+from spook_tracker.tracker.events import Event, judged
+from spook_tracker.tracker.nights import Book, Night, State, TestHistory, Trend
+from spook_tracker.tracker.svg import sparkline
+from spook_tracker.tracker.wording import (
     band,
     clean,
     conditions,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, trend_chart, view
-from tracker.events import Event, of_test
-from tracker.nights import Book, TestHistory
-from tracker.page_rows import Page, address, event_row, row
-from tracker.scenery import scenery
-from tracker.stage_times import stage_times
-from tracker.wording import clean, day, slug
+from spook_tracker.tracker.diagrams import figure_chart, grid_view, ladder_charts, map_grid, trend_chart, view
+from spook_tracker.tracker.events import Event, of_test
+from spook_tracker.tracker.nights import Book, TestHistory
+from spook_tracker.tracker.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.scenery import scenery
+from spook_tracker.tracker.stage_times import stage_times
+from spook_tracker.tracker.wording import clean, day, slug
 
 
 def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from tracker import page_overviews
-from tracker.comparisons import Comparisons
-from tracker.events import Event
-from tracker.nights import Book
-from tracker.page_index import index
-from tracker.page_rows import Page
-from tracker.page_test import test_page
+from spook_tracker.tracker import page_overviews
+from spook_tracker.tracker.comparisons import Comparisons
+from spook_tracker.tracker.events import Event
+from spook_tracker.tracker.nights import Book
+from spook_tracker.tracker.page_index import index
+from spook_tracker.tracker.page_rows import Page
+from spook_tracker.tracker.page_test import test_page
 
 NAVIGATION = (
     ("index.html", "Tonight"),

@@ -16,18 +16,18 @@ from typing import Any
 
 import msgspec
 
-from tracker import data_files, feed
-from tracker.accepted import Accepted
-from tracker.comparisons import FILE, comparisons, read_known, stored
-from tracker.events import Event, all_events
-from tracker.folder import FolderError, digest, replacing
-from tracker.nights import Book, Source, TestHistory, book
-from tracker.page_index import health
-from tracker.page_rows import Page, address
-from tracker.pages import NAVIGATION, pages
-from tracker.resources import resource
-from tracker.templates import environment
-from tracker.wording import slug
+from spook_tracker.tracker import data_files, feed
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.comparisons import FILE, comparisons, read_known, stored
+from spook_tracker.tracker.events import Event, all_events
+from spook_tracker.tracker.folder import FolderError, digest, replacing
+from spook_tracker.tracker.nights import Book, Source, TestHistory, book
+from spook_tracker.tracker.page_index import health
+from spook_tracker.tracker.page_rows import Page, address
+from spook_tracker.tracker.pages import NAVIGATION, pages
+from spook_tracker.tracker.resources import resource
+from spook_tracker.tracker.templates import environment
+from spook_tracker.tracker.wording import slug
 
 __all__ = ["FolderError", "Report", "publish"]
 

@@ -9,12 +9,12 @@ from sqlalchemy import Table, insert, or_, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from tracker import models, rows
-from tracker.border import checked
-from tracker.database import in_words
-from tracker.document import RunDocument
-from tracker.errors import DatabaseError
-from tracker.models import identity
+from spook_tracker.tracker import models, rows
+from spook_tracker.tracker.border import checked
+from spook_tracker.tracker.database import in_words
+from spook_tracker.tracker.document import RunDocument
+from spook_tracker.tracker.errors import DatabaseError
+from spook_tracker.tracker.models import identity
 
 ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
 CHUNK = 500  # ids in one IN (...), well below every database's limit

@@ -8,11 +8,11 @@ from typing import Any
 
 import click
 
-from scalar_tests.case import Measurement, Metric, ScalarTest
-from tracker.cards import explained
-from tracker.console import Column, table, width
-from tracker.report_sweep import seconds
-from tracker.report_table import number
+from spook_tracker.scalar_tests.case import Measurement, Metric, ScalarTest
+from spook_tracker.tracker.cards import explained
+from spook_tracker.tracker.console import Column, table, width
+from spook_tracker.tracker.report_sweep import seconds
+from spook_tracker.tracker.report_table import number
 
 
 def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import click
 
-from tracker.analyse import Finding
-from tracker.compare_document import Change, CompareDocument, Frontier, Side
-from tracker.console import Column, clean, table, width
-from tracker.document import Number, from_number
+from spook_tracker.tracker.analyse import Finding
+from spook_tracker.tracker.compare_document import Change, CompareDocument, Frontier, Side
+from spook_tracker.tracker.console import Column, clean, table, width
+from spook_tracker.tracker.document import Number, from_number
 
 MARK = {
     "regressed": "✗",
@@ -233,7 +233,7 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
 
 
 def _finding_line(finding: Finding, site: str) -> str:
-    from tracker.compare import page_of
+    from spook_tracker.tracker.compare import page_of
 
     judged, definition = finding.judged, finding.definition
     parts = [f"✗ {finding.series}: {finding.verdict.name or finding.verdict.word}"]

@@ -6,10 +6,10 @@ import re
 from collections import defaultdict
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from tracker.compare_document import CompareDocument
-from tracker.document import RunDocument
-from tracker.report_compare import red_line
-from tracker.report_table import is_red, limit, measured, pairs
+from spook_tracker.tracker.compare_document import CompareDocument
+from spook_tracker.tracker.document import RunDocument
+from spook_tracker.tracker.report_compare import red_line
+from spook_tracker.tracker.report_table import is_red, limit, measured, pairs
 
 ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 

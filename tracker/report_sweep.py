@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import click
 
-from tracker.console import Column, table
-from tracker.document import Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.console import Column, table
+from spook_tracker.tracker.document import Sample, SeriesDefinition, from_number
 
 WIDE = 100  # columns; below, order and time to error are all there is room for
 Pair = tuple[SeriesDefinition, Sample]

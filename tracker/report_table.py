@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import click
 
-from tracker.console import Column, Style, clean, table, width
-from tracker.document import MapData, RunDocument, Sample, SeriesDefinition, from_number
-from tracker.report_sweep import sweep_table
-from tracker.verdict import cell_rank
+from spook_tracker.tracker.console import Column, Style, clean, table, width
+from spook_tracker.tracker.document import MapData, RunDocument, Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.report_sweep import sweep_table
+from spook_tracker.tracker.verdict import cell_rank
 
 NARROW = 100  # columns; below, time step and set point have no column of their own
 ROLES = {"gate": 0, "companion": 1, "reported": 2}

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import click
 
-from tracker.accepted import Accepted
-from tracker.analyse import Judged, Night, commit_of, is_noisy, judge_history
-from tracker.change_points import change_points
-from tracker.console import Column, sparkline, table, width
-from tracker.document import SeriesDefinition, from_number
-from tracker.report_table import limit, number
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.analyse import Judged, Night, commit_of, is_noisy, judge_history
+from spook_tracker.tracker.change_points import change_points
+from spook_tracker.tracker.console import Column, sparkline, table, width
+from spook_tracker.tracker.document import SeriesDefinition, from_number
+from spook_tracker.tracker.report_table import limit, number
 
 MARK = {"detected": "✗ red", "accepted": "! accepted", "recovered": "✓ recovered", "suspected": "? suspected"}
 

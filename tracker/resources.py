@@ -1,4 +1,4 @@
-"""Where the folders lie that are data, not modules: migrations and site, in a wheel and in a checkout."""
+"""Where the folders lie that are data, not modules: migrations and site."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from pathlib import Path
 
 
 def resource(name: str) -> Path:
-    """The folder `name`: inside the package in a wheel, beside it in a checkout."""
-    package = Path(__file__).resolve().parent
-    for folder in (package / name, package.parent / name):
-        if folder.is_dir():
-            return folder
-    raise FileNotFoundError(
-        f"the folder {name!r} is missing from this installation; install the tracker again"
-    )
+    """The folder `name`, beside this package: in an installation and in a checkout alike."""
+    folder = Path(__file__).resolve().parent.parent / name
+    if not folder.is_dir():
+        raise FileNotFoundError(
+            f"the folder {name!r} is missing from this installation; install the tracker again"
+        )
+    return folder

@@ -13,10 +13,10 @@ from collections.abc import Collection
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from tracker import git, models
-from tracker.database import in_words
-from tracker.series import History
-from tracker.versions import RunInfo
+from spook_tracker.tracker import git, models
+from spook_tracker.tracker.database import in_words
+from spook_tracker.tracker.series import History
+from spook_tracker.tracker.versions import RunInfo
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*((a|b|rc|\.post)\d+)?")
 

@@ -10,8 +10,8 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection
 
-from tracker.models import Base
-from tracker.resources import resource
+from spook_tracker.tracker.models import Base
+from spook_tracker.tracker.resources import resource
 
 
 def configuration(connection: Connection | None = None) -> Config:

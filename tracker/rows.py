@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from tracker import document
-from tracker.document import Number
-from tracker.errors import DatabaseError, DocumentError
-from tracker.models import identity
+from spook_tracker.tracker import document
+from spook_tracker.tracker.document import Number
+from spook_tracker.tracker.errors import DatabaseError, DocumentError
+from spook_tracker.tracker.models import identity
 
 Row = dict[str, Any]
 Part = TypeVar("Part")

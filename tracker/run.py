@@ -21,13 +21,29 @@ from datetime import UTC, datetime
 from multiprocessing import get_context
 from typing import Any, Literal
 
-from scalar_tests.case import ScalarTest, Simulate
-from tracker import ladder as ladders
-from tracker.cards import engine_version, test_card
-from tracker.document import EngineVersion, FigureData, MapData, RunDocument, Sample, SeriesDefinition
-from tracker.errors import TrackerError
-from tracker.machine import machine
-from tracker.measure import Measured, Outcome, Witness, draw, judged_sample, measure, metric_series, study
+from spook_tracker.scalar_tests.case import ScalarTest, Simulate
+from spook_tracker.tracker import ladder as ladders
+from spook_tracker.tracker.cards import engine_version, test_card
+from spook_tracker.tracker.document import (
+    EngineVersion,
+    FigureData,
+    MapData,
+    RunDocument,
+    Sample,
+    SeriesDefinition,
+)
+from spook_tracker.tracker.errors import TrackerError
+from spook_tracker.tracker.machine import machine
+from spook_tracker.tracker.measure import (
+    Measured,
+    Outcome,
+    Witness,
+    draw,
+    judged_sample,
+    measure,
+    metric_series,
+    study,
+)
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData
@@ -42,7 +58,7 @@ class RunError(TrackerError):
 class Source:
     """Where the questions and the engine are found, by name."""
 
-    catalogue: str = "scalar_tests.catalogue:CATALOGUE"
+    catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
     engine: str = "engine"  # a module with simulate, explain and build_info
 
     def tests(self) -> Mapping[str, ScalarTest]:

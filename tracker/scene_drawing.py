@@ -9,12 +9,12 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from engine.bodies import WORLD, Particle, RigidBody
-from engine.forces import CentralGravity, Spring
-from engine.joints import Distance, Joint
-from engine.scene import Scene
-from engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
-from tracker.document import DrawnLink, DrawnSolid, SceneDrawing
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.forces import CentralGravity, Spring
+from spook_tracker.engine.joints import Distance, Joint
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.tracker.document import DrawnLink, DrawnSolid, SceneDrawing
 
 MOST_SOLIDS = 300
 Vector = tuple[float, float, float]

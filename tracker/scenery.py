@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from tracker.document import DrawnLink, DrawnSolid, SceneDrawing
-from tracker.scene_drawing import Quaternion, Vector, multiplied
+from spook_tracker.tracker.document import DrawnLink, DrawnSolid, SceneDrawing
+from spook_tracker.tracker.scene_drawing import Quaternion, Vector, multiplied
 
 WIDTH, LEAST_HEIGHT, MOST_HEIGHT, EDGE = 640.0, 150.0, 400.0, 44.0
 SIDE, ABOVE = math.radians(24.0), math.radians(16.0)

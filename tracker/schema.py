@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from tracker.document import SCHEMA_VERSION, RunDocument
+from spook_tracker.tracker.document import SCHEMA_VERSION, RunDocument
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple, TypeVar
 from sqlalchemy import ColumnElement, and_, select
 from sqlalchemy.orm import Session
 
-from tracker import document, git, models, rows
-from tracker.ancestry import commit_order
-from tracker.document import RunDocument, Sample, SeriesDefinition
-from tracker.errors import DocumentError, UnknownName
-from tracker.versions import RunInfo, resolve
+from spook_tracker.tracker import document, git, models, rows
+from spook_tracker.tracker.ancestry import commit_order
+from spook_tracker.tracker.document import RunDocument, Sample, SeriesDefinition
+from spook_tracker.tracker.errors import DocumentError, UnknownName
+from spook_tracker.tracker.versions import RunInfo, resolve
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
 

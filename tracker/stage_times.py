@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tracker.nights import TestHistory, Trend
-from tracker.wording import number, seconds
+from spook_tracker.tracker.nights import TestHistory, Trend
+from spook_tracker.tracker.wording import number, seconds
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from datetime import datetime
 
 from sqlalchemy import Engine, func, select, text
 
-from tracker import models
-from tracker.database import head, in_words, shown
+from spook_tracker.tracker import models
+from spook_tracker.tracker.database import head, in_words, shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,8 +10,18 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from tracker.charts import Chart, Grid, Line, Scale, drawable, flattened, names_on_lines, thinned, ticks
-from tracker.wording import clean, number
+from spook_tracker.tracker.charts import (
+    Chart,
+    Grid,
+    Line,
+    Scale,
+    drawable,
+    flattened,
+    names_on_lines,
+    thinned,
+    ticks,
+)
+from spook_tracker.tracker.wording import clean, number
 
 WIDTH, HEIGHT = 640.0, 360.0
 LEFT, RIGHT, TOP, BOTTOM = 74.0, 14.0, 14.0, 50.0

@@ -13,8 +13,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from tracker import wording
-from tracker.resources import resource
+from spook_tracker.tracker import wording
+from spook_tracker.tracker.resources import resource
 
 ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from engine.result import Result
-from scalar_tests.case import Simulate
-from tracker.document import Timing
-from tracker.instructions import InstructionCounter, can_count
-from tracker.measure import ask
+from spook_tracker.engine.result import Result
+from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.tracker.document import Timing
+from spook_tracker.tracker.instructions import InstructionCounter, can_count
+from spook_tracker.tracker.measure import ask
 
 RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
 MOST_RUNS = 200  # in one repeat

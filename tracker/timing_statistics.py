@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from statistics import median
 
-from tracker.document import Timing
+from spook_tracker.tracker.document import Timing
 
 FLOOR = 0.10  # least relative change of run time worth a word, between two sessions
 SIGNIFICANT = 0.01

@@ -8,9 +8,9 @@ from typing import Any
 
 import msgspec
 
-from tracker.accepted import Accepted
-from tracker.analyse import Finding, Night, Run, judge_maps, judge_run
-from tracker.document import Sample, SeriesDefinition
+from spook_tracker.tracker.accepted import Accepted
+from spook_tracker.tracker.analyse import Finding, Night, Run, judge_maps, judge_run
+from spook_tracker.tracker.document import Sample, SeriesDefinition
 
 RECENT = 60  # nights read with all their evidence: state hashes, failures, timings
 

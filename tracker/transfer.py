@@ -14,12 +14,12 @@ from pathlib import Path
 import msgspec
 from sqlalchemy.orm import Session
 
-from tracker.border import MAX_BYTES, checked, decoded
-from tracker.document import RunDocument
-from tracker.errors import DocumentError
-from tracker.record import record
-from tracker.series import History
-from tracker.versions import RunInfo
+from spook_tracker.tracker.border import MAX_BYTES, checked, decoded
+from spook_tracker.tracker.document import RunDocument
+from spook_tracker.tracker.errors import DocumentError
+from spook_tracker.tracker.record import record
+from spook_tracker.tracker.series import History
+from spook_tracker.tracker.versions import RunInfo
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from typing import Literal
 
 import msgspec
 
-from tracker.document import MapData, OutcomeClass, Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.document import MapData, OutcomeClass, Sample, SeriesDefinition, from_number
 
 Word = Literal[
     "identical",

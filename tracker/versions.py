@@ -16,8 +16,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from tracker import document
-from tracker.errors import UnknownName
+from spook_tracker.tracker import document
+from spook_tracker.tracker.errors import UnknownName
 
 ENGINE = "spook"  # meant where no engine is named
 SHORTEST = 4  # characters of a hash or an id

@@ -12,7 +12,7 @@ import unicodedata
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from tracker.document import EngineVersion, SeriesDefinition
+from spook_tracker.tracker.document import EngineVersion, SeriesDefinition
 
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")

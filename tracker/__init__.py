@@ -1,0 +1,1 @@
+"""What changed, and since which commit? Runs scalar tests, records them, judges them, publishes them."""
