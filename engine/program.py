@@ -134,7 +134,7 @@ class Program:
     def run(self, steps: int, time_limit: float | None = None, time_stages: bool = False) -> Result:
         """Run from the start for that many steps, natively and with the GIL released.
 
-        `time_limit` [s] of wall time ends the run as "timed_out" (looked at between blocks of steps);
+        `time_limit` [s] of wall time ends the run as "timed_out", within a step, too;
         `time_stages` measures seconds by stage, which slows the run down.
         """
         for name, what in self._observe.items():
@@ -175,6 +175,8 @@ class Program:
 
 
 def _failure(status: str, body: str | None, step: int, time_limit: float | None, reason: str) -> str:
+    if status == "unsettled":
+        return f"unsettled since step {step}: rows of body {body!r} {reason}"
     if reason:
         return f"in step {step} body {body!r} {reason}"
     if status == "diverged":

@@ -140,6 +140,8 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "floor": method.floor,
             "solver": _SOLVERS[method.solver],
             "friction": _FRICTION[method.friction],
+            "impacts": int(method.impacts == "successive"),
+            "unsettled_residual": method.unsettled_residual,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "force_collision": "collision" in method.force_stages,

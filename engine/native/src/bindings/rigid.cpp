@@ -85,6 +85,8 @@ RigidMethod to_method(const nb::dict& method) {
     out.friction = static_cast<FrictionModel>(nb::cast<int>(method["friction"]));
     out.iterations = nb::cast<int>(method["iterations"]);
     out.residual_tolerance = nb::cast<double>(method["residual_tolerance"]);
+    out.impacts = static_cast<ImpactOrder>(nb::cast<int>(method["impacts"]));
+    out.unsettled_residual = nb::cast<double>(method["unsettled_residual"]);
     out.force_collision = nb::cast<bool>(method["force_collision"]);
     return out;
 }

@@ -155,9 +155,11 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
 
         // Contradicting rigid contacts leave residuals that no round removes: ask less after 25 rounds.
         if (round >= 25 && round % 5 == 0) accepted = std::min(10.0 * accepted, loosest);
+        // The bounds in use count, too: without them a round in which every normal force vanishes would settle at
+        // once, with the friction of the step before.
         double largest = 0.0, change = 0.0;
         for (const FrictionPoint& point : points)
-            largest = std::max(largest, system.rows[point.block].multiplier[0]);
+            largest = std::max({largest, system.rows[point.block].multiplier[0], point.normal});
         double residual = 0.0;
         for (std::size_t k = 0; k < points.size(); ++k) {
             FrictionPoint& point = points[k];

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "run/watch.hpp"
+
 namespace spook {
 
 namespace {
@@ -162,6 +164,7 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
     Sweeper sweeper(system, points, model);
     report.residual = unbounded;
     while (report.sweeps < iterations && report.residual > tolerance) {
+        Watch::look();
         report.residual = sweeper.sweep(false);
         ++report.sweeps;
     }
@@ -193,6 +196,7 @@ FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& poi
         Sweeper sweeper(system, points, model);
         double largest = 0.0, sweep = unbounded;
         for (int inner = 0; inner < iterations && sweep > 0.1 * tolerance; ++inner) {
+            Watch::look();
             sweep = sweeper.sweep(true);
             if (inner == 0) largest = sweep;
             ++report.sweeps;

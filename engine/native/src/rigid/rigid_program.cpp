@@ -1,5 +1,7 @@
 #include "rigid/rigid_program.hpp"
 
+#include <algorithm>
+#include <cstdio>
 #include <stdexcept>
 
 #include "run/state_hash.hpp"
@@ -89,6 +91,12 @@ Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
     throw std::invalid_argument("rigid bodies have no quantity " + kind);
 }
 
+std::string short_text(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", value);
+    return text;
+}
+
 std::vector<Sampler> samplers_of(RigidSystem& system, const std::vector<QuantityRequest>& quantities) {
     std::vector<Sampler> samplers;
     for (const QuantityRequest& request : quantities) samplers.push_back(sampler_of(system, request));
@@ -99,7 +107,7 @@ std::vector<Sampler> samplers_of(RigidSystem& system, const std::vector<Quantity
 
 RigidProgram::RigidProgram(const RigidScene& scene, const std::vector<QuantityRequest>& quantities,
                            std::vector<Observation> observations)
-    : system_(scene), recorder_(samplers_of(system_, quantities), std::move(observations)) {}
+    : substeps_(scene.method.substeps), system_(scene), recorder_(samplers_of(system_, quantities), std::move(observations)) {}
 
 RunReport RigidProgram::run(std::int64_t steps, double time_limit, bool timed) {
     RunReport report;
@@ -108,6 +116,16 @@ RunReport RigidProgram::run(std::int64_t steps, double time_limit, bool timed) {
     recorder_.prepare(steps);
     run_loop(system_, recorder_, steps, time_limit, report);
     system_.count(report, report.steps);
+    if (const RigidSystem::Unsettled& left = system_.unsettled(); left.body >= 0) {
+        report.residual = std::max(report.residual, left.residual);
+        if (report.status == Status::completed) {
+            report.status = Status::unsettled;
+            report.failed_body = left.body;
+            report.failed_step = (left.step + substeps_ - 1) / substeps_;
+            report.reason = "are off by up to " + short_text(left.residual) +
+                            " m/s; use more iterations, smaller time steps or the direct solver";
+        }
+    }
     report.final_state = system_.final_state();
     report.state_hash = state_hash(report.final_state);
     if (timed)

@@ -22,6 +22,7 @@ public:
     bool contacts_possible() const noexcept { return system_.contacts_possible(); }
 
 private:
+    int substeps_;
     RigidSystem system_;
     Recorder recorder_;
 };

@@ -71,6 +71,8 @@ struct RigidMethod {
     FrictionModel friction = FrictionModel::cone;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
+    ImpactOrder impacts = ImpactOrder::simultaneous;
+    double unsettled_residual = 0.1;    // m/s
     bool force_collision = false;       // look for contacts even where none are possible, to measure what it costs
 };
 

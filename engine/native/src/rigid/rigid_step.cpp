@@ -35,6 +35,7 @@ void RigidSystem::apply_forces() {
 }
 
 void RigidSystem::step() {
+    ++live_.step;
     if (clock_) clock_->start();
     if (!force_.empty()) apply_forces();
     kick_free_bodies();
@@ -53,7 +54,7 @@ void RigidSystem::step() {
 void RigidSystem::kick_free_body(int i) noexcept {
     BodyState& s = live_.bodies[i];
     s.velocity += kick(i);
-    s.angular_momentum += h_ * constants_[i].torque;
+    s.angular_momentum += twist(i);
 }
 
 void RigidSystem::kick_free_bodies() {

@@ -44,10 +44,14 @@ RigidSystem::RigidSystem(const RigidScene& scene)
         }
     if (touching) {
         std::vector<SurfaceMaterial> materials;
+        std::vector<IndexPair> joint_pairs;
+        for (const JointBlock& block : joints_.blocks()) joint_pairs.push_back({block.first, block.second});
         for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
         fresh_contacts_.emplace(std::move(detection), materials, slot_,
                                 ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
-                                               method_.residual_tolerance, method_.floor, method_.refinements});
+                                               method_.residual_tolerance, method_.floor, method_.refinements,
+                                               method_.impacts, method_.unsettled_residual},
+                                joint_pairs);
     }
     if (method_.solver == SolverKind::iterative)
         solver_ = joints_.blocks().empty() ? RigidSolver::none : RigidSolver::iterative;
@@ -70,6 +74,7 @@ void RigidSystem::reset(StageClock* clock) {
     pivot_.floor = method_.floor;
     pivot_.refinements = method_.refinements;
     contacts_ = fresh_contacts_;
+    share_.clear();
     matrix_.clear_counters();
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
