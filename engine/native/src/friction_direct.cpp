@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "elementary.hpp"
 #include "friction_acceleration.hpp"
 #include "friction_sweeps.hpp"
+#include "vec.hpp"
 
 namespace spook {
 
@@ -31,7 +33,7 @@ void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPo
         RowBlock& block = system.rows[point.block];
         const double s1 = row_velocity(block, 1, free_velocity) - block.right[1];
         const double s2 = row_velocity(block, 2, free_velocity) - block.right[2];
-        const double speed = std::hypot(s1, s2);
+        const double speed = length(s1, s2);
         if (speed > 0.0) turn_tangents(block, s1 / speed, s2 / speed);
     }
 }
@@ -59,16 +61,16 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
               const std::vector<Vec6>& velocity) {
     const double s1 = slip(block, point, 1, velocity), s2 = slip(block, point, 2, velocity);
     const double b1 = block.multiplier[1], b2 = block.multiplier[2];
-    const double d1 = b1 - s1 / scale, d2 = b2 - s2 / scale, reach = std::hypot(d1, d2);
+    const double d1 = b1 - s1 / scale, d2 = b2 - s2 / scale, reach = length(d1, d2);
     const double shrink = reach > bound ? bound / reach : 1.0;
     Law law;
-    law.residual = std::hypot(b1 - shrink * d1, b2 - shrink * d2);
+    law.residual = length(b1 - shrink * d1, b2 - shrink * d2);
     if (law.residual <= accepted) return law;
     const double old_softness = block.softness[2];
     block.softness[1] = block.softness[2] = point.slip_softness;
     if (reach > bound) {
         turn_tangents(block, -d1 / reach, -d2 / reach);
-        if (bound > 0.0) block.softness[2] += std::max(std::hypot(s1, s2) / bound, reluctant * scale);
+        if (bound > 0.0) block.softness[2] += std::max(length(s1, s2) / bound, reluctant * scale);
         block.state[1] = RowState::at_lower;  // beta_1 = −mu nu: against the slip
         block.state[2] = RowState::free;
         law.moved = true;
@@ -89,7 +91,7 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
     for (std::size_t b = 0; b < start.mass.size(); ++b) {
         Vec6 v = start.momentum[b];
         solve_six(factor_six(start.mass[b]), v);
-        speed = std::max(speed, std::hypot(v[0], v[1], v[2]));
+        speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
     }
     std::vector<FrictionPoint> swept_points = points;
     const FrictionReport sweeps = solve_iterative(start, swept_points, model, 1000, 1e-10 * speed);
@@ -165,7 +167,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
             const double now = std::max(0.0, block.multiplier[0]);
             if (model != FrictionModel::box) change = std::max(change, point.coefficient * std::abs(now - point.normal));
             if (model == FrictionModel::cone) {
-                const double reluctant = reluctance * std::pow(0.5, std::max(0, round - 5));
+                const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
                 const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
                                           accepted * point.coefficient * largest, reluctant, system.velocity);
                 residual = std::max(residual, law.residual);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "elementary.hpp"
+
 namespace spook {
 
 namespace {
@@ -72,7 +74,7 @@ private:
         for (int i = n; i < 6; ++i) prepared.schur[6 * i + i] = 1.0;
         if (prepared.point >= 0) {
             const double a = prepared.schur[7], b = prepared.schur[14], c = prepared.schur[8];
-            prepared.step = 1.0 / (0.5 * (a + b) + std::hypot(0.5 * (a - b), c));
+            prepared.step = 1.0 / (0.5 * (a + b) + length(0.5 * (a - b), c));
         } else if (prepared.bilateral) {
             // A body tied twice to the world makes no singular block; a rigid joint without inertia would.
             Mat6 guarded = prepared.schur;
@@ -132,13 +134,13 @@ private:
         const double b1 = block.multiplier[1], b2 = block.multiplier[2];
         double d1 = b1 - prepared.step * row_residual(block, 1, system_.velocity);
         double d2 = b2 - prepared.step * row_residual(block, 2, system_.velocity);
-        const double bound = point.coefficient * std::max(0.0, block.multiplier[0]), reach = std::hypot(d1, d2);
+        const double bound = point.coefficient * std::max(0.0, block.multiplier[0]), reach = length(d1, d2);
         if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
         block.multiplier[1] = d1;
         block.multiplier[2] = d2;
         push(k, 1, d1 - b1);
         push(k, 2, d2 - b2);
-        return std::hypot(d1 - b1, d2 - b2) / prepared.step;
+        return length(d1 - b1, d2 - b2) / prepared.step;
     }
 
     MixedSystem& system_;

@@ -1,5 +1,7 @@
 #include "joint_rows.hpp"
 
+#include "elementary.hpp"
+
 namespace spook {
 namespace {
 
@@ -135,7 +137,7 @@ AxialRow axial_row(const JointConstants& joint, const BodyState& first, const Bo
     const Quat q = relative_turn(first, second);
     put(row.first + 3, -axis);
     put(row.second + 3, axis);
-    row.coordinate = 2.0 * std::atan2(dot(joint.axes[0], Vec3{q.x, q.y, q.z}), q.w);
+    row.coordinate = 2.0 * arc_tangent(dot(joint.axes[0], Vec3{q.x, q.y, q.z}), q.w);
     row.rate = dot(axis, second.angular_velocity - first.angular_velocity);
     return row;
 }

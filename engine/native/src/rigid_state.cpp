@@ -1,5 +1,7 @@
 #include "rigid_state.hpp"
 
+#include "elementary.hpp"
+
 namespace spook {
 namespace {
 
@@ -11,8 +13,9 @@ Vec3 transposed_times(const Mat3& a, Vec3 v) noexcept {
 /// The turn of a constant angular velocity over h.
 Quat turn_of(double h, Vec3 angular_velocity) noexcept {
     const double angle = 0.5 * h * norm(angular_velocity);
-    const Vec3 e = (angle != 0.0 ? 0.5 * h * std::sin(angle) / angle : 0.0) * angular_velocity;
-    return {std::cos(angle), e.x, e.y, e.z};
+    const SineCosine half = sine_cosine(angle);
+    const Vec3 e = (angle != 0.0 ? 0.5 * h * half.sine / angle : 0.0) * angular_velocity;
+    return {half.cosine, e.x, e.y, e.z};
 }
 
 bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia.y == inertia.z; }
