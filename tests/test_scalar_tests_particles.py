@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import PLAIN, Distance, Final, Position, Scene, SimulationFailed, Spring, simulate
-from spook_tracker.scalar_tests import chain, oscillator, pendulum_scene, planetarium_scene
+from spook_tracker.scalar_tests import chain
 from spook_tracker.scalar_tests.case import Metric, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.oscillator import scene as oscillator
+from spook_tracker.scalar_tests.pendulum import scene as pendulum_scene
+from spook_tracker.scalar_tests.planetarium import scene as planetarium_scene
 
 # test, configuration, metric, value known from an independent prototype or a closed form, |difference| allowed
 KNOWN = (

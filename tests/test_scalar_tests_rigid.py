@@ -10,7 +10,8 @@ import pytest
 
 from spook_tracker.engine import PLAIN, Load, RigidBody, Scene, simulate
 from spook_tracker.engine.joints import Joint
-from spook_tracker.scalar_tests import beam_scene, cantilever
+from spook_tracker.scalar_tests import cantilever
+from spook_tracker.scalar_tests.beam import scene as beam_scene
 from spook_tracker.scalar_tests.case import Measurement, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 

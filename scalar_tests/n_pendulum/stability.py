@@ -11,7 +11,7 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, is_stable, table
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.chain import COMPLIANCE, LENGTH, fall_to_hanging, level_chain
-from spook_tracker.scalar_tests.n_pendulum_figures import COUNT, CURVED_TWICE, DURATION, TIME_STEP
+from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, DURATION, TIME_STEP
 
 FOUR_SUBSTEPS = Method(substeps=4)
 EIGHT_SUBSTEPS = Method(substeps=8)

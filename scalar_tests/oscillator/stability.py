@@ -11,7 +11,7 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_oscillates
 from spook_tracker.scalar_tests.bracket import break_point, cell, table
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from spook_tracker.scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     START,
     TIME_STEP,

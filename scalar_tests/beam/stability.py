@@ -9,10 +9,10 @@ import numpy as np
 from spook_tracker.engine import Position, Result, Trace
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests.beam_scene import COUNT, MASS, SIZE, TIME_STEP, sag_of_compliant_beam, scene
+from spook_tracker.scalar_tests.beam.scene import COUNT, MASS, SIZE, TIME_STEP, sag_of_compliant_beam, scene
 from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, table
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from spook_tracker.scalar_tests.oscillator import growth
+from spook_tracker.scalar_tests.oscillator.scene import growth
 
 COUNTS = (10, 20, 40, 80, 160, 320, 640, 1000)
 SHORT = 20

@@ -17,7 +17,14 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.inclined_plane import FRICTION, GRAVITY, TIME_STEP, scene, slip_slope, slips
+from spook_tracker.scalar_tests.inclined_plane.scene import (
+    FRICTION,
+    GRAVITY,
+    TIME_STEP,
+    scene,
+    slip_slope,
+    slips,
+)
 
 LADDER_SLOPE = 0.51
 COEFFICIENTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)

@@ -21,8 +21,8 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.door_scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
-from spook_tracker.scalar_tests.door_stability import STUDIES
+from spook_tracker.scalar_tests.door.scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
+from spook_tracker.scalar_tests.door.stability import STUDIES
 
 LADDER_COUNT = 5
 COUNTS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 40, 60, 80)

@@ -6,7 +6,7 @@ import numpy as np
 
 from spook_tracker.engine import Position, Trace
 from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
-from spook_tracker.scalar_tests.planetarium_scene import (
+from spook_tracker.scalar_tests.planetarium.scene import (
     DURATION,
     HALF_STEP,
     TIME_STEP,

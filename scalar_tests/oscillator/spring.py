@@ -16,7 +16,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     START,
     STEPS,
@@ -25,7 +25,7 @@ from spook_tracker.scalar_tests.oscillator import (
     spring_scene,
     traced,
 )
-from spook_tracker.scalar_tests.oscillator_stability import SPRING_STUDY
+from spook_tracker.scalar_tests.oscillator.stability import SPRING_STUDY
 from spook_tracker.scalar_tests.sweep import line
 
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")

@@ -11,7 +11,7 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.chain import GRAVITY, LENGTH, MASS, sideways_modes
-from spook_tracker.scalar_tests.hanging_chain_scene import (
+from spook_tracker.scalar_tests.hanging_chain.scene import (
     COUNT,
     HEAVY,
     STEPS,

@@ -19,7 +19,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
 )
 from spook_tracker.scalar_tests.chain import LENGTH
-from spook_tracker.scalar_tests.hanging_chain_scene import (
+from spook_tracker.scalar_tests.hanging_chain.scene import (
     BELOW_BREAK,
     COUNT,
     HEAVY,
@@ -33,7 +33,7 @@ from spook_tracker.scalar_tests.hanging_chain_scene import (
     lift,
     scene,
 )
-from spook_tracker.scalar_tests.hanging_chain_stability import STUDIES
+from spook_tracker.scalar_tests.hanging_chain.stability import STUDIES
 from spook_tracker.scalar_tests.sweep import line
 
 LADDER_RATIO, LADDER_TILT = 1000.0, 1e-4  # rad: small motion to 1e-9

@@ -12,8 +12,8 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
-from spook_tracker.scalar_tests.oscillator import growth
-from spook_tracker.scalar_tests.pendulum_scene import (
+from spook_tracker.scalar_tests.oscillator.scene import growth
+from spook_tracker.scalar_tests.pendulum.scene import (
     COMPLIANCE,
     CURVED,
     CURVED_TWICE,

@@ -6,7 +6,7 @@ import numpy as np
 
 from spook_tracker.engine import PLAIN, Method
 from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
-from spook_tracker.scalar_tests.pendulum_scene import (
+from spook_tracker.scalar_tests.pendulum.scene import (
     CURVED,
     CURVED_TWICE,
     GRAVITY,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from spook_tracker.engine import PLAIN, MaximumAbsolute, Method, Position, Result, Trace
-from spook_tracker.scalar_tests.beam_scene import (
+from spook_tracker.scalar_tests.beam.scene import (
     COUNT,
     SAG,
     SAG_COMPLIANCE,
@@ -22,7 +22,7 @@ from spook_tracker.scalar_tests.beam_scene import (
     sag_of_compliant_beam,
     scene,
 )
-from spook_tracker.scalar_tests.beam_stability import STUDIES
+from spook_tracker.scalar_tests.beam.stability import STUDIES
 from spook_tracker.scalar_tests.case import (
     Configuration,
     Curve,

@@ -17,7 +17,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.inclined_plane import FRICTION, TIME_STEP, force_ratio, scene, slide
+from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, TIME_STEP, force_ratio, scene, slide
 
 LADDER_SLOPE = 0.3
 MASSES = (1.0, 10.0, 1e2, 1e3, 1e4)  # kg

@@ -6,7 +6,7 @@ import numpy as np
 
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityStudy
-from spook_tracker.scalar_tests.door_scene import TIME_STEP, forces, least_norm_forces, weight_error
+from spook_tracker.scalar_tests.door.scene import TIME_STEP, forces, least_norm_forces, weight_error
 
 
 def most_hinges(simulate: Simulate) -> BreakPoint:

@@ -18,7 +18,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
 )
 from spook_tracker.scalar_tests.chain import LENGTH, chain, exact_tip, level_chain, small_motion
-from spook_tracker.scalar_tests.n_pendulum_figures import (
+from spook_tracker.scalar_tests.n_pendulum.figures import (
     COUNT,
     CURVED_TWICE,
     FIGURES,
@@ -27,7 +27,7 @@ from spook_tracker.scalar_tests.n_pendulum_figures import (
     TWO_SUBSTEPS,
     swing,
 )
-from spook_tracker.scalar_tests.n_pendulum_stability import STUDIES
+from spook_tracker.scalar_tests.n_pendulum.stability import STUDIES
 
 EARLY_STEPS = 240  # 4 s
 ENERGY_STEP = 600  # 10 s: later the chain is chaotic, and rounding decides the energy

@@ -19,7 +19,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     START,
     STEPS,
@@ -32,7 +32,7 @@ from spook_tracker.scalar_tests.oscillator import (
     run_map,
     traced,
 )
-from spook_tracker.scalar_tests.oscillator_stability import MAP_STUDY, growth_error
+from spook_tracker.scalar_tests.oscillator.stability import MAP_STUDY, growth_error
 from spook_tracker.scalar_tests.sweep import line
 
 DAMPING = 2.0 * TIME_STEP  # s

@@ -27,8 +27,8 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.pendulum_figures import FIGURES
-from spook_tracker.scalar_tests.pendulum_scene import (
+from spook_tracker.scalar_tests.pendulum.figures import FIGURES
+from spook_tracker.scalar_tests.pendulum.scene import (
     CURVED,
     CURVED_TWICE,
     GRAVITY,
@@ -42,7 +42,7 @@ from spook_tracker.scalar_tests.pendulum_scene import (
     swing,
     traced_angle,
 )
-from spook_tracker.scalar_tests.pendulum_stability import STUDIES
+from spook_tracker.scalar_tests.pendulum.stability import STUDIES
 
 LADDER_DURATION = 10.0  # s
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")

@@ -21,7 +21,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.inclined_plane import (
+from spook_tracker.scalar_tests.inclined_plane.scene import (
     BOX,
     CONE,
     FRICTION,

@@ -13,7 +13,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator.scene import (
     START,
     TIME_STEP,
     decay,

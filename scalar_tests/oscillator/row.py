@@ -18,7 +18,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
-from spook_tracker.scalar_tests.oscillator import (
+from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     REST_LENGTH,
     START,
@@ -29,8 +29,8 @@ from spook_tracker.scalar_tests.oscillator import (
     row_scene,
     traced,
 )
-from spook_tracker.scalar_tests.oscillator_spring import verlet
-from spook_tracker.scalar_tests.oscillator_stability import ROW_STUDY
+from spook_tracker.scalar_tests.oscillator.spring import verlet
+from spook_tracker.scalar_tests.oscillator.stability import ROW_STUDY
 from spook_tracker.scalar_tests.sweep import line
 
 FAST_STIFFNESS = 400.0 / TIME_STEP**2  # N/m: (h ω)² = 400, a hundred times beyond Verlet's bound

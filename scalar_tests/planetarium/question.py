@@ -33,8 +33,8 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
-from spook_tracker.scalar_tests.planetarium_figures import FIGURES
-from spook_tracker.scalar_tests.planetarium_scene import (
+from spook_tracker.scalar_tests.planetarium.figures import FIGURES
+from spook_tracker.scalar_tests.planetarium.scene import (
     DURATION,
     GAUSS,
     HALF_STEP,
