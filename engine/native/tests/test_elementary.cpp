@@ -1,5 +1,5 @@
 // Sine, cosine, arc tangent and length against long double, over random, special and hard arguments.
-#include "elementary.hpp"
+#include "linear/elementary.hpp"
 
 #include <bit>
 #include <cfloat>
