@@ -11,19 +11,19 @@ import time
 import pytest
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.database_check import check
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.database_check import check
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 from tests.run_documents import figure, run, run_of
 
 WRITER = """
 import sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run_of
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.record import record
 engine = open_database(sys.argv[1])
 name, count = sys.argv[2], int(sys.argv[3])
 with Session(engine) as session:
@@ -97,9 +97,9 @@ FULL_DISK = """
 import resource, signal, sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.record import record
 engine = open_database(sys.argv[1])
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -136,7 +136,7 @@ def test_a_full_disk_is_one_sentence_and_costs_nothing_stored(sqlite_url, tmp_pa
 
 
 def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
-    monkeypatch.setattr("tracker.connection.LOCK_TIMEOUT", 0.2)
+    monkeypatch.setattr("spook_tracker.tracker.store.connection.LOCK_TIMEOUT", 0.2)
     engine, other = open_database(sqlite_url), open_database(sqlite_url)
     with Session(engine) as holding, Session(other) as waiting:
         History(holding)  # a transaction of a writer, left open
@@ -148,7 +148,7 @@ def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
 
 def test_a_failure_in_the_middle_leaves_nothing(session, monkeypatch):
     """Samples are written before figures: an error there takes everything back."""
-    from spook_tracker.tracker import rows
+    from spook_tracker.tracker.store import rows
 
     def broken(part):
         raise RuntimeError("the power went")
