@@ -40,7 +40,7 @@ MUTANTS = (
         story="the elimination of a path wastes time and changes no bit",
         changes=(
             (
-                f"{SRC}/particle_kernels.cpp",
+                f"{SRC}/particles/particle_kernels.cpp",
                 "                link[k].u = u;\n",
                 "                for (int i = 1; i < 30; ++i) { volatile double waste = 1.0 / (r.diagonal + i); (void)waste; }\n"
                 "                link[k].u = u;\n",
@@ -54,9 +54,9 @@ MUTANTS = (
         name="coarse-update",
         story="only half of each violation is put right per step",
         changes=(
-            (f"{SRC}/particle_kernels.cpp", "-r.violation_gain * g", "-0.5 * r.violation_gain * g"),
+            (f"{SRC}/particles/particle_kernels.cpp", "-r.violation_gain * g", "-0.5 * r.violation_gain * g"),
             (
-                f"{SRC}/particle_system.cpp",
+                f"{SRC}/particles/particle_system.cpp",
                 "-row.violation_gain * link.g",
                 "-0.5 * row.violation_gain * link.g",
             ),
@@ -69,9 +69,9 @@ MUTANTS = (
         name="no-refinement",
         story="solutions are not refined against the true equations",
         changes=(
-            (f"{SRC}/block_ldlt.cpp", "round < refinements", "round < 0 * refinements"),
+            (f"{SRC}/linear/block_ldlt.cpp", "round < refinements", "round < 0 * refinements"),
             (
-                f"{SRC}/pivot_solver.cpp",
+                f"{SRC}/contacts/pivot_solver.cpp",
                 "    if (refined) {\n        refine(",
                 "    if (false && refined) {\n        refine(",
             ),
@@ -84,9 +84,9 @@ MUTANTS = (
         name="damping-sign",
         story="the damping term has the sign printed in equation 2.11 of the thesis",
         changes=(
-            (f"{SRC}/regularisation.hpp", "spread = 1.0 + 4.0 * theta", "spread = 1.0 - 4.0 * theta"),
+            (f"{SRC}/linear/regularisation.hpp", "spread = 1.0 + 4.0 * theta", "spread = 1.0 - 4.0 * theta"),
             (
-                f"{SRC}/regularisation.hpp",
+                f"{SRC}/linear/regularisation.hpp",
                 "static_assert(regularise(0.0, 0.25, 0.25).velocity_gain == 0.8);\n",
                 "",
             ),

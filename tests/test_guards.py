@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import pkgutil
 import re
 import subprocess
 import sys
@@ -12,9 +11,9 @@ from types import FunctionType
 
 import pytest
 
-from spook_tracker import engine, scalar_tests
+from spook_tracker import engine
 from spook_tracker.engine.observe import Quantity
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.catalogue import CATALOGUE, QUESTIONS
 
 ROOT = Path(__file__).parent.parent
 PYTHON_FILES = sorted(
@@ -43,13 +42,15 @@ def test_all_names_of_the_engine_exist_and_are_public() -> None:
 
 def test_the_catalogue_lists_every_scalar_test() -> None:
     """A file whose module has a TEST is a scalar test, and must be in the table."""
+    folder = ROOT / "scalar_tests"
     files = {
-        module.name
-        for module in pkgutil.iter_modules(scalar_tests.__path__)
-        if re.search(r"^TEST\b", (ROOT / "scalar_tests" / f"{module.name}.py").read_text(), re.MULTILINE)
+        ".".join(path.relative_to(folder).with_suffix("").parts)
+        for path in folder.rglob("*.py")
+        if re.search(r"^TEST\b", path.read_text(), re.MULTILINE)
     }
 
-    assert set(CATALOGUE) == files
+    assert set(QUESTIONS.values()) == files
+    assert set(CATALOGUE) == set(QUESTIONS)
 
 
 def test_every_path_in_the_architecture_exists() -> None:

@@ -15,16 +15,10 @@ from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, is_stable
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.oscillator_stability import growth_error, measured_growth, predicted_growth
+from spook_tracker.scalar_tests.oscillator.stability import growth_error, measured_growth, predicted_growth
 
 KINDS = {"settled", "bounded", "growing", "diverged", "not_finite"}
-SLOW = {"map-string", "longest-beam"}  # seconds each; every night runs them
-STUDIES = [
-    (name, study)
-    for name, test in CATALOGUE.items()
-    for study in test.stability
-    if study.name not in SLOW and (name, study.name) != ("beam", "damping-compliance-map")
-]
+STUDIES = [(name, study) for name, test in CATALOGUE.items() for study in test.stability]
 
 
 def study_of(test: str, name: str) -> StabilityStudy:

@@ -13,7 +13,7 @@ from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
-from spook_tracker.tracker.store.database import in_words
+from spook_tracker.tracker.store.database import in_words, one_writer
 from spook_tracker.tracker.store.models import identity
 
 ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
@@ -52,6 +52,7 @@ def _known(session: Session, run: RunDocument) -> bool:
 
 
 def _store(session: Session, run: RunDocument) -> bool:
+    one_writer(session)  # two that insert the same rows in another order would wait for each other
     if _known(session, run):
         return False
     engine, machine = rows.engine_row(run.engine), rows.machine_row(run.machine)

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "contact_stage.hpp"
+#include "contacts/contact_stage.hpp"
 
 struct ContactBody {
     spook::Primitive shape;

@@ -1,5 +1,5 @@
 // The block factor against a dense elimination with pivoting in long double, and the promises of its ordering.
-#include "block_ldlt.hpp"
+#include "linear/block_ldlt.hpp"
 
 #include <chrono>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Islands: who hangs together, and that solving apart gives what solving together gives.
 #include <cstring>
 
-#include "contact_islands.hpp"
 #include "contact_world.hpp"
+#include "contacts/contact_islands.hpp"
 #include "expect.hpp"
 
 using namespace spook;

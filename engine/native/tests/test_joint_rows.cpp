@@ -1,5 +1,5 @@
 // The rows of every joint: Jacobians are the derivatives of violations, and reactions are equal and opposite.
-#include "joint_rows.hpp"
+#include "rigid/joint_rows.hpp"
 
 #include <random>
 

@@ -4,8 +4,8 @@
 #include <new>
 
 #include "expect.hpp"
-#include "particle_program.hpp"
-#include "path_order.hpp"
+#include "particles/particle_program.hpp"
+#include "particles/path_order.hpp"
 
 namespace {
 std::atomic<long> allocations{0};

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <random>
 
+#include "contacts/pivot_solver.hpp"
 #include "expect.hpp"
-#include "pivot_solver.hpp"
 
 using namespace spook;
 

@@ -1,10 +1,10 @@
 // Reductions over samples, NaN and ranges included.
-#include "recorder.hpp"
+#include "run/recorder.hpp"
 
 #include <limits>
 
 #include "expect.hpp"
-#include "state_hash.hpp"
+#include "run/state_hash.hpp"
 
 using namespace spook;
 

@@ -1,5 +1,5 @@
 // Whole steps of rigid bodies against closed forms: sagging chains, overdetermined doors, closed systems.
-#include "rigid_system.hpp"
+#include "rigid/rigid_system.hpp"
 
 #include "expect.hpp"
 

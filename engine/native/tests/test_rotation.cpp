@@ -1,8 +1,8 @@
 // The variational rotation step: its equation, conservation, order, and the refusal of a body that is too fast.
-#include "rotation.hpp"
+#include "rigid/rotation.hpp"
 
 #include "expect.hpp"
-#include "rigid_state.hpp"
+#include "rigid/rigid_state.hpp"
 
 using namespace spook;
 

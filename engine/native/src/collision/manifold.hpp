@@ -14,7 +14,7 @@
 #include <array>
 #include <cstdint>
 
-#include "vec.hpp"
+#include "linear/vec.hpp"
 
 namespace spook {
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "vec.hpp"
+#include "linear/vec.hpp"
 
 namespace spook {
 

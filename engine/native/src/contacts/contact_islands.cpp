@@ -1,0 +1,117 @@
+#include "contacts/contact_islands.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace spook {
+
+Islands find_islands(const MixedSystem& system) {
+    const int bodies = static_cast<int>(system.mass.size());
+    std::vector<int> parent(bodies);
+    std::iota(parent.begin(), parent.end(), 0);
+    auto root = [&](int b) {
+        while (parent[b] != b) b = parent[b] = parent[parent[b]];
+        return b;
+    };
+    std::vector<char> has_rows(bodies, 0);
+    for (const RowBlock& block : system.rows) {
+        if (block.first >= 0) has_rows[block.first] = 1;
+        if (block.second >= 0) has_rows[block.second] = 1;
+        if (block.first < 0 || block.second < 0) continue;
+        const int a = root(block.first), b = root(block.second);
+        parent[std::max(a, b)] = std::min(a, b);  // the root is the island's first body
+    }
+    Islands islands;
+    islands.of_body.assign(bodies, -1);
+    for (int b = 0; b < bodies; ++b) {
+        if (!has_rows[b]) continue;
+        const int r = root(b);
+        islands.of_body[b] = r == b ? islands.count++ : islands.of_body[r];
+    }
+    return islands;
+}
+
+FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve) {
+    const Islands islands = find_islands(system);
+    auto solver_of = [&](int first_body) -> PivotSolver& {
+        PivotSolver& solver = solvers_[first_body];
+        solver.floor = floor;
+        solver.refinements = refinements;
+        return solver;
+    };
+    if (islands.count <= 1) return solve(system, points, solver_of(0));
+
+    const int bodies = static_cast<int>(system.mass.size());
+    std::vector<MixedSystem> parts(islands.count);
+    std::vector<std::vector<FrictionPoint>> part_points(islands.count);
+    std::vector<int> first_body(islands.count, -1), place(bodies, -1), row_island(system.rows.size()),
+        row_place(system.rows.size());
+    system.velocity.resize(bodies);
+    for (int b = 0; b < bodies; ++b) {
+        const int island = islands.of_body[b];
+        if (island < 0) {
+            system.velocity[b] = system.momentum[b];
+            solve_six(factor_six(system.mass[b]), system.velocity[b]);
+            continue;
+        }
+        if (first_body[island] < 0) first_body[island] = b;
+        place[b] = static_cast<int>(parts[island].mass.size());
+        parts[island].mass.push_back(system.mass[b]);
+        parts[island].momentum.push_back(system.momentum[b]);
+    }
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        const int island = islands.of_body[std::max(block.first, block.second)];
+        row_island[k] = island;
+        row_place[k] = static_cast<int>(parts[island].rows.size());
+        parts[island].rows.push_back(block);
+        RowBlock& copy = parts[island].rows.back();
+        if (copy.first >= 0) copy.first = place[copy.first];
+        if (copy.second >= 0) copy.second = place[copy.second];
+    }
+    for (const FrictionPoint& point : points) {
+        part_points[row_island[point.block]].push_back(point);
+        part_points[row_island[point.block]].back().block = row_place[point.block];
+    }
+
+    FrictionReport sum;
+    for (int island = 0; island < islands.count; ++island) {
+        const FrictionReport report = solve(parts[island], part_points[island], solver_of(first_body[island]));
+        sum.rounds += report.rounds;
+        sum.pivots += report.pivots;
+        sum.sweeps += report.sweeps;
+        sum.residual = std::max(sum.residual, report.residual);
+        sum.converged = sum.converged && report.converged;
+        sum.finite = sum.finite && report.finite;
+    }
+    for (int b = 0; b < bodies; ++b)
+        if (islands.of_body[b] >= 0) system.velocity[b] = parts[islands.of_body[b]].velocity[place[b]];
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const int first = system.rows[k].first, second = system.rows[k].second;
+        system.rows[k] = parts[row_island[k]].rows[row_place[k]];
+        system.rows[k].first = first;
+        system.rows[k].second = second;
+    }
+    std::vector<std::size_t> next(islands.count, 0);
+    for (FrictionPoint& point : points) {
+        const int island = row_island[point.block], block = point.block;
+        point = part_points[island][next[island]++];
+        point.block = block;
+    }
+    return sum;
+}
+
+BlockLdlt::Counters IslandSolver::counters() const noexcept {
+    BlockLdlt::Counters sum;
+    for (const auto& [body, solver] : solvers_) {
+        const BlockLdlt::Counters more = solver.counters();
+        sum.factorisations += more.factorisations;
+        sum.block_operations += more.block_operations;
+        sum.floored_pivots += more.floored_pivots;
+        sum.solves += more.solves;
+    }
+    return sum;
+}
+
+}  // namespace spook

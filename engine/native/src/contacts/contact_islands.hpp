@@ -1,0 +1,40 @@
+// Bodies that hang together by rows are solved together, the others apart.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "contacts/friction_point.hpp"
+#include "contacts/pivot_solver.hpp"
+
+namespace spook {
+
+/// Island of each body of the system: islands are numbered by their first body's index, upwards from 0; a body
+/// without rows has −1. Ends that do not move (−1 in a row) join nothing, so bodies on the same ground stay apart.
+struct Islands {
+    std::vector<int> of_body;
+    int count = 0;
+};
+Islands find_islands(const MixedSystem& system);
+
+/// Splits a system into its islands and solves each with a solver of its own, which keeps its analysis as long as
+/// the island does not change. Islands are done in order on one thread: equal input gives equal bits.
+class IslandSolver {
+public:
+    using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, PivotSolver&)>;
+
+    double floor = 1e-12;
+    int refinements = 1;
+
+    /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and sweeps and takes the
+    /// largest residual.
+    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve);
+
+    BlockLdlt::Counters counters() const noexcept;
+
+private:
+    std::map<int, PivotSolver> solvers_;  // by the island's first body
+};
+
+}  // namespace spook

@@ -1,0 +1,23 @@
+// Joints, normals and friction together, by direct solves.
+#pragma once
+
+#include "contacts/friction_point.hpp"
+#include "contacts/pivot_solver.hpp"
+
+namespace spook {
+
+/// Solves `system` with the friction law `model` at `points`.
+///
+/// The box needs one boxed problem. The scaled box repeats it with the new normal forces until they settle. The
+/// cone adds Newton's method on the exact law beta = −mu nu s/|s| (Alart and Curnier 1991): each point's first
+/// tangent is turned along the slip; there the law reads beta_1 = −mu nu, a bound, and across it
+/// s_2 + (|s|/(mu nu)) beta_2 = 0, a softness. The first slip is the one predicted without constraints,
+/// D(v + h M⁻¹ f); then the one of the last solve. A fixed point obeys the disc exactly: no direction is preferred.
+/// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
+/// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
+/// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
+/// On return FrictionPoint::normal is the normal impulse.
+FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
+                                     PivotSolver& solver, int max_rounds = 60);
+
+}  // namespace spook

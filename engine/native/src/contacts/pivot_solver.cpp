@@ -1,0 +1,359 @@
+#include "contacts/pivot_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contacts/friction_sweeps.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int patience = 5;          // rounds without fewer offenders before Murty's rule
+constexpr int max_restarts = 7;      // then Murty's rule
+constexpr double tightest = 1e-11;   // tolerance of a velocity, relative to the system's scale
+constexpr double loosest = 1e-7;     // where contradicting rigid contacts leave no exact answer
+
+bool bilateral(const RowBlock& block, int i) noexcept { return block.lower[i] == -unbounded && block.upper[i] == unbounded; }
+bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == RowState::free; }
+
+}  // namespace
+
+Mat6 factor_six(const Mat6& m) noexcept {
+    Mat6 l{};
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j <= i; ++j) {
+            double sum = m[6 * i + j];
+            for (int k = 0; k < j; ++k) sum -= l[6 * i + k] * l[7 * k] * l[6 * j + k];
+            l[6 * i + j] = i == j ? sum : sum / l[7 * j];
+        }
+    return l;
+}
+
+void solve_six(const Mat6& l, Vec6& x) noexcept {
+    for (int i = 1; i < 6; ++i)
+        for (int k = 0; k < i; ++k) x[i] -= l[6 * i + k] * x[k];
+    for (int i = 0; i < 6; ++i) x[i] /= l[7 * i];
+    for (int i = 4; i >= 0; --i)
+        for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
+}
+
+bool PivotSolver::analyse(const MixedSystem& system) {
+    const int bodies = static_cast<int>(system.mass.size());
+    std::vector<Pattern> pattern(system.rows.size());
+    for (std::size_t k = 0; k < pattern.size(); ++k)
+        pattern[k] = {system.rows[k].first, system.rows[k].second, system.rows[k].size};
+    if (bodies == bodies_ && pattern == pattern_) return false;
+
+    std::vector<int> sizes(bodies, 6);
+    std::vector<std::uint8_t> is_constraint(bodies, 0);
+    std::vector<BlockEdge> edges;
+    first_edge_.assign(pattern.size(), -1);
+    second_edge_.assign(pattern.size(), -1);
+    for (std::size_t k = 0; k < pattern.size(); ++k) {
+        const int block = bodies + static_cast<int>(k);
+        sizes.push_back(pattern[k].size);
+        is_constraint.push_back(1);
+        if (pattern[k].first >= 0) first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
+        if (pattern[k].second >= 0) second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
+    }
+    matrix_.analyse(sizes, edges, is_constraint);
+    ++analyses_;
+    last_ = {};
+    bodies_ = bodies;
+    pattern_ = std::move(pattern);
+    factored_ = false;
+    solution_.assign(matrix_.unknowns(), 0.0);
+    residual_.assign(matrix_.unknowns(), 0.0);
+    state_.assign(matrix_.unknowns(), 0.0);
+    right_.assign(matrix_.unknowns(), 0.0);
+    return true;
+}
+
+void PivotSolver::measure(const MixedSystem& system) {
+    std::vector<Mat6>& mass_factor = mass_factor_;
+    mass_factor.resize(system.mass.size());
+    free_velocity_.resize(system.mass.size());
+    for (std::size_t b = 0; b < system.mass.size(); ++b) {
+        mass_factor[b] = factor_six(system.mass[b]);
+        free_velocity_[b] = system.momentum[b];
+        solve_six(mass_factor[b], free_velocity_[b]);
+    }
+    speed_ = 0.0;
+    bounded_.clear();
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        for (int i = 0; i < block.size; ++i) {
+            speed_ = std::max(speed_, std::abs(block.right[i]) + std::abs(row_velocity(block, i, free_velocity_)));
+            if (bilateral(block, i)) continue;
+            double own = 0.0;
+            if (block.first >= 0) {
+                Vec6 x = block.first_jacobian[i];
+                solve_six(mass_factor[block.first], x);
+                own += dot(block.first_jacobian[i], x);
+            }
+            if (block.second >= 0) {
+                Vec6 x = block.second_jacobian[i];
+                solve_six(mass_factor[block.second], x);
+                own += dot(block.second_jacobian[i], x);
+            }
+            bounded_.push_back({static_cast<int>(k), i, own});
+        }
+    }
+}
+
+bool PivotSolver::factor(const MixedSystem& system) {
+    for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        const int n = block.size;
+        double* diagonal = matrix_.diagonal(bodies_ + static_cast<int>(k));
+        std::fill_n(diagonal, n * n, 0.0);
+        for (int i = 0; i < n; ++i) diagonal[i * n + i] = is_free(block, i) ? -block.softness[i] : -1.0;
+        for (int end = 0; end < 2; ++end) {
+            const int edge = end == 0 ? first_edge_[k] : second_edge_[k];
+            if (edge < 0) continue;
+            const auto& jacobian = end == 0 ? block.first_jacobian : block.second_jacobian;
+            double* coupling = matrix_.coupling(edge);
+            for (int a = 0; a < 6; ++a)
+                for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? jacobian[i][a] : 0.0;
+        }
+    }
+    factored_free_.resize(bounded_.size());
+    for (std::size_t b = 0; b < bounded_.size(); ++b) {
+        const auto [k, i, own] = bounded_[b];
+        const bool free = is_free(system.rows[k], i);
+        factored_free_[b] = free;
+        if (free) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] -= relief * own;
+    }
+    const bool finite = matrix_.factor(floor);
+    for (const auto& [k, i, own] : bounded_)  // the factor keeps its relief; residuals are of the true equations
+        if (is_free(system.rows[k], i)) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] = -system.rows[k].softness[i];
+    return finite;
+}
+
+/// residual_ ← right side − true matrix × state_; the largest entry relative to its scale.
+double PivotSolver::residual() {
+    matrix_.residual(right_.data(), state_.data(), residual_.data());
+    double force = 0.0, slip = 0.0;
+    for (int i = 0; i < 6 * bodies_; ++i) force = std::max(force, std::abs(residual_[i]));
+    for (int i = 6 * bodies_; i < matrix_.unknowns(); ++i) slip = std::max(slip, std::abs(residual_[i]));
+    return std::max(force_ > 0.0 ? force / force_ : force, speed_ > 0.0 ? slip / speed_ : slip);
+}
+
+double PivotSolver::refine(int rounds) {
+    double before = unbounded, now = residual();
+    for (int round = 0; round < rounds && now > 1e-16 && now < 0.25 * before; ++round) {
+        before = now;
+        matrix_.solve(residual_.data());
+        for (int i = 0; i < matrix_.unknowns(); ++i) state_[i] += residual_[i];
+        now = residual();
+    }
+    return now;
+}
+
+void PivotSolver::solve_free(MixedSystem& system, bool refined) {
+    force_ = 0.0;
+    for (int b = 0; b < bodies_; ++b)
+        for (int a = 0; a < 6; ++a) {
+            right_[6 * b + a] = system.momentum[b][a];
+            force_ = std::max(force_, std::abs(system.momentum[b][a]));
+        }
+    for (std::size_t k = 0; k < system.rows.size(); ++k)
+        std::copy_n(system.rows[k].right.data(), system.rows[k].size, right_.data() + matrix_.offset(bodies_ + static_cast<int>(k)));
+    relieved_.clear();
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        const int at = matrix_.offset(bodies_ + k) + i;
+        if (is_free(block, i)) {
+            relieved_.push_back({at, relief * own});
+            continue;
+        }
+        const double z = block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
+        right_[at] = z;
+        if (z == 0.0) continue;
+        for (int a = 0; a < 6; ++a) {
+            if (block.first >= 0) right_[6 * block.first + a] += block.first_jacobian[i][a] * z;
+            if (block.second >= 0) right_[6 * block.second + a] += block.second_jacobian[i][a] * z;
+        }
+    }
+    state_ = right_;
+    matrix_.solve(state_.data());
+    if (refined) {
+        refine(refinements + 1);
+        if (conjugate_directions()) refine(refinements + 1);
+    }
+    for (int b = 0; b < bodies_; ++b) std::copy_n(state_.data() + 6 * b, 6, system.velocity[b].data());
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const double* y = state_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
+        for (int i = 0; i < system.rows[k].size; ++i) system.rows[k].multiplier[i] = -y[i];
+    }
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        if (!is_free(block, i)) block.multiplier[i] = block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
+    }
+}
+
+/// Takes the relief out of the solution. In the multipliers of relieved rows, all else eliminated, the true equations
+/// read S z = b and the factor solves with P = S + relief: conjugate gradients with P as preconditioner need one
+/// solve per round and about as many rounds as S has eigenvalues below the relief (a heavy body on a light one).
+bool PivotSolver::conjugate_directions() {
+    const auto only_relieved = [this] {  // the rest is rounding; directions are scaled, so leave it to refine()
+        gradient_.resize(relieved_.size());
+        double largest = 0.0;
+        for (std::size_t k = 0; k < relieved_.size(); ++k) {
+            gradient_[k] = residual_[relieved_[k].at];
+            largest = std::max(largest, std::abs(gradient_[k]));
+        }
+        return largest;
+    };
+    residual();
+    double before = only_relieved(), product_before = 0.0;
+    const double small = 1e-15 * speed_;
+    int round = 0, stalled = 0;
+    for (; round < max_directions && before > small && stalled < 8; ++round) {
+        solution_.assign(residual_.size(), 0.0);
+        for (std::size_t k = 0; k < relieved_.size(); ++k) solution_[relieved_[k].at] = gradient_[k];
+        matrix_.solve(solution_.data());
+        double product = 0.0;
+        for (std::size_t k = 0; k < relieved_.size(); ++k) product -= gradient_[k] * solution_[relieved_[k].at];
+        if (!(product > 0.0)) break;
+        if (round == 0) {
+            direction_ = solution_;
+            image_ = gradient_;
+        } else {
+            const double turn = product / product_before;
+            for (std::size_t i = 0; i < direction_.size(); ++i) direction_[i] = solution_[i] + turn * direction_[i];
+            for (std::size_t k = 0; k < relieved_.size(); ++k) image_[k] = gradient_[k] + turn * image_[k];
+        }
+        double curvature = 0.0;  // pᵀ S p, with S p = P p − relief p
+        for (std::size_t k = 0; k < relieved_.size(); ++k) {
+            const double p = -direction_[relieved_[k].at];
+            curvature += p * (image_[k] - relieved_[k].relief * p);
+        }
+        if (!(curvature > 1e-14 * product)) break;  // a direction of equal solutions: nothing to gain
+        const double length = product / curvature;
+        for (std::size_t i = 0; i < state_.size(); ++i) state_[i] += length * direction_[i];
+        residual();
+        const double now = only_relieved();
+        stalled = now < 0.5 * before ? 0 : stalled + 1;
+        before = now;
+        product_before = product;
+    }
+    return round > 0;
+}
+
+void PivotSolver::guess_by_sweeps(MixedSystem& system, int sweeps) {
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) block.multiplier[i] = std::clamp(block.multiplier[i], block.lower[i], block.upper[i]);
+    std::vector<FrictionPoint> none;
+    solve_iterative(system, none, FrictionModel::cone, sweeps, 0.0);
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) {
+            if (bilateral(block, i) || block.lower[i] == block.upper[i]) continue;
+            block.state[i] = block.multiplier[i] <= block.lower[i]   ? RowState::at_lower
+                             : block.multiplier[i] >= block.upper[i] ? RowState::at_upper
+                                                                     : RowState::free;
+        }
+}
+
+int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
+    const double slip = tolerance_ * speed_;
+    int count = 0, last = -1;
+    offends_.assign(bounded_.size(), 0);
+    for (std::size_t b = 0; b < bounded_.size(); ++b) {
+        const auto& [k, i, own] = bounded_[b];
+        const RowBlock& block = system.rows[k];
+        if (block.lower[i] == block.upper[i]) continue;
+        bool offends;
+        if (is_free(block, i)) {
+            const double slack = slip / (own + block.softness[i]);
+            offends = block.multiplier[i] < block.lower[i] - slack || block.multiplier[i] > block.upper[i] + slack;
+        } else {
+            const double w = row_residual(block, i, system.velocity);
+            offends = block.state[i] == RowState::at_lower ? w < -slip : w > slip;
+        }
+        if (!offends) continue;
+        ++count;
+        last = static_cast<int>(b);
+        if (mark_all) offends_[b] = 1;
+    }
+    if (!mark_all && last >= 0) offends_[last] = 1;
+    return count;
+}
+
+PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
+    PivotReport report;
+    report.converged = false;
+    tolerance_ = tightest;
+    system.velocity.resize(system.mass.size());
+    if (analyse(system)) same_matrix = false;
+    if (!same_matrix) measure(system);
+
+    int bounded = 0;
+    for (RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i)
+            if (bilateral(block, i)) block.state[i] = RowState::free;
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        const RowState state = block.state[i];
+        if (block.lower[i] == block.upper[i]) block.state[i] = RowState::at_lower;
+        else if (state == RowState::at_lower && block.lower[i] == -unbounded) block.state[i] = RowState::free;
+        else if (state == RowState::at_upper && block.upper[i] == unbounded) block.state[i] = RowState::free;
+        bounded += block.lower[i] != block.upper[i];
+    }
+
+    // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
+    const int refined_rounds = 50 + 4 * bounded;
+    const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
+    int best = 1 << 30, left = patience;
+    for (int round = 0; round < last_round; ++round) {
+        bool stale = !same_matrix || !factored_;
+        for (std::size_t b = 0; b < bounded_.size() && !stale; ++b)
+            stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) != static_cast<bool>(factored_free_[b]);
+        if (stale && !factor(system)) {
+            report.finite = false;
+            factored_ = false;
+            break;
+        }
+        factored_ = same_matrix = true;
+        const bool refined = round < refined_rounds;
+        solve_free(system, refined);
+        ++report.rounds;
+
+        int count = offenders(system, true);
+        if (count == 0 && !refined) solve_free(system, true);
+        if (count == 0) {
+            report.converged = true;
+            break;
+        }
+        if (count < best && refined) best = count, left = patience;
+        else if (left > 0) --left;
+        if (left == 0 && report.restarts < max_restarts) {
+            tolerance_ = std::min(10.0 * tolerance_, loosest);
+            if (report.restarts > 1) guess_by_sweeps(system, 5 << report.restarts);
+            ++report.restarts;
+            best = 1 << 30, left = patience;
+            if (report.restarts > 2) continue;
+        }
+        const bool all = left > 0 && refined;
+        if (!all) offenders(system, false);
+        for (std::size_t b = 0; b < bounded_.size(); ++b) {
+            if (!offends_[b]) continue;
+            const auto& [k, i, own] = bounded_[b];
+            RowBlock& block = system.rows[k];
+            ++report.flips;
+            if (!is_free(block, i)) block.state[i] = RowState::free;
+            else block.state[i] = block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
+        }
+    }
+    const BlockLdlt::Counters now = matrix_.counters();
+    counters_.factorisations += now.factorisations - last_.factorisations;
+    counters_.block_operations += now.block_operations - last_.block_operations;
+    counters_.floored_pivots += now.floored_pivots - last_.floored_pivots;
+    counters_.solves += now.solves - last_.solves;
+    last_ = now;
+    return report;
+}
+
+}  // namespace spook

@@ -1,0 +1,93 @@
+// Direct solver of a mixed system: which rows sit at a bound, found by pivoting; the rest by block LDLᵀ.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "contacts/pivot_system.hpp"
+#include "linear/block_ldlt.hpp"
+
+namespace spook {
+
+struct PivotReport {
+    int rounds = 0;         // linear systems solved
+    int flips = 0;          // rows that changed state
+    int restarts = 0;       // times the search stalled and began anew
+    bool converged = true;  // no row is on the wrong side of its complementarity
+    bool finite = true;     // the factorisation met only finite values
+};
+
+/// Solves MixedSystem by block pivoting: free every row that wants to leave its bound, bind every row that broke
+/// one, all at once. Five rounds without fewer offenders are a stall. Rigid redundant contacts may contradict each
+/// other by rounding, so at each stall the tolerance, 1e-11 of the system's speed at first, is loosened tenfold, to
+/// 1e-7 at most; from the third on Gauss–Seidel sweeps guess the free set anew (fixed bounds make a convex quadratic
+/// problem, which sweeps descend); after seven only the offender of the largest index is flipped (Murty 1974), which
+/// ends for P-matrices. Rows start from RowBlock::state; bilateral rows never leave the free set.
+///
+/// Singular systems (four rigid corners, Sig = 0): the factored matrix carries a compliance of `relief` times each
+/// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the relief is then taken out again against the true equations, by conjugate
+/// gradients with the factor as preconditioner. That gives the solution of least norm among equals, weighted by
+/// (G M⁻¹ Gᵀ)ᵢᵢ, and changes no equation. A factor 1e-6 is small enough for a few rounds and large enough that the
+/// rounding of gaps, divided by it, stays out of the loads.
+class PivotSolver {
+public:
+    double floor = 1e-12;   // of BlockLdlt::factor
+    double relief = 1e-6;   // of bounded rows, in the factor only
+    int refinements = 1;    // against the true equations, after each solve
+    int max_directions = 30;
+    int round_limit = 1 << 30;  // give up after so many rounds; without it the search ends by itself
+
+    /// Fills velocity, multipliers and states. With `same_matrix` the caller promises that mass, Jacobians and
+    /// softness are those of the call before: a factor of the same free set is then used again.
+    PivotReport solve(MixedSystem& system, bool same_matrix = false);
+
+    BlockLdlt::Counters counters() const noexcept { return counters_; }
+    std::uint64_t analyses() const noexcept { return analyses_; }
+
+private:
+    bool analyse(const MixedSystem& system);
+    void measure(const MixedSystem& system);
+    bool factor(const MixedSystem& system);
+    void solve_free(MixedSystem& system, bool refined);
+    double refine(int rounds);
+    bool conjugate_directions();
+    double residual();
+    void guess_by_sweeps(MixedSystem& system, int sweeps);
+    int offenders(const MixedSystem& system, bool mark_all);
+
+    struct Bounded {  // a row that is not bilateral
+        int block, row;
+        double own;  // its (G M⁻¹ Gᵀ)ᵢᵢ
+    };
+    struct Relieved {
+        int at;  // in the vectors of matrix_
+        double relief;
+    };
+    struct Pattern {
+        int first, second, size;
+        bool operator==(const Pattern&) const = default;
+    };
+    BlockLdlt matrix_;
+    BlockLdlt::Counters counters_{}, last_{};
+    std::uint64_t analyses_ = 0;
+    int bodies_ = -1;
+    std::vector<Pattern> pattern_;
+    std::vector<int> first_edge_, second_edge_;  // per row block, −1 if there is none
+    std::vector<Bounded> bounded_;
+    bool factored_ = false;
+    std::vector<std::uint8_t> factored_free_, offends_;  // per bounded row
+    double tolerance_ = 0.0;                     // of this solve
+    double speed_ = 0.0, force_ = 0.0;           // the scales of this system, m/s and N s
+    std::vector<double> right_, state_, residual_, solution_, direction_, image_, gradient_;
+    std::vector<Relieved> relieved_;
+    std::vector<Mat6> mass_factor_;
+    std::vector<Vec6> free_velocity_;  // M⁻¹ p
+};
+
+/// Factor of a symmetric positive definite 6×6, L D Lᵀ with D in place of L's unit diagonal, and x ← M⁻¹ x with it.
+/// No square roots: masses scaled by a power of two scale every result exactly.
+Mat6 factor_six(const Mat6& m) noexcept;
+void solve_six(const Mat6& factor, Vec6& x) noexcept;
+
+}  // namespace spook

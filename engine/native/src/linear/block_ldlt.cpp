@@ -1,0 +1,321 @@
+#include "linear/block_ldlt.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+namespace spook {
+
+void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
+                        std::span<const std::uint8_t> is_constraint, bool thin_constraints) {
+    const int count = static_cast<int>(sizes.size());
+    if (is_constraint.size() != sizes.size())
+        throw std::invalid_argument("block LDLT: every block needs a size and a sign");
+    for (int size : sizes)
+        if (size < 1 || size > 6) throw std::invalid_argument("block LDLT: blocks have 1 to 6 unknowns");
+    for (const BlockEdge& edge : edges)
+        if (edge.first < 0 || edge.first >= edge.second || edge.second >= count)
+            throw std::invalid_argument("block LDLT: an edge joins two different blocks, the smaller first");
+
+    size_.assign(sizes.begin(), sizes.end());
+    edges_.assign(edges.begin(), edges.end());
+    is_constraint_.assign(is_constraint.begin(), is_constraint.end());
+    offset_.resize(count);
+    diagonal_at_.resize(count);
+    coupling_at_.resize(edges.size());
+    thin_ = thin_constraints;
+    unknowns_ = 0;
+    uniform_size_ = count ? size_[0] : 0;
+    std::int64_t at = 0;
+    for (int i = 0; i < count; ++i) {
+        offset_[i] = unknowns_;
+        unknowns_ += size_[i];
+        diagonal_at_[i] = at;
+        at += thin_ && is_constraint_[i] ? size_[i] : size_[i] * size_[i];
+        if (size_[i] != uniform_size_) uniform_size_ = 0;
+    }
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+        coupling_at_[e] = at;
+        at += size_[edges[e].first] * size_[edges[e].second];
+    }
+    values_.assign(at, 0.0);
+
+    const Ordering ordering = order_blocks(size_, edges_, is_constraint_);
+    order_ = ordering.order;
+    place_columns(ordering);
+    scale_.assign(unknowns_, 0.0);
+    residual_.assign(unknowns_, 0.0);
+    counters_ = {};
+}
+
+void BlockLdlt::place_columns(const Ordering& ordering) {
+    const int count = block_count();
+    std::vector<int> position(count);
+    for (int k = 0; k < count; ++k) position[order_[k]] = k;
+
+    columns_.resize(count);
+    row_size_.resize(ordering.column_rows.size());
+    row_offset_.resize(ordering.column_rows.size());
+    std::int64_t at = 0, target_count = 0;
+    operations_per_factor_ = 0;
+    for (int k = 0; k < count; ++k) {
+        const int block = order_[k], n = size_[block];
+        const std::int64_t first = ordering.column_start[k], last = ordering.column_start[k + 1], d = last - first;
+        columns_[k] = {at,  0, first, target_count, offset_[block], static_cast<std::int32_t>(d),
+                       static_cast<std::uint8_t>(n), is_constraint_[block]};
+        at += n * (n + 1) / 2;
+        for (std::int64_t r = first; r < last; ++r) {
+            const int row = ordering.column_rows[r];
+            row_size_[r] = static_cast<std::uint8_t>(size_[row]);
+            row_offset_[r] = offset_[row];
+            at += n * size_[row];
+        }
+        target_count += d * (d + 1) / 2;
+        operations_per_factor_ += 1 + d + d * (d + 1) / 2;
+    }
+    factor_.assign(at, 0.0);
+
+    // Blocks are numbered: pivot blocks in order of elimination, then the rows. Each is touched first by its own
+    // column, or by the first one that updates it.
+    std::vector<std::int64_t> touched(count + ordering.column_rows.size());
+    for (int k = 0; k < count; ++k) {
+        touched[k] = k;
+        for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) touched[count + r] = k;
+    }
+    targets_.resize(target_count);
+    std::int64_t next = 0;
+    for (int k = 0; k < count; ++k) {
+        const std::int64_t last = ordering.column_start[k + 1];
+        const auto aim = [&](std::int64_t block) {
+            targets_[next++] = block;
+            touched[block] = std::min<std::int64_t>(touched[block], k);
+        };
+        for (std::int64_t r = ordering.column_start[k]; r < last; ++r) {
+            const int p = position[ordering.column_rows[r]];
+            aim(p);
+            // Both lists are in order of elimination, and the later one contains the rest of this one.
+            std::int64_t q = ordering.column_start[p];
+            for (std::int64_t s = r + 1; s < last; ++s) {
+                while (ordering.column_rows[q] != ordering.column_rows[s]) ++q;
+                aim(count + q);
+            }
+        }
+    }
+    std::vector<std::int64_t> block_at(touched.size());
+    place_work(touched, block_at);
+    for (std::int64_t& target : targets_) target = block_at[target];
+    place_loads(ordering, touched, block_at);
+}
+
+void BlockLdlt::place_work(const std::vector<std::int64_t>& touched, std::vector<std::int64_t>& block_at) {
+    const int count = block_count();
+    std::vector<std::vector<int>> born(count);
+    for (int k = 0; k < count; ++k) {
+        std::int64_t first = touched[k];
+        for (std::int64_t r = columns_[k].first_row; r < columns_[k].first_row + columns_[k].row_count; ++r)
+            first = std::min(first, touched[count + r]);
+        born[first].push_back(k);
+    }
+    std::map<std::int64_t, std::vector<std::int64_t>> vacant;  // by size
+    std::int64_t end = 0;
+    for (int k = 0; k < count; ++k) {
+        for (int c : born[k]) {
+            kernel::Column& column = columns_[c];
+            std::int64_t room = column.size * column.size;
+            for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r)
+                room += column.size * row_size_[r];
+            std::vector<std::int64_t>& free = vacant[room];
+            if (free.empty()) {
+                column.work = end;
+                end += room;
+            } else {
+                column.work = free.back();
+                free.pop_back();
+            }
+            block_at[c] = column.work;
+            std::int64_t at = column.work + column.size * column.size;
+            for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
+                block_at[count + r] = at;
+                at += column.size * row_size_[r];
+            }
+        }
+        const kernel::Column& done = columns_[k];
+        std::int64_t room = done.size * done.size;
+        for (std::int64_t r = done.first_row; r < done.first_row + done.row_count; ++r) room += done.size * row_size_[r];
+        vacant[room].push_back(done.work);
+    }
+    work_.assign(end, 0.0);
+}
+
+void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int64_t>& touched,
+                            const std::vector<std::int64_t>& block_at) {
+    const int count = block_count();
+    std::vector<int> position(count);
+    for (int k = 0; k < count; ++k) position[order_[k]] = k;
+    const std::size_t rows = ordering.column_rows.size();
+
+    // The edge that a block of the factor comes from; the rest is fill.
+    std::vector<std::int64_t> edge_of(rows, -1);
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+        const auto [i, j] = edges_[e];
+        const bool later = position[i] > position[j];
+        const int early = later ? j : i, late = later ? i : j;
+        const auto first = ordering.column_rows.begin() + ordering.column_start[position[early]];
+        const auto last = ordering.column_rows.begin() + ordering.column_start[position[early] + 1];
+        const auto found = std::lower_bound(first, last, late,
+                                            [&](int a, int b) { return position[a] < position[b]; });
+        std::int64_t& edge = edge_of[found - ordering.column_rows.begin()];
+        if (edge >= 0) throw std::invalid_argument("block LDLT: two edges join the same pair of blocks");
+        edge = static_cast<std::int64_t>(e);
+    }
+    find_raw(position);
+    std::vector<std::uint8_t> raw(count, 0);
+    for (int block : raw_blocks_) raw[block] = 1;
+
+    load_start_.assign(count + 1, 0);
+    for (std::int64_t column : touched) ++load_start_[column + 1];
+    for (int k = 0; k < count; ++k) load_start_[k + 1] += load_start_[k];
+    std::vector<std::int64_t> next(load_start_.begin(), load_start_.end() - 1);
+    loads_.resize(touched.size());
+    for (int block = 0; block < count; ++block) {
+        const auto n = static_cast<std::uint8_t>(size_[block]);
+        const int k = position[block];
+        loads_[next[touched[k]]++] = {diagonal_at_[block], block_at[k], offset_[block], n, n,
+                                      kernel::Load::diagonal, is_constraint_[block] != 0,
+                                      thin_ && is_constraint_[block], raw[block] != 0};
+    }
+    for (int k = 0; k < count; ++k)
+        for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) {
+            const int early = order_[k], late = ordering.column_rows[r];
+            kernel::Load& item = loads_[next[touched[count + r]]++];
+            item = {0, block_at[count + r], 0, static_cast<std::uint8_t>(size_[early]),
+                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero};
+            if (edge_of[r] < 0) continue;
+            item.from = coupling_at_[edge_of[r]];
+            item.kind = early < late ? kernel::Load::direct : kernel::Load::transposed;
+            if (early > late) std::swap(item.rows, item.columns);
+        }
+}
+
+void BlockLdlt::find_raw(const std::vector<int>& position) {
+    // A constraint eliminated before all its bodies has no Schur complement to measure its pivot by.
+    const int count = block_count();
+    raw_blocks_.clear();
+    raw_edges_.clear();
+    raw_start_.assign(1, 0);
+    std::vector<std::uint8_t> early_body(count, 0);
+    for (const auto& [i, j] : edges_) {
+        const int constraint = is_constraint_[i] ? i : j, body = is_constraint_[i] ? j : i;
+        if (position[body] < position[constraint]) early_body[constraint] = 1;
+    }
+    std::vector<std::vector<int>> raw(count);
+    for (std::size_t e = 0; e < edges_.size(); ++e)
+        for (int block : {edges_[e].first, edges_[e].second})
+            if (is_constraint_[block] && !early_body[block]) raw[block].push_back(static_cast<int>(e));
+    for (int i = 0; i < count; ++i) {
+        if (raw[i].empty()) continue;
+        raw_blocks_.push_back(i);
+        raw_edges_.insert(raw_edges_.end(), raw[i].begin(), raw[i].end());
+        raw_start_.push_back(static_cast<int>(raw_edges_.size()));
+    }
+}
+
+void BlockLdlt::raw_scales() {
+    for (std::size_t k = 0; k < raw_blocks_.size(); ++k) {
+        const int block = raw_blocks_[k], n = size_[block];
+        double* scale = scale_.data() + offset_[block];
+        std::fill_n(scale, n, 0.0);
+        for (int at = raw_start_[k]; at < raw_start_[k + 1]; ++at) {
+            const auto [i, j] = edges_[raw_edges_[at]];
+            const double* b = coupling(raw_edges_[at]);
+            const int other = i == block ? j : i, m = size_[other];
+            if (is_constraint_[other]) continue;
+            const double* d = diagonal(other);
+            for (int a = 0; a < n; ++a)
+                for (int c = 0; c < m; ++c) {
+                    const double entry = i == block ? b[a * m + c] : b[c * n + a], mass = std::abs(d[c * m + c]);
+                    if (mass > 0.0) scale[a] += entry * entry / mass;
+                }
+        }
+    }
+}
+
+kernel::Factor BlockLdlt::view() const noexcept {
+    auto* self = const_cast<BlockLdlt*>(this);  // the sweeps of a solve only read
+    return {columns_.data(),      static_cast<std::int64_t>(columns_.size()),
+            row_size_.data(),     row_offset_.data(),
+            targets_.data(),      values_.data(),
+            loads_.data(),        load_start_.data(),
+            self->factor_.data(), self->work_.data(),
+            self->scale_.data(),  shift_};
+}
+
+bool BlockLdlt::factor_with(double floor, double* x) {
+    if (!raw_blocks_.empty()) raw_scales();
+    const std::int64_t replaced = kernel::kernels().factor(view(), uniform_size_, floor, x);
+    ++counters_.factorisations;
+    counters_.block_operations += static_cast<std::uint64_t>(operations_per_factor_);
+    if (replaced < 0) return false;
+    counters_.floored_pivots += static_cast<std::uint64_t>(replaced);
+    return true;
+}
+
+bool BlockLdlt::factor(double floor) { return factor_with(floor, nullptr); }
+
+void BlockLdlt::solve(double* x) const {
+    kernel::kernels().forward(view(), uniform_size_, x);
+    kernel::kernels().backward(view(), uniform_size_, x);
+}
+
+double BlockLdlt::largest_constraint_scale() const noexcept {
+    double largest = 0.0;
+    for (int i = 0; i < block_count(); ++i)
+        if (is_constraint_[i])
+            for (int k = 0; k < size_[i]; ++k) largest = std::max(largest, scale_[offset_[i] + k]);
+    return largest;
+}
+
+void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
+    const kernel::Kernels& fast = kernel::kernels();
+    if (r != rhs) std::copy_n(rhs, unknowns_, r);
+    for (int i = 0; i < block_count(); ++i) {
+        const double *d = diagonal(i), *from = x + offset_[i];
+        double* to = r + offset_[i];
+        if (thin_ && is_constraint_[i])
+            for (int k = 0; k < size_[i]; ++k) to[k] -= d[k] * from[k];
+        else
+            fast.subtract_product(size_[i], size_[i], d, from, to);
+    }
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+        const auto [i, j] = edges_[e];
+        fast.subtract_coupling(size_[i], size_[j], coupling(static_cast<int>(e)), x + offset_[i], x + offset_[j],
+                               r + offset_[i], r + offset_[j]);
+    }
+}
+
+void BlockLdlt::refine(const double* rhs, double* x, int refinements) {
+    ++counters_.solves;
+    for (int round = 0; round < refinements; ++round) {
+        residual(rhs, x, residual_.data());
+        solve(residual_.data());
+        ++counters_.solves;
+        for (int i = 0; i < unknowns_; ++i) x[i] += residual_[i];
+    }
+}
+
+void BlockLdlt::solve_refined(const double* rhs, double* x, int refinements) {
+    std::copy_n(rhs, unknowns_, x);
+    solve(x);
+    refine(rhs, x, refinements);
+}
+
+bool BlockLdlt::factor_and_solve(double floor, const double* rhs, double* x, int refinements) {
+    std::copy_n(rhs, unknowns_, x);
+    if (!factor_with(floor, x)) return false;
+    kernel::kernels().backward(view(), uniform_size_, x);
+    refine(rhs, x, refinements);
+    return true;
+}
+
+}  // namespace spook

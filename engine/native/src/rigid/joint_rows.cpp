@@ -1,0 +1,143 @@
+#include "rigid/joint_rows.hpp"
+
+namespace spook {
+namespace {
+
+void put(double* out, Vec3 v) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
+
+/// What all rows of one joint share.
+struct Ends {
+    Ends(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept
+        : first_arm(joint.first_arm + first.turn_less_one * joint.first_arm),
+          second_arm(joint.second_arm + second.turn_less_one * joint.second_arm),
+          gap(second.displacement - first.displacement + second.turn_less_one * joint.second_arm -
+              first.turn_less_one * joint.first_arm) {}
+
+    Vec3 first_arm, second_arm, gap;
+};
+
+struct Writer {
+    JointRows& rows;
+    Vec3 first_reach, second_reach, slip, spin;  // relative velocity at the joint, relative angular velocity
+    int next = 0;
+
+    void linear(Vec3 direction, double violation) noexcept {
+        double* a = rows.first + 6 * next;
+        double* b = rows.second + 6 * next;
+        put(a, -direction);
+        put(a + 3, -cross(first_reach, direction));
+        put(b, direction);
+        put(b + 3, cross(second_reach, direction));
+        rows.violation[next] = violation;
+        rows.rate[next] = dot(direction, slip);
+        ++next;
+    }
+    void angular(Vec3 axis, double violation) noexcept {
+        put(rows.first + 6 * next + 3, -axis);
+        put(rows.second + 6 * next + 3, axis);
+        rows.violation[next] = violation;
+        rows.rate[next] = dot(axis, spin);
+        ++next;
+    }
+};
+
+/// The turn of the second body seen from the first, in the first body's frame.
+Quat relative_turn(const BodyState& first, const BodyState& second) noexcept {
+    Quat q = conjugate(first.turn) * second.turn;
+    if (q.w < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
+    return q;
+}
+
+Vec3 carried(const BodyState& body, Vec3 v) noexcept { return v + body.turn_less_one * v; }
+
+void assemble_distance(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                       const Ends& ends, JointRows& rows) noexcept {
+    const Vec3 d = joint.span + ends.gap;
+    const double length = norm(d), rest = joint.rest_length, span = norm(joint.span);
+    // |d|² − |span|² without cancellation; span and rest differ only if the scene says so.
+    const double stretch = (dot(ends.gap, ends.gap) + 2.0 * dot(joint.span, ends.gap)) / (length + span);
+    const Vec3 direction = (1.0 / length) * d;
+    const Vec3 slip = second.velocity + cross(second.angular_velocity, ends.second_arm) - first.velocity -
+                      cross(first.angular_velocity, ends.first_arm);
+    put(rows.first, -direction);
+    put(rows.first + 3, -cross(ends.first_arm, direction));
+    put(rows.second, direction);
+    put(rows.second + 3, cross(ends.second_arm, direction));
+    rows.violation[0] = stretch + (span - rest);
+    rows.rate[0] = dot(direction, slip);
+}
+
+}  // namespace
+
+JointConstants constants_of(const JointSpec& spec, const Vec3* first_start, const Vec3* second_start) noexcept {
+    JointConstants joint;
+    joint.kind = spec.kind;
+    joint.rows = row_count(spec.kind);
+    if (first_start) joint.first_arm = spec.first_point - *first_start;
+    if (second_start) joint.second_arm = spec.second_point - *second_start;
+    joint.span = spec.second_point - spec.first_point;
+    joint.axes = spec.axes;
+    joint.rest_length = spec.rest_length;
+    return joint;
+}
+
+void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second, JointRows& rows,
+                    Vec3& first_reach, Vec3& second_reach) noexcept {
+    const Ends ends(joint, first, second);
+    first_reach = ends.first_arm;
+    second_reach = ends.second_arm;
+    if (joint.kind == JointKind::distance) return assemble_distance(joint, first, second, ends, rows);
+    first_reach += ends.gap;
+    Writer write{rows,
+                 first_reach,
+                 second_reach,
+                 second.velocity + cross(second.angular_velocity, second_reach) - first.velocity -
+                     cross(first.angular_velocity, first_reach),
+                 second.angular_velocity - first.angular_velocity};
+    Vec3 axes[3];
+    for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
+    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k) write.linear(axes[k], dot(axes[k], ends.gap));
+    if (joint.kind == JointKind::ball) return;
+    const Quat q = relative_turn(first, second);
+    const Vec3 e{q.x, q.y, q.z};
+    if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
+        const Vec3 world = carried(first, e);
+        for (int k = 0; k < 3; ++k)
+            write.angular(q.w * axes[k] + cross(world, axes[k]), 2.0 * dot(joint.axes[k], e));
+        return;
+    }
+    const Mat3 tilt = rotation_less_one(q);
+    if (joint.kind == JointKind::hinge) {
+        const Vec3 moved = tilt * joint.axes[0];  // how far the second body's axis has left the first's
+        const Vec3 axis = carried(second, joint.axes[0]);
+        // n × axis for the two normals: n1 × a = −n2 and n2 × a = n1.
+        write.angular(cross(axis, -axes[2]), -dot(joint.axes[2], moved));
+        write.angular(cross(axis, axes[1]), dot(joint.axes[1], moved));
+        return;
+    }
+    write.angular(cross(carried(second, joint.axes[1]), axes[0]), dot(joint.axes[0], tilt * joint.axes[1]));
+}
+
+AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept {
+    AxialRow row;
+    const Ends ends(joint, first, second);
+    const Vec3 axis = carried(first, joint.axes[0]), reach = ends.first_arm + ends.gap;
+    if (joint.kind == JointKind::prismatic) {
+        put(row.first, -axis);
+        put(row.first + 3, -cross(reach, axis));
+        put(row.second, axis);
+        put(row.second + 3, cross(ends.second_arm, axis));
+        row.coordinate = dot(axis, ends.gap);
+        row.rate = dot(axis, second.velocity + cross(second.angular_velocity, ends.second_arm) - first.velocity -
+                                 cross(first.angular_velocity, reach));
+        return row;
+    }
+    const Quat q = relative_turn(first, second);
+    put(row.first + 3, -axis);
+    put(row.second + 3, axis);
+    row.coordinate = 2.0 * std::atan2(dot(joint.axes[0], Vec3{q.x, q.y, q.z}), q.w);
+    row.rate = dot(axis, second.angular_velocity - first.angular_velocity);
+    return row;
+}
+
+}  // namespace spook

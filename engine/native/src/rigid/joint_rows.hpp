@@ -1,0 +1,49 @@
+// The rows of every joint: violation, rate and Jacobian at the bodies' current state.
+#pragma once
+
+#include "rigid/rigid_scene.hpp"
+#include "rigid/rigid_state.hpp"
+
+namespace spook {
+
+/// Where a joint's rows are written: Jacobians row-major with six columns (linear, angular), world axes. Entries
+/// that are always zero are not written: the caller clears the memory once.
+struct JointRows {
+    double* first;    // rows × 6
+    double* second;   // rows × 6
+    double violation[6];
+    double rate[6];   // G v
+};
+
+/// Constant geometry of a joint: arms at the start, from each body's centre, world axes.
+struct JointConstants {
+    JointKind kind = JointKind::lock;
+    int rows = 6;
+    Vec3 first_arm, second_arm;
+    Vec3 span;  // distance: second point minus first point at the start
+    std::array<Vec3, 3> axes;
+    double rest_length = 0.0;
+};
+
+JointConstants constants_of(const JointSpec& spec, const Vec3* first_start, const Vec3* second_start) noexcept;
+
+/// Violations are measured in the frame fixed to the first body:
+/// - translation: the second end's point minus the first's, along the joint's axes;
+/// - lock and prismatic rotation: 2 × the vector part of the relative quaternion, along the joint's axes, with
+///   its exact derivative, so that a compliant row is a linear spring to O(angle³) and does no work on its own;
+/// - hinge: axis × (axis as the second body carries it), along both normals;
+/// - universal: axis · (cross axis as the second body carries it);
+/// - distance: |d| − rest length, free of cancellation.
+/// The reaction acts at the second body's point on both bodies, so momenta are conserved for any violation.
+/// Returns that point minus each body's centre in first_reach, second_reach.
+void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second, JointRows& rows,
+                    Vec3& first_reach, Vec3& second_reach) noexcept;
+
+/// The free coordinate of a hinge (angle within ±π) or prismatic joint [rad or m], its rate and one Jacobian row.
+struct AxialRow {
+    double coordinate = 0.0, rate = 0.0;
+    double first[6] = {}, second[6] = {};
+};
+AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept;
+
+}  // namespace spook

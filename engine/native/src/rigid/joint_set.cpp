@@ -1,0 +1,141 @@
+#include "rigid/joint_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace spook {
+
+namespace {
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+}
+
+JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_step) {
+    for (const JointSpec& spec : scene.joints) {
+        Joint joint;
+        const auto start = [&](int body) { return body < 0 ? nullptr : &scene.bodies[body].position; };
+        joint.constants = constants_of(spec, start(spec.first), start(spec.second));
+        joint.first = spec.first;
+        joint.second = spec.second;
+        JointBlock block;
+        block.joint = static_cast<int>(joints_.size());
+        block.first = spec.first;
+        block.second = spec.second;
+        block.size = joint.constants.rows;
+        for (int k = 0; k < block.size; ++k) {
+            const Regularisation row = regularise(spec.compliance[k], spec.damping[k], time_step);
+            joint.gain[k] = {row.upsilon, row.violation_gain};
+            block.softness[k] = row.softness;
+        }
+        blocks_.push_back(block);
+
+        joint.tracked = spec.has_limit || spec.has_spring;
+        if (spec.has_motor || spec.has_limit || spec.has_spring) {
+            Axial axial;
+            axial.has_motor = spec.has_motor;
+            axial.has_limit = spec.has_limit;
+            axial.has_spring = spec.has_spring;
+            block.axial = true;
+            block.size = 0;
+            block.softness = {};
+            if (spec.has_motor) {
+                axial.speed = spec.motor_speed;
+                axial.impulse = time_step * spec.motor_force;
+                block.bounded = std::isfinite(axial.impulse);
+                block.softness[block.size++] = 0.0;
+            }
+            if (spec.has_limit) {
+                axial.lower = spec.limit_lower;
+                axial.upper = spec.limit_upper;
+                axial.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
+                block.bounded = block.bounded || axial.lower < axial.upper;
+                block.softness[block.size++] = axial.limit.softness;
+            }
+            if (spec.has_spring) {
+                axial.spring_rest = spec.spring_rest;
+                axial.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
+                block.softness[block.size++] = axial.spring.softness;
+            }
+            blocks_.push_back(block);
+            joint.axial = static_cast<int>(axials_.size());
+            axials_.push_back(axial);
+        }
+        joints_.push_back(joint);
+    }
+    states.resize(joints_.size());
+}
+
+void JointSet::assemble(int index, std::span<const BodyState> bodies, double* first, double* second,
+                        BlockRight& right) noexcept {
+    const JointBlock& block = blocks_[index];
+    const Joint& joint = joints_[block.joint];
+    State& state = states[block.joint];
+    right.lower.fill(-kUnbounded);
+    right.upper.fill(kUnbounded);
+    if (block.axial) return assemble_axial(joint, state, bodies, first, second, right);
+    JointRows rows{first, second, {}, {}};
+    assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows, state.first_reach,
+                   state.second_reach);
+    for (int k = 0; k < block.size; ++k) {
+        right.right[k] = joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
+    }
+}
+
+double JointSet::unwrapped(const Joint& joint, double angle, double near) const noexcept {
+    if (joint.constants.kind != JointKind::hinge) return angle;
+    constexpr double turn = 2.0 * std::numbers::pi;
+    return angle + turn * std::round((near - angle) / turn);
+}
+
+void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
+                              double* second, BlockRight& right) noexcept {
+    const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
+    if (joint.tracked) state.angle = unwrapped(joint, row.coordinate, state.angle);
+    const Axial& axial = axials_[joint.axial];
+    int k = 0;
+    const auto next = [&](double value) {
+        std::copy_n(row.first, 6, first + 6 * k);
+        std::copy_n(row.second, 6, second + 6 * k);
+        right.right[k] = value;
+        return k++;
+    };
+    if (axial.has_motor) {
+        const int motor = next(axial.speed);
+        right.lower[motor] = -axial.impulse;
+        right.upper[motor] = axial.impulse;
+    }
+    if (axial.has_limit) {
+        // Only the nearer end can be reached within a step. An open gap may close but no more: then it meets no
+        // row at all, and a bounce off the limit would depend on the phase of the step.
+        const bool low = axial.lower == axial.upper || state.angle - axial.lower <= axial.upper - state.angle;
+        const double violation = state.angle - (low ? axial.lower : axial.upper);
+        const bool open = low ? violation > 0.0 : violation < 0.0;
+        const Regularisation& r = axial.limit;
+        if (axial.lower == axial.upper) {
+            next(r.upsilon * row.rate - r.violation_gain * violation);
+        } else {
+            const int limit =
+                next(open ? -violation / time_step_ : r.upsilon * row.rate - r.violation_gain * violation);
+            (low ? right.lower : right.upper)[limit] = 0.0;
+        }
+    }
+    if (axial.has_spring)
+        next(axial.spring.upsilon * row.rate - axial.spring.violation_gain * (state.angle - axial.spring_rest));
+}
+
+void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {
+    const Joint& joint = joints_[index];
+    double first[36], second[36];
+    JointRows rows{first, second, {}, {}};
+    Vec3 a, b;
+    assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows, a, b);
+    std::copy_n(rows.violation, joint.constants.rows, out);
+}
+
+double JointSet::coordinate(int index, std::span<const BodyState> bodies) const noexcept {
+    const Joint& joint = joints_[index];
+    const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
+    return joint.tracked ? unwrapped(joint, row.coordinate, states[index].angle) : row.coordinate;
+}
+
+}  // namespace spook

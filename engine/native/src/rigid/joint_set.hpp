@@ -1,0 +1,92 @@
+// All joints of a scene: their blocks of rows, right sides and readable forces.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "linear/large_array.hpp"
+#include "linear/regularisation.hpp"
+#include "rigid/joint_rows.hpp"
+
+namespace spook {
+
+/// One block of up to six rows between two bodies: a joint's own rows, or those of its free coordinate.
+struct JointBlock {
+    int joint = 0;
+    bool axial = false;      // motor, limit, spring, in this order, as far as the joint has them
+    int first = -1, second = -1;  // bodies of the scene, −1 the world
+    int size = 1;
+    std::array<double, 6> softness{};
+    bool bounded = false;    // some row has a finite bound
+};
+
+/// The numbers of a block in one step, besides its Jacobians. A row reads
+/// G v₊ + softness λ = right where lower < λ < upper; λ are impulses on the second body.
+struct BlockRight {
+    std::array<double, 6> right, lower, upper;
+};
+
+class JointSet {
+public:
+    /// What a joint carries from step to step.
+    struct State {
+        std::array<double, 6> multiplier{};
+        std::array<double, 3> axial_multiplier{};
+        Vec3 first_reach, second_reach;  // from the centres to the point where forces are read, at the last step
+        double angle = 0.0;              // unwrapped coordinate of a hinge that needs it
+    };
+
+    JointSet(const RigidScene& scene, double time_step);
+
+    std::span<const JointBlock> blocks() const noexcept { return blocks_; }
+    int count() const noexcept { return static_cast<int>(joints_.size()); }
+    int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
+    bool is_distance(int joint) const noexcept { return joints_[joint].constants.kind == JointKind::distance; }
+
+    /// Writes the Jacobians of a block (rows × 6 each; the memory holds zeros or an earlier call's values) and
+    /// its right side without the share of bodies that move by themselves.
+    void assemble(int block, std::span<const BodyState> bodies, double* first, double* second,
+                  BlockRight& right) noexcept;
+
+    /// Violations of a joint's own rows at the given state [m or rad].
+    void violation(int joint, std::span<const BodyState> bodies, double* out) const noexcept;
+    /// Free coordinate of a hinge (unwrapped) or prismatic joint.
+    double coordinate(int joint, std::span<const BodyState> bodies) const noexcept;
+    /// From now on the turns of this hinge are counted.
+    void track(int joint) noexcept { joints_[joint].tracked = true; }
+
+    LargeArray<State> states;
+
+private:
+    struct Joint {
+        JointConstants constants;
+        int first = -1, second = -1, axial = -1;  // axial: index into axials_
+        bool tracked = false;
+        struct {
+            double upsilon, violation;
+        } gain[6];
+    };
+    struct Axial {
+        bool has_motor = false, has_limit = false, has_spring = false;
+        double speed = 0.0, impulse = 0.0;
+        double lower = 0.0, upper = 0.0, spring_rest = 0.0;
+        Regularisation limit, spring;
+    };
+
+    const BodyState& body(int index, std::span<const BodyState> bodies) const noexcept {
+        return index < 0 ? world_ : bodies[index];
+    }
+    double unwrapped(const Joint& joint, double angle, double near) const noexcept;
+    void assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
+                        double* second, BlockRight& right) noexcept;
+
+    double time_step_;
+    BodyState world_;
+    LargeArray<Joint> joints_;
+    std::vector<Axial> axials_;
+    LargeArray<JointBlock> blocks_;
+};
+
+}  // namespace spook

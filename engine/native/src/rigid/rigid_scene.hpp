@@ -1,0 +1,88 @@
+// A rigid-body scene as the native side gets it: indices instead of names, every default resolved.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "collision/detection.hpp"
+#include "contacts/contact_stage.hpp"
+#include "linear/vec.hpp"
+
+namespace spook {
+
+enum class Motion { dynamic, fixed, kinematic };
+enum class JointKind { distance, lock, ball, hinge, prismatic, universal };
+
+struct RigidBodySpec {
+    Motion motion = Motion::dynamic;
+    bool particle = false;  // three unknowns, no rotation
+    double mass = 0.0;
+    Vec3 inertia;  // principal moments, body axes
+    Vec3 position;
+    Quat orientation;
+    Vec3 velocity, angular_velocity;  // world axes
+    Vec3 force, torque;               // constant loads, world axes
+    SurfaceMaterial material;
+};
+
+/// Rows of a joint in the order of engine/joints.py, then those of its free coordinate: motor, limit, spring.
+struct JointSpec {
+    JointKind kind = JointKind::lock;
+    int first = -1, second = -1;           // body, −1 the world
+    Vec3 first_point, second_point;        // where the joint holds each end at the start, world
+    std::array<Vec3, 3> axes;              // unit, right-handed, at the start; the first is the joint's axis.
+                                           // universal: axis, cross axis, their product
+    double rest_length = 0.0;              // distance
+    std::array<double, 6> compliance{}, damping{};
+
+    bool has_motor = false, has_limit = false, has_spring = false;
+    double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
+    double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
+    double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
+};
+
+constexpr int row_count(JointKind kind) noexcept {
+    switch (kind) {
+        case JointKind::distance: return 1;
+        case JointKind::lock: return 6;
+        case JointKind::ball: return 3;
+        case JointKind::universal: return 4;
+        default: return 5;
+    }
+}
+
+struct RigidSpring {
+    int first = -1, second = -1;      // body, −1 the point
+    Vec3 first_point, second_point;   // world, of ends that are no body
+    double stiffness = 0.0, rest_length = 0.0, viscosity = 0.0;
+};
+
+struct RigidField {
+    double strength = 0.0;
+    Vec3 centre;
+};
+
+struct RigidMethod {
+    double time_step = 0.0;  // of a reported step
+    int substeps = 1;
+    int refinements = 1;
+    double floor = 1e-12;
+    SolverKind solver = SolverKind::direct;
+    FrictionModel friction = FrictionModel::cone;
+    int iterations = 50;
+    double residual_tolerance = 1e-10;  // m/s
+    bool force_collision = false;       // look for contacts even where none are possible, to measure what it costs
+};
+
+struct RigidScene {
+    std::vector<RigidBodySpec> bodies;
+    std::vector<JointSpec> joints;
+    std::vector<RigidSpring> springs;
+    std::vector<RigidField> fields;
+    std::vector<Collider> colliders;    // of all bodies that can touch
+    std::vector<IndexPair> no_contact;  // pairs of bodies that never touch
+    Vec3 gravity;
+    RigidMethod method;
+};
+
+}  // namespace spook

@@ -1,0 +1,305 @@
+// The rows of a step, solved: one factorisation when all are bilateral, else with bounds and contacts.
+#include <algorithm>
+#include <cmath>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+void RigidSystem::analyse_block() {
+    // Rows come first, so that the block of an edge is the Jacobian itself, rows × 6.
+    const auto blocks = joints_.blocks();
+    const int row_blocks = static_cast<int>(blocks.size());
+    std::vector<int> sizes;
+    std::vector<BlockEdge> edges;
+    std::vector<std::uint8_t> is_constraint(blocks.size() + tied_.size(), 0);
+    places_.assign(blocks.size(), {});
+    for (int k = 0; k < row_blocks; ++k) {
+        sizes.push_back(blocks[k].size);
+        is_constraint[k] = 1;
+        const auto tie = [&](int body, int& edge, bool& particle) {
+            if (body < 0 || slot_[body] < 0) return;
+            edge = static_cast<int>(edges.size());
+            particle = constants_[body].particle;
+            edges.push_back({k, row_blocks + slot_[body]});
+        };
+        tie(blocks[k].first, places_[k].first_edge, places_[k].first_particle);
+        tie(blocks[k].second, places_[k].second_edge, places_[k].second_particle);
+    }
+    for (int body : tied_) sizes.push_back(constants_[body].particle ? 3 : 6);
+    matrix_.analyse(sizes, edges, is_constraint, true);
+    right_.assign(matrix_.unknowns(), 0.0);
+    solution_.assign(matrix_.unknowns(), 0.0);
+    for (int k = 0; k < row_blocks; ++k)
+        for (int i = 0; i < sizes[k]; ++i) matrix_.diagonal(k)[i] = -blocks[k].softness[i];
+    for (std::size_t k = 0; k < tied_.size(); ++k) {
+        const int block = row_blocks + static_cast<int>(k), n = matrix_.size(block);
+        for (int i = 0; i < 3; ++i) matrix_.diagonal(block)[i * n + i] = constants_[tied_[k]].mass;
+    }
+}
+
+double* RigidSystem::jacobian(int block, bool second) noexcept {
+    if (mixed_values_)
+        return (second ? mixed_.rows[block].second_jacobian : mixed_.rows[block].first_jacobian)[0].data();
+    const BlockPlace& place = places_[block];
+    const int edge = second ? place.second_edge : place.first_edge;
+    const bool particle = second ? place.second_particle : place.first_particle;
+    if (edge >= 0 && !particle) return matrix_.coupling(edge);
+    return spare_.data() + spare_at_[block] + (second ? 6 * joints_.blocks()[block].size : 0);
+}
+
+void RigidSystem::solve_block() {
+    const auto blocks = joints_.blocks();
+    const int row_blocks = static_cast<int>(blocks.size());
+    double* right = right_.data();
+    mixed_values_ = false;
+    for (int k = 0; k < row_blocks; ++k) {
+        const JointBlock& block = blocks[k];
+        const BlockPlace& place = places_[k];
+        double *first = jacobian(k, false), *second = jacobian(k, true);
+        BlockRight numbers;
+        joints_.assemble(k, live_.bodies, first, second, numbers);
+        const auto given = [&](int body, const double* rows) {
+            if (body < 0 || constants_[body].motion != Motion::kinematic) return;
+            const BodyState& s = live_.bodies[body];
+            for (int i = 0; i < block.size; ++i)
+                numbers.right[i] -= dot({rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]}, s.velocity) +
+                                    dot({rows[6 * i + 3], rows[6 * i + 4], rows[6 * i + 5]}, s.angular_velocity);
+        };
+        if (place.first_edge < 0) given(block.first, first);
+        if (place.second_edge < 0) given(block.second, second);
+        const auto narrow = [&](int edge, const double* rows) {
+            for (int i = 0; i < block.size; ++i) std::copy_n(rows + 6 * i, 3, matrix_.coupling(edge) + 3 * i);
+        };
+        if (place.first_particle) narrow(place.first_edge, first);
+        if (place.second_particle) narrow(place.second_edge, second);
+        std::copy_n(numbers.right.data(), block.size, right);
+        right += block.size;
+    }
+    for (std::size_t k = 0; k < tied_.size(); ++k) {
+        const int i = tied_[k];
+        const BodyConstants& body = constants_[i];
+        const BodyState& s = live_.bodies[i];
+        const Vec3 p = body.mass * (s.velocity + kick(i));
+        right[0] = p.x, right[1] = p.y, right[2] = p.z;
+        right += 3;
+        if (body.particle) continue;
+        const Vec3 l = s.angular_momentum + h_ * body.torque;
+        right[0] = l.x, right[1] = l.y, right[2] = l.z;
+        right += 3;
+        double* diagonal = matrix_.diagonal(row_blocks + static_cast<int>(k)) + 21;
+        for (int row = 0; row < 3; ++row) std::copy_n(s.inertia.m + 3 * row, 3, diagonal + 6 * row);
+    }
+    if (clock_) clock_->mark(Stage::assemble_rows);
+
+    if (!(live_.share > 0.0 ? solve_shared() : solve_once())) {
+        live_.not_solved = tied_.front();
+        return;
+    }
+    const double* x = solution_.data();
+    for (int k = 0; k < row_blocks; ++k) {
+        JointSet::State& state = joints_.states[blocks[k].joint];
+        double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
+        for (int i = 0; i < blocks[k].size; ++i) multiplier[i] = -*x++;
+    }
+    for (int i : tied_) {
+        BodyState& s = live_.bodies[i];
+        s.velocity = {x[0], x[1], x[2]};
+        x += 3;
+        if (!constants_[i].particle) {
+            s.angular_momentum = s.inertia * Vec3{x[0], x[1], x[2]};
+            x += 3;
+        }
+        if (!clock_) integrate_body(i);  // while it is at hand; a timed run keeps the stages apart
+    }
+    tied_are_moved_ = clock_ == nullptr;
+    if (clock_) clock_->mark(Stage::solve_block);
+}
+
+bool RigidSystem::solve_once() {
+    const std::uint64_t floored = matrix_.counters().floored_pivots;
+    if (!matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), method_.refinements)) return false;
+    if (matrix_.counters().floored_pivots == floored) return true;
+    if (live_.share == 0.0) {
+        // Redundant rows, seen for the first time: let all of them share the load, if that can be had.
+        live_.share = 1e-7 * matrix_.largest_constraint_scale();
+        return solve_shared();
+    }
+    find_contradiction();
+    return true;
+}
+
+bool RigidSystem::solve_shared() {
+    // With a slight softness of all rows in the factor, refinement from zero tends to the multipliers of least norm;
+    // quickly, unless the rows are nearly dependent as well (long rings). Then the factor with floors is better.
+    matrix_.shift_constraints(live_.share);
+    bool solved = matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), std::max(2, method_.refinements));
+    left_.resize(right_.size());
+    for (int round = 0; solved; ++round) {
+        double speed = 0.0;
+        if (row_residual(speed).first <= 1e-13 * speed) return true;
+        if (round == 6) solved = false;
+        else matrix_.solve(left_.data());
+        for (std::size_t i = 0; i < left_.size() && solved; ++i) solution_[i] += left_[i];
+    }
+    live_.share = -1.0;
+    matrix_.shift_constraints(0.0);
+    return solve_once();
+}
+
+/// The largest residual of a row, its block, and the largest speed the rows and forces ask for [m/s, rad/s].
+std::pair<double, int> RigidSystem::row_residual(double& speed) {
+    left_.resize(right_.size());
+    matrix_.residual(right_.data(), solution_.data(), left_.data());
+    for (int i : tied_) {
+        const Vec3 v = live_.bodies[i].velocity + kick(i);
+        speed = std::max({speed, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    }
+    std::pair<double, int> worst{0.0, 0};
+    std::size_t row = 0;
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
+            speed = std::max(speed, std::abs(right_[row]));
+            if (!(std::abs(left_[row]) <= worst.first)) worst = {std::abs(left_[row]), k};
+        }
+    return worst;
+}
+
+void RigidSystem::find_contradiction() {
+    // Redundant rows agree with the others, and refinement leaves them a residual of rounding. Rows that cannot
+    // hold together keep one of the size of the speeds they ask for.
+    double speed = 0.0;
+    const auto [largest, worst] = row_residual(speed);
+    if (largest <= 1e-3 * speed) return;
+    const JointBlock& block = joints_.blocks()[worst];
+    const bool second = block.second >= 0 && constants_[block.second].moves();
+    live_.contradicted = second ? block.second : block.first;
+}
+
+void RigidSystem::fill_rows() {
+    const auto blocks = joints_.blocks();
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        RowBlock& rows = mixed_.rows[k];
+        BlockRight numbers;
+        joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
+                         rows.second_jacobian[0].data(), numbers);
+        for (int body : {blocks[k].first, blocks[k].second}) {
+            if (body < 0 || constants_[body].motion != Motion::kinematic) continue;
+            const BodyState& s = live_.bodies[body];
+            const Vec6 given{s.velocity.x,         s.velocity.y,         s.velocity.z,
+                             s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z};
+            const auto& jacobian = body == blocks[k].first ? rows.first_jacobian : rows.second_jacobian;
+            for (int i = 0; i < rows.size; ++i) numbers.right[i] -= dot(jacobian[i], given);
+        }
+        rows.right = numbers.right;
+        rows.lower = numbers.lower;
+        rows.upper = numbers.upper;
+    }
+}
+
+void RigidSystem::fill_masses() {
+    for (std::size_t k = 0; k < tied_.size(); ++k) {
+        const BodyConstants& body = constants_[tied_[k]];
+        const BodyState& s = live_.bodies[tied_[k]];
+        Mat6& mass = mixed_.mass[k];
+        for (int row = 0; row < 3; ++row) {
+            mass[7 * row] = body.mass;
+            for (int column = 0; column < 3; ++column)  // a particle's rotation is never touched
+                mass[6 * (row + 3) + column + 3] =
+                    body.particle ? (row == column ? body.mass : 0.0) : s.inertia.m[3 * row + column];
+        }
+    }
+}
+
+void RigidSystem::fill_momenta(bool forces) {
+    for (std::size_t k = 0; k < tied_.size(); ++k) {
+        const int i = tied_[k];
+        const BodyState& s = live_.bodies[i];
+        const Vec3 p = constants_[i].mass * (forces ? s.velocity + kick(i) : s.velocity);
+        const Vec3 l = forces ? s.angular_momentum + h_ * constants_[i].torque : s.angular_momentum;
+        mixed_.momentum[k] = {p.x, p.y, p.z, l.x, l.y, l.z};
+    }
+}
+
+void RigidSystem::take_velocities(bool angular_too) {
+    for (std::size_t k = 0; k < tied_.size(); ++k) {
+        const Vec6& v = mixed_.velocity[k];
+        BodyState& s = live_.bodies[tied_[k]];
+        s.velocity = {v[0], v[1], v[2]};
+        if (constants_[tied_[k]].particle) continue;
+        s.angular_momentum = s.inertia * Vec3{v[3], v[4], v[5]};
+        if (angular_too) s.angular_velocity = {v[3], v[4], v[5]};
+    }
+}
+
+void RigidSystem::impact() {
+    fill_momenta(false);
+    fill_rows();
+    contacts_->impact(mixed_);
+    take_velocities(true);
+    for (std::size_t k = 0; k < tied_.size(); ++k) velocities_[tied_[k]] = mixed_.velocity[k];
+    if (clock_) clock_->mark(Stage::impact);
+}
+
+void RigidSystem::solve_mixed(bool touching) {
+    mixed_values_ = true;
+    const auto blocks = joints_.blocks();
+    mixed_.rows.resize(blocks.size());
+    fill_masses();
+    if (touching && contacts_->impact_needed()) impact();
+    fill_momenta(true);
+    fill_rows();
+    if (clock_) clock_->mark(Stage::assemble_rows);
+
+    bool finite = true;
+    if (touching) {
+        finite = contacts_->solve(mixed_, velocities_);
+        residual_ = std::max(residual_, contacts_->residual());
+    } else if (solver_ == RigidSolver::iterative) {
+        std::vector<FrictionPoint> none;
+        const FrictionReport report = solve_iterative(mixed_, none, method_.friction, method_.iterations,
+                                                      method_.residual_tolerance);
+        finite = report.finite;
+        residual_ = std::max(residual_, report.residual);
+        sweeps_ += static_cast<std::uint64_t>(report.sweeps);
+    } else {
+        const PivotReport report = pivot_.solve(mixed_);
+        finite = report.finite;
+        rounds_ += static_cast<std::uint64_t>(report.rounds);
+    }
+    if (!finite) {
+        live_.not_solved = tied_.front();
+        return;
+    }
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        JointSet::State& state = joints_.states[blocks[k].joint];
+        double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
+        std::copy_n(mixed_.rows[k].multiplier.data(), blocks[k].size, multiplier);
+    }
+    take_velocities(false);
+    if (clock_) clock_->mark(solver_ == RigidSolver::iterative ? Stage::solve_iterative : Stage::pivot);
+}
+
+void RigidSystem::wrench(int joint, double* out) const noexcept {
+    std::fill_n(out, 6, 0.0);
+    const JointSet::State& state = joints_.states[joint];
+    const auto blocks = joints_.blocks();
+    auto* self = const_cast<RigidSystem*>(this);
+    Vec3 force, torque;
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        if (blocks[k].joint != joint) continue;
+        const double* rows = self->jacobian(static_cast<int>(k), true);
+        const double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
+        for (int i = 0; i < blocks[k].size; ++i) {
+            const double f = multiplier[i] / h_;
+            force += f * Vec3{rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]};
+            torque += f * Vec3{rows[6 * i + 3], rows[6 * i + 4], rows[6 * i + 5]};
+        }
+    }
+    torque -= cross(state.second_reach, force);
+    for (int k = 0; k < 3; ++k) out[k] = force[k], out[3 + k] = torque[k];
+}
+
+double RigidSystem::tension(int joint) const noexcept { return -joints_.states[joint].multiplier[0] / h_; }
+
+}  // namespace spook

@@ -1,0 +1,98 @@
+#include "rigid/rigid_state.hpp"
+
+namespace spook {
+namespace {
+
+Vec3 transposed_times(const Mat3& a, Vec3 v) noexcept {
+    return {a.m[0] * v.x + a.m[3] * v.y + a.m[6] * v.z, a.m[1] * v.x + a.m[4] * v.y + a.m[7] * v.z,
+            a.m[2] * v.x + a.m[5] * v.y + a.m[8] * v.z};
+}
+
+/// The turn of a constant angular velocity over h.
+Quat turn_of(double h, Vec3 angular_velocity) noexcept {
+    const double angle = 0.5 * h * norm(angular_velocity);
+    const Vec3 e = (angle != 0.0 ? 0.5 * h * std::sin(angle) / angle : 0.0) * angular_velocity;
+    return {std::cos(angle), e.x, e.y, e.z};
+}
+
+bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia.y == inertia.z; }
+
+}  // namespace
+
+Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept {
+    Mat3 r = state.turn_less_one * body.start_rotation;
+    for (int i = 0; i < 9; ++i) r.m[i] += body.start_rotation.m[i];
+    return r;
+}
+
+BodyConstants constants_of(const RigidBodySpec& spec) noexcept {
+    return {spec.motion,      spec.particle,    spec.mass,  spec.inertia, spec.position,
+            spec.orientation, rotation(spec.orientation), spec.force, spec.torque};
+}
+
+BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept {
+    BodyState state;
+    state.velocity = spec.velocity;
+    state.angular_velocity = spec.angular_velocity;
+    if (!body.particle && body.moves()) {
+        refresh(body, state);  // for the inertia
+        state.angular_momentum = state.inertia * spec.angular_velocity;
+        state.angular_velocity = spec.angular_velocity;
+    }
+    return state;
+}
+
+void refresh(const BodyConstants& body, BodyState& state) noexcept {
+    state.turn_less_one = rotation_less_one(state.turn);
+    if (!body.moves()) return;
+    if (isotropic(body.inertia)) {
+        state.inertia = Mat3::diagonal(body.inertia);
+        state.angular_velocity = (1.0 / body.inertia.x) * state.angular_momentum;
+        return;
+    }
+    const Mat3 r = axes(body, state);
+    const Vec3 p = transposed_times(r, state.angular_momentum);
+    state.angular_velocity = r * Vec3{p.x / body.inertia.x, p.y / body.inertia.y, p.z / body.inertia.z};
+    for (int i = 0; i < 3; ++i)
+        for (int j = i; j < 3; ++j)
+            state.inertia.m[3 * i + j] = state.inertia.m[3 * j + i] =
+                r.m[3 * i] * body.inertia.x * r.m[3 * j] + r.m[3 * i + 1] * body.inertia.y * r.m[3 * j + 1] +
+                r.m[3 * i + 2] * body.inertia.z * r.m[3 * j + 2];
+}
+
+bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
+    if (body.motion == Motion::fixed) return true;
+    state.displacement += h * state.velocity;
+    if (body.particle) return true;
+    if (body.motion == Motion::kinematic) {
+        state.turn = unit(turn_of(h, state.angular_velocity) * state.turn);
+    } else {
+        Vec3 w;
+        if (isotropic(body.inertia)) {
+            if (!rotation_rate(body.inertia, h, state.angular_momentum, w)) return false;
+        } else {
+            const Mat3 r = axes(body, state);
+            if (!rotation_rate(body.inertia, h, transposed_times(r, state.angular_momentum), w)) return false;
+            w = r * w;
+        }
+        const Vec3 e = 0.5 * h * w;
+        state.turn = unit(Quat{std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z} * state.turn);
+    }
+    refresh(body, state);
+    return true;
+}
+
+void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity, BodyState& state) noexcept {
+    state.displacement += h * velocity;
+    if (body.particle) return;
+    state.turn = unit(turn_of(h, angular_velocity) * state.turn);
+    refresh(body, state);
+}
+
+Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept {
+    const Mat3 r = axes(body, state);
+    const Vec3 p = transposed_times(r, angular_momentum);
+    return r * Vec3{p.x / body.inertia.x, p.y / body.inertia.y, p.z / body.inertia.z};
+}
+
+}  // namespace spook

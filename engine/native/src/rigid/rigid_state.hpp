@@ -1,0 +1,61 @@
+// Where the rigid bodies are. Positions are kept as displacements from the start, and orientations as turns from
+// the start: a violation of 1e-11 m is then known to sixteen digits, however far from the origin the scene lies.
+#pragma once
+
+#include <vector>
+
+#include "rigid/rigid_scene.hpp"
+#include "rigid/rotation.hpp"
+
+namespace spook {
+
+/// What does not change during a run.
+struct BodyConstants {
+    Motion motion = Motion::dynamic;
+    bool particle = false;
+    double mass = 0.0;
+    Vec3 inertia;          // principal
+    Vec3 start;            // position at the start
+    Quat start_turn;       // orientation at the start
+    Mat3 start_rotation;
+    Vec3 force, torque;    // constant loads
+
+    bool moves() const noexcept { return motion == Motion::dynamic; }
+};
+
+struct BodyState {
+    Vec3 displacement;       // from the start
+    Quat turn;               // from the start: orientation = turn · start_turn
+    Vec3 velocity, angular_velocity;
+    Vec3 angular_momentum;   // world axes, about the centre of mass; what a free body keeps exactly
+    // Derived from the above:
+    Mat3 turn_less_one;      // rotation matrix of `turn`, minus the identity
+    Mat3 inertia;            // world axes
+};
+
+inline Vec3 position(const BodyConstants& body, const BodyState& state) noexcept {
+    return body.start + state.displacement;
+}
+inline Quat orientation(const BodyConstants& body, const BodyState& state) noexcept {
+    return state.turn * body.start_turn;
+}
+/// Body axes to world axes.
+Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept;
+
+BodyConstants constants_of(const RigidBodySpec& spec) noexcept;
+BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept;
+
+/// Angular velocity from angular momentum, and the derived matrices, at the state's orientation.
+void refresh(const BodyConstants& body, BodyState& state) noexcept;
+
+/// Moves a body on by h with its velocities (kinematic) or its momenta (dynamic, after a solve). False when it
+/// turns too fast for the time step.
+bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept;
+
+/// Moves a body by h times velocities that leave no trace in its momenta.
+void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity, BodyState& state) noexcept;
+
+/// I⁻¹ L in world axes at the state's orientation.
+Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept;
+
+}  // namespace spook

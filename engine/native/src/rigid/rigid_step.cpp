@@ -1,0 +1,106 @@
+// One step of the rigid-body pipeline, stage by stage.
+#include <algorithm>
+#include <cmath>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+void RigidSystem::apply_forces() {
+    std::fill(force_.begin(), force_.end(), Vec3{});
+    for (const RigidField& field : fields_)
+        for (int i = 0; i < bodies(); ++i) {
+            if (!constants_[i].moves()) continue;
+            const Vec3 d = position_of(i) - field.centre;
+            const double r2 = dot(d, d);
+            force_[i] -= (constants_[i].mass * field.strength / (r2 * std::sqrt(r2))) * d;
+        }
+    if (clock_ && !fields_.empty()) clock_->mark(Stage::apply_central_gravity);
+    for (const RigidSpring& spring : springs_) {
+        const Vec3 a = spring.first < 0 ? spring.first_point : position_of(spring.first);
+        const Vec3 b = spring.second < 0 ? spring.second_point : position_of(spring.second);
+        const Vec3 va = spring.first < 0 ? Vec3{} : live_.bodies[spring.first].velocity;
+        const Vec3 vb = spring.second < 0 ? Vec3{} : live_.bodies[spring.second].velocity;
+        const Vec3 d = b - a;
+        Vec3 pull = spring.stiffness * d;  // on the first end
+        if (spring.rest_length > 0.0) pull = (spring.stiffness * (1.0 - spring.rest_length / norm(d))) * d;
+        if (spring.viscosity > 0.0) {
+            const double squared = dot(d, d);
+            if (squared > 0.0) pull += (spring.viscosity * dot(vb - va, d) / squared) * d;
+        }
+        if (spring.first >= 0 && constants_[spring.first].moves()) force_[spring.first] += pull;
+        if (spring.second >= 0 && constants_[spring.second].moves()) force_[spring.second] -= pull;
+    }
+    if (clock_ && !springs_.empty()) clock_->mark(Stage::apply_springs);
+}
+
+void RigidSystem::step() {
+    if (clock_) clock_->start();
+    if (!force_.empty()) apply_forces();
+    kick_free_bodies();
+    if (contacts_ && find_contacts()) {
+        solve_mixed(true);
+    } else if (solver_ == RigidSolver::block) {
+        solve_block();
+    } else if (solver_ != RigidSolver::none) {
+        solve_mixed(false);
+    } else {
+        for (int i : tied_) kick_free_body(i);  // bodies that could touch but do not
+    }
+    integrate_all();
+}
+
+void RigidSystem::kick_free_body(int i) noexcept {
+    BodyState& s = live_.bodies[i];
+    s.velocity += kick(i);
+    s.angular_momentum += h_ * constants_[i].torque;
+}
+
+void RigidSystem::kick_free_bodies() {
+    for (int i : free_) kick_free_body(i);
+    if (clock_) clock_->mark(Stage::apply_gravity);
+}
+
+bool RigidSystem::find_contacts() {
+    const std::size_t count = constants_.size();
+    poses_.resize(count);
+    velocities_.resize(count);
+    free_velocities_.resize(count);
+    for (int i = 0; i < bodies(); ++i) {
+        const BodyState& s = live_.bodies[i];
+        poses_[i] = {position_of(i), axes(constants_[i], s)};
+        const Vec3 v = s.velocity, w = s.angular_velocity;
+        velocities_[i] = free_velocities_[i] = {v.x, v.y, v.z, w.x, w.y, w.z};
+        if (!constants_[i].moves()) continue;
+        const Vec3 dv = kick(i);
+        for (int k = 0; k < 3; ++k) free_velocities_[i][k] += dv[k];
+        if (dot(constants_[i].torque, constants_[i].torque) > 0.0 && !constants_[i].particle) {
+            const Vec3 dw = turned_by(constants_[i], s, h_ * constants_[i].torque);
+            for (int k = 0; k < 3; ++k) free_velocities_[i][3 + k] += dw[k];
+        }
+    }
+    const bool found = contacts_->detect(poses_, velocities_, free_velocities_);
+    if (clock_) clock_->mark(Stage::collision);
+    return found;
+}
+
+void RigidSystem::integrate_body(int i) {
+    if (!integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
+}
+
+void RigidSystem::integrate_all() {
+    if (!tied_are_moved_)
+        for (int i : tied_) integrate_body(i);
+    tied_are_moved_ = false;
+    for (int i : free_) integrate_body(i);
+    for (int i : driven_) integrate_body(i);
+    if (contacts_ && !contacts_->correction().empty()) {
+        const std::vector<Vec6>& extra = contacts_->correction();
+        for (std::size_t k = 0; k < tied_.size(); ++k)
+            displace(constants_[tied_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
+                     {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[tied_[k]]);
+    }
+    if (clock_) clock_->mark(Stage::integrate_positions);
+}
+
+}  // namespace spook

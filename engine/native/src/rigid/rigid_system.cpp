@@ -1,0 +1,203 @@
+#include "rigid/rigid_system.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spook {
+
+RigidSystem::RigidSystem(const RigidScene& scene)
+    : springs_(scene.springs), fields_(scene.fields), gravity_(scene.gravity), method_(scene.method),
+      h_(scene.method.time_step / scene.method.substeps), joints_(scene, h_) {
+    for (const RigidBodySpec& spec : scene.bodies) {
+        constants_.push_back(constants_of(spec));
+        start_.push_back(start_of(spec, constants_.back()));
+        const bool moves = constants_.back().moves();
+        acceleration_.push_back(moves ? scene.gravity + (1.0 / spec.mass) * spec.force : Vec3{});
+    }
+    if (!springs_.empty() || !fields_.empty()) force_.resize(constants_.size());
+
+    std::vector<char> dynamic;
+    for (const BodyConstants& body : constants_) dynamic.push_back(body.moves());
+    Detection detection(scene.colliders, dynamic, scene.no_contact);
+    const bool touching = detection.possible() || method_.force_collision;
+
+    slot_.assign(constants_.size(), -1);
+    bool bounded = false;
+    std::size_t spare = 0;
+    for (const JointBlock& block : joints_.blocks()) {
+        bounded = bounded || block.bounded;
+        rows_ += static_cast<std::uint64_t>(block.size);
+        spare_at_.push_back(spare);
+        spare += static_cast<std::size_t>(12 * block.size);
+        for (int body : {block.first, block.second})
+            if (body >= 0 && constants_[body].moves()) slot_[body] = 0;
+    }
+    spare_.assign(spare, 0.0);
+    for (int body = 0; body < bodies(); ++body)
+        if (slot_[body] == 0 || (touching && constants_[body].moves())) {
+            slot_[body] = static_cast<int>(tied_.size());
+            tied_.push_back(body);
+        } else if (constants_[body].moves()) {
+            free_.push_back(body);
+        } else if (constants_[body].motion == Motion::kinematic) {
+            driven_.push_back(body);
+        }
+    if (touching) {
+        std::vector<SurfaceMaterial> materials;
+        for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
+        fresh_contacts_.emplace(std::move(detection), materials, slot_,
+                                ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
+                                               method_.residual_tolerance, method_.floor, method_.refinements});
+    }
+    if (method_.solver == SolverKind::iterative)
+        solver_ = joints_.blocks().empty() ? RigidSolver::none : RigidSolver::iterative;
+    else
+        solver_ = joints_.blocks().empty() ? RigidSolver::none : bounded ? RigidSolver::pivot : RigidSolver::block;
+    if (solver_ == RigidSolver::block) analyse_block();
+    reset(nullptr);
+}
+
+void RigidSystem::reset(StageClock* clock) {
+    live_ = {};
+    tied_are_moved_ = false;
+    live_.bodies = start_;
+    matrix_.shift_constraints(0.0);
+    std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
+    clock_ = clock;
+    rounds_ = sweeps_ = 0;
+    residual_ = 0.0;
+    pivot_ = PivotSolver{};
+    pivot_.floor = method_.floor;
+    pivot_.refinements = method_.refinements;
+    contacts_ = fresh_contacts_;
+    matrix_.clear_counters();
+    mixed_ = MixedSystem{};
+    mixed_values_ = solver_ != RigidSolver::block;
+    if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
+    mixed_.mass.assign(tied_.size(), Mat6{});
+    mixed_.momentum.resize(tied_.size());
+    mixed_.velocity.resize(tied_.size());
+    for (const JointBlock& block : joints_.blocks()) {
+        RowBlock rows;
+        rows.first = block.first < 0 ? -1 : slot_[block.first];
+        rows.second = block.second < 0 ? -1 : slot_[block.second];
+        rows.size = block.size;
+        rows.softness = block.softness;
+        mixed_.rows.push_back(rows);
+    }
+}
+
+void RigidSystem::advance(std::int64_t steps) {
+    for (std::int64_t n = steps * method_.substeps; n > 0; --n) step();
+}
+
+void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
+    if (clock_) clock_->start();
+    recorder.sample(sample);
+    if (clock_) clock_->mark(Stage::observe);
+}
+
+Health RigidSystem::health() const {
+    if (live_.too_fast >= 0)
+        return {Status::diverged, live_.too_fast, "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+    if (live_.contradicted >= 0)
+        return {Status::diverged, live_.contradicted,
+                "is held by rows that contradict each other; give one of them a compliance"};
+    for (int body = 0; body < bodies(); ++body) {
+        const BodyState& s = live_.bodies[body];
+        if (!finite(s.displacement) || !finite(s.velocity) || !finite(s.angular_momentum) ||
+            !finite(s.angular_velocity))
+            return {Status::not_finite, body};
+        for (int k = 0; k < 3; ++k)
+            if (std::abs(s.displacement[k]) > RUNAWAY || std::abs(s.velocity[k]) > RUNAWAY)
+                return {Status::diverged, body};
+    }
+    if (live_.not_solved >= 0)
+        return {Status::not_finite, live_.not_solved, "belongs to a system of rows that cannot be solved; give its joints a compliance or the method a floor"};
+    return {};
+}
+
+double RigidSystem::kinetic_energy() const noexcept {
+    double sum = 0.0;
+    for (int i = 0; i < bodies(); ++i) {
+        if (!constants_[i].moves()) continue;
+        const BodyState& s = live_.bodies[i];
+        sum += 0.5 * constants_[i].mass * dot(s.velocity, s.velocity);
+        if (!constants_[i].particle) sum += 0.5 * dot(s.angular_velocity, s.angular_momentum);
+    }
+    return sum;
+}
+
+double RigidSystem::potential_energy() const noexcept {
+    double sum = 0.0;
+    for (int i = 0; i < bodies(); ++i) {
+        if (!constants_[i].moves()) continue;
+        const Vec3 x = position_of(i);
+        sum -= constants_[i].mass * dot(gravity_, x);
+        for (const RigidField& field : fields_)
+            sum -= constants_[i].mass * field.strength / norm(x - field.centre);
+    }
+    for (const RigidSpring& spring : springs_) {
+        const Vec3 a = spring.first < 0 ? spring.first_point : position_of(spring.first);
+        const Vec3 b = spring.second < 0 ? spring.second_point : position_of(spring.second);
+        const double stretch = norm(b - a) - spring.rest_length;
+        sum += 0.5 * spring.stiffness * stretch * stretch;
+    }
+    return sum;
+}
+
+std::vector<double> RigidSystem::final_state() const {
+    std::vector<double> out;
+    out.reserve(13 * constants_.size());
+    for (int i = 0; i < bodies(); ++i) {
+        const BodyState& s = live_.bodies[i];
+        const Vec3 x = position_of(i);
+        const Quat q = orientation_of(i);
+        for (double value : {x.x, x.y, x.z, q.w, q.x, q.y, q.z, s.velocity.x, s.velocity.y, s.velocity.z,
+                             s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z})
+            out.push_back(value);
+    }
+    return out;
+}
+
+void RigidSystem::count(RunReport& report, std::int64_t steps) const {
+    const std::int64_t substeps = steps * method_.substeps;
+    report.counters["steps"] = steps;
+    report.counters["substeps"] = substeps;
+    report.counters["rows_assembled"] = static_cast<std::int64_t>(rows_) * substeps;
+    BlockLdlt::Counters work = matrix_.counters();
+    const auto add = [&work](const BlockLdlt::Counters& more) {
+        work.factorisations += more.factorisations;
+        work.block_operations += more.block_operations;
+        work.floored_pivots += more.floored_pivots;
+        work.solves += more.solves;
+    };
+    add(pivot_.counters());
+    if (contacts_) add(contacts_->factor_counters());
+    const auto put = [&report](const char* name, std::uint64_t value) {
+        report.counters[name] = static_cast<std::int64_t>(value);
+    };
+    put("factorisations", work.factorisations);
+    put("block_operations", work.block_operations);
+    put("floored_pivots", work.floored_pivots);
+    put("back_substitutions", work.solves);
+    put("pivot_rounds", rounds_);
+    put("sweeps", sweeps_);
+    put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
+    std::int64_t moving = 0;
+    for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;
+    report.counters["force_evaluations"] =
+        substeps * (static_cast<std::int64_t>(springs_.size()) + static_cast<std::int64_t>(fields_.size()) * moving);
+    report.residual = residual_;
+    if (!contacts_) return;
+    const ContactCounters contact = contacts_->counters();
+    put("contacts", contact.contacts);
+    put("impacts", contact.impacts);
+    put("corrections", contact.corrections);
+    put("friction_rounds", contact.friction_rounds);
+    put("pivots", contact.pivots);
+    put("sweeps", sweeps_ + contact.sweeps);
+    put("unsettled_solves", contact.unsettled);
+}
+
+}  // namespace spook

@@ -1,0 +1,148 @@
+// The rigid-body stepper: what a step needs, in the order of the step, and nothing else.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "contacts/contact_stage.hpp"
+#include "contacts/pivot_solver.hpp"
+#include "linear/block_ldlt.hpp"
+#include "rigid/joint_set.hpp"
+#include "run/run_loop.hpp"
+#include "run/stage_clock.hpp"
+
+namespace spook {
+
+/// How a step's rows are solved: block is one factorisation, for bilateral rows; pivot and iterative know bounds.
+enum class RigidSolver { none, block, pivot, iterative };
+
+/// One scene with its state. One step of h, symplectic order:
+///   forces → p = M v + h f;  contacts → impact;  joints → rows;  one solve → v₊, λ;
+///   positions and orientations with v₊.
+/// Bodies that can never have rows are moved directly. The angular momentum of a body is its state, so that a
+/// free body keeps it to the last bit. A step in which nothing touches is solved as if contacts were impossible.
+class RigidSystem {
+public:
+    explicit RigidSystem(const RigidScene& scene);
+
+    // For run_loop:
+    void advance(std::int64_t steps);
+    void observe(Recorder& recorder, std::int64_t sample);
+    Health health() const;
+    void save() { saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_, saved_contacts_ = contacts_; }
+    void restore() {
+        live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_, contacts_ = saved_contacts_;
+    }
+    /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
+    std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
+
+    void reset(StageClock* clock);
+    void set_clock(StageClock* clock) noexcept { clock_ = clock; }
+    RigidSolver solver() const noexcept { return solver_; }
+    bool contacts_possible() const noexcept { return contacts_ && contacts_->possible(); }
+    void count(RunReport& report, std::int64_t steps) const;
+    std::vector<double> final_state() const;
+
+    // What can be observed:
+    int bodies() const noexcept { return static_cast<int>(constants_.size()); }
+    const BodyConstants& constants(int body) const noexcept { return constants_[body]; }
+    const BodyState& state(int body) const noexcept { return live_.bodies[body]; }
+    Vec3 position_of(int body) const noexcept { return position(constants_[body], live_.bodies[body]); }
+    Quat orientation_of(int body) const noexcept { return orientation(constants_[body], live_.bodies[body]); }
+    double kinetic_energy() const noexcept;
+    double potential_energy() const noexcept;
+    const JointSet& joints() const noexcept { return joints_; }
+    JointSet& joints() noexcept { return joints_; }
+    void violation(int joint, double* out) const { joints_.violation(joint, live_.bodies, out); }
+    double coordinate(int joint) const { return joints_.coordinate(joint, live_.bodies); }
+    /// Force and torque on the second body at the joint in the last step [N, N m], world axes.
+    void wrench(int joint, double* out) const noexcept;
+    /// Tension of a distance in the last step [N], positive where it pulls.
+    double tension(int joint) const noexcept;
+    /// Force [N] on `body` from `other` (−1: from all) in the last step; count and depth of its contact points.
+    Vec3 contact_force(int body, int other) const noexcept {
+        return contacts_ ? contacts_->force(body, other) : Vec3{};
+    }
+    int contact_count() const noexcept { return contacts_ ? contacts_->count() : 0; }
+    double penetration() const noexcept { return contacts_ ? contacts_->penetration() : 0.0; }
+
+private:
+    struct Live {
+        LargeArray<BodyState> bodies;
+        int too_fast = -1;   // the first body that turned too fast
+        int not_solved = -1;  // a body of a system that could not be factored
+        double share = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
+        int contradicted = -1;  // a body held by rows that cannot hold together
+    };
+
+    void step();
+    void apply_forces();
+    void kick_free_bodies();
+    void kick_free_body(int body) noexcept;
+    bool find_contacts();
+    void fill_masses();
+    void fill_momenta(bool forces);
+    void fill_rows();
+    void impact();
+    void take_velocities(bool angular_too);
+    void solve_block();
+    bool solve_once();
+    bool solve_shared();
+    std::pair<double, int> row_residual(double& speed);
+    void find_contradiction();
+    void solve_mixed(bool touching);
+    void integrate_body(int body);
+    void integrate_all();
+    void analyse_block();
+    double* jacobian(int block, bool second) noexcept;
+    Vec3 kick(int body) const noexcept {  // change of velocity by forces in a step
+        Vec3 dv = h_ * acceleration_[body];
+        if (!force_.empty()) dv += (h_ / constants_[body].mass) * force_[body];
+        return dv;
+    }
+
+    // The scene.
+    LargeArray<BodyConstants> constants_;
+    LargeArray<BodyState> start_;
+    std::vector<Vec3> acceleration_;  // gravity and constant loads
+    std::vector<RigidSpring> springs_;
+    std::vector<RigidField> fields_;
+    Vec3 gravity_;
+    RigidMethod method_;
+    double h_ = 0.0;  // of one substep
+    RigidSolver solver_ = RigidSolver::none;
+
+    // The state.
+    Live live_, saved_;
+    JointSet joints_;
+    LargeArray<JointSet::State> saved_joints_;
+
+    // One step's work.
+    std::vector<Vec3> force_;           // of springs and centres, per body
+    std::vector<int> tied_;             // dynamic bodies that have rows
+    std::vector<int> free_, driven_;    // dynamic bodies that never have rows; kinematic ones
+    bool tied_are_moved_ = false;
+    std::vector<int> slot_;             // per body: its place among the tied bodies, −1
+    BlockLdlt matrix_;
+    LargeArray<double> right_, solution_, left_;
+    struct BlockPlace {
+        int first_edge = -1, second_edge = -1;  // in matrix_
+        bool first_particle = false, second_particle = false;
+    };
+    std::vector<BlockPlace> places_;
+    LargeArray<double> spare_;         // Jacobians with nowhere else to go, per block 2 × rows × 6
+    std::vector<std::size_t> spare_at_;
+    bool mixed_values_ = false;         // whether the last step's rows are in mixed_ or in matrix_
+    MixedSystem mixed_, saved_mixed_;
+    PivotSolver pivot_;
+    std::optional<ContactStage> contacts_, fresh_contacts_, saved_contacts_;
+    std::vector<Pose> poses_;
+    std::vector<Vec6> velocities_, free_velocities_;
+    double residual_ = 0.0;             // largest an iterative solve stopped at, m/s
+    std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;
+    StageClock* clock_ = nullptr;
+};
+
+}  // namespace spook

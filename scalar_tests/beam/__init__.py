@@ -1,0 +1,1 @@
+"""A beam of boxes held by locks, on two piles."""

@@ -1,0 +1,1 @@
+"""A door hung on more hinges than it needs."""

@@ -1,0 +1,1 @@
+"""A box on a plane that is tilted in any direction."""

@@ -1,0 +1,127 @@
+"""Does the friction force grow with the slope and stop at the friction coefficient, whatever the mass?"""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine import PLAIN, ContactForce, Final, Method, Result
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, TIME_STEP, force_ratio, scene, slide
+
+LADDER_SLOPE = 0.3
+MASSES = (1.0, 10.0, 1e2, 1e3, 1e4)  # kg
+SLOPES = tuple(0.05 * i for i in range(1, 15))
+
+
+def _error(simulate: Simulate, slope: float, mass: float) -> float:
+    return force_ratio(slide(simulate, slope, mass=mass)) - min(slope, FRICTION)
+
+
+def _measure(simulate: Simulate) -> dict[str, float]:
+    errors = [_error(simulate, slope, mass) for mass in (1.0, 1e4) for slope in (0.1, 0.3, 0.45, 0.55, 0.7)]
+    return {"ratio_error": max(errors, key=abs)}
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    curves = [
+        Curve(
+            name=f"{mass:g} kg",
+            x=SLOPES,
+            y=tuple(force_ratio(slide(simulate, slope, mass=mass)) for slope in SLOPES),
+        )
+        for mass in MASSES
+    ]
+    curves.append(
+        Curve(name="min(tan θ, µ)", x=SLOPES, y=tuple(min(s, FRICTION) for s in SLOPES), style="reference")
+    )
+    return Drawing(
+        curves=tuple(curves),
+        x_label="tan θ",
+        y_label="F_t/F_n",
+        note="The thesis' curve dips near tan θ = 0.3; Coulomb's law has no dip, and there is none here.",
+    )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """|F_t/F_n − tan θ| of a box that stands at tan θ = 0.3, after 1 s."""
+    observe = {"force": Final(quantity=ContactForce("box"))}
+    result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
+    x, y, z = result["force"]
+    return abs(math.hypot(x, y) / abs(float(z)) - LADDER_SLOPE)
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
+
+
+TEST = ScalarTest(
+    title="Force ratio on a slope",
+    question="Does the friction force follow the slope up to the friction coefficient, whatever the mass?",
+    why="Below the friction angle the plane must give exactly the force that is needed, above it exactly µ F_n.",
+    model="A box on a plane under tilted gravity; the contact force is read after one second.",
+    parameters=(
+        ("box", "1 × 1 × 1 m, 1 … 1e4 kg"),
+        ("friction coefficient", "µ = 0.5"),
+        ("gravity", "10 m/s²"),
+        ("time step", "1/60 s, 60 steps"),
+    ),
+    theory=("F_t/F_n = min(tan θ, µ), independent of the mass.",),
+    reference="Coulomb's law (closed form).",
+    conclusion="Green: the contact gives the force the law asks for. Red: it creeps, sticks or depends on the mass.",
+    source="thesis, section 3.2.4",
+    measurements=(
+        Measurement(
+            configuration="cone",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="ratio_error",
+                    description="largest deviation of F_t/F_n from min(tan θ, µ), five slopes, 1 kg and 1e4 kg",
+                    unit="1",
+                    role="gate",
+                    limit=1e-9,
+                    limit_source="Coulomb's law to rounding",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=_measure,
+            note="Cone friction, direct solver.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(0.3), time_step=TIME_STEP),
+    figures=(
+        Figure(
+            name="force-ratio-against-slope", title="Force ratio against slope", draw=_draw, thesis="Fig 3.17"
+        ),
+    ),
+    ladders=(
+        Ladder(
+            name="ratio",
+            description="error of F_t/F_n at tan θ = 0.3 after 1 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-9,
+            target_seconds=0.01,
+        ),
+    ),
+)

@@ -1,0 +1,268 @@
+"""Is Coulomb's law obeyed in every direction?
+
+At tan θ = µ the box only just stands, so any model that can hold it reads F_t/F_n = µ there: the printed gate
+alone cannot see anisotropy. The companions slide the box at tan θ = 0.6 in the same 36 directions.
+"""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine import ContactForce, Final, Method, Result
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.inclined_plane.scene import (
+    BOX,
+    CONE,
+    FRICTION,
+    MODELS,
+    SCALED_BOX,
+    TIME_STEP,
+    force_direction_error,
+    force_ratio,
+    scene,
+    slide,
+)
+
+DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
+LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
+SLIDING = 0.6  # tan θ, above the friction coefficient
+
+
+def ratios(simulate: Simulate, slope: float, method: Method) -> tuple[float, ...]:
+    """F_t/F_n in each of the 36 directions."""
+    return tuple(force_ratio(slide(simulate, slope, alpha, method=method)) for alpha in DIRECTIONS)
+
+
+def _worst(values: tuple[float, ...]) -> float:
+    return max(values, key=lambda value: abs(value - FRICTION))
+
+
+def _measure_cone(simulate: Simulate) -> dict[str, float]:
+    standing = _worst(ratios(simulate, FRICTION, CONE))
+    runs = [(slide(simulate, SLIDING, alpha, method=CONE), alpha) for alpha in DIRECTIONS]
+    sliding = _worst(tuple(force_ratio(run) for run, _ in runs))
+    return {
+        "force_ratio": standing,
+        "standing_error": standing - FRICTION,
+        "sliding_error": sliding - FRICTION,
+        "direction_error": max(force_direction_error(run, alpha) for run, alpha in runs),
+    }
+
+
+def _measure_anisotropy(method: Method) -> object:
+    def measure(simulate: Simulate) -> dict[str, float]:
+        values = ratios(simulate, SLIDING, method)
+        return {"anisotropy": max(values) - min(values)}
+
+    return measure
+
+
+def _draw_polar(slope: float) -> object:
+    def draw(simulate: Simulate) -> Drawing:
+        angles = (*tuple(math.degrees(alpha) for alpha in DIRECTIONS), 360.0)
+        curves = []
+        for name, method in MODELS.items():
+            values = ratios(simulate, slope, method)
+            curves.append(Curve(name=name, x=angles, y=(*values, values[0])))
+        curves.append(Curve(name="Coulomb", x=angles, y=(FRICTION,) * len(angles), style="reference"))
+        return Drawing(
+            curves=tuple(curves),
+            x_label="direction of the slope [degrees]",
+            y_label="F_t/F_n",
+            x_scale="angle",
+            note=(
+                "At tan θ = µ every model only holds the box and reads 0.5: nothing is learnt about anisotropy."
+                if slope == FRICTION
+                else "Sliding at tan θ = 0.6: only the cone keeps 0.5 in every direction."
+            ),
+        )
+
+    return draw
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest |F_t/F_n − µ| over six directions after sliding for a second."""
+    worst = 0.0
+    for direction in LADDER_DIRECTIONS:
+        observe = {"force": Final(quantity=ContactForce("box"))}
+        result = simulate(
+            scene(SLIDING, direction), time_step=time_step, duration=1.0, method=method, observe=observe
+        )
+        x, y, z = result["force"]
+        worst = max(worst, abs(math.hypot(x, y) / abs(float(z)) - FRICTION))
+    return worst
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """One of these slides with nothing observed."""
+    return simulate(scene(SLIDING, LADDER_DIRECTIONS[1]), time_step=time_step, duration=1.0, method=method)
+
+
+TEST = ScalarTest(
+    title="Friction in every direction",
+    question="Is Coulomb's law obeyed, in every direction?",
+    why=(
+        "A friction model that bounds two axes separately is stronger along their diagonals: a vehicle then turns "
+        "differently depending on where it stands in the world."
+    ),
+    model=(
+        "A box of 1 m and 1 kg lies on a level plane under a gravity vector tilted by θ towards 36 directions α. "
+        "The contact force on the box is split into its normal and tangential parts."
+    ),
+    parameters=(
+        ("box", "1 × 1 × 1 m, 1 kg"),
+        ("friction coefficient", "µ = 0.5"),
+        ("gravity", "10 m/s², G = −g (sin θ cos α, sin θ sin α, cos θ)"),
+        ("slopes", "tan θ = 0.5 (the printed test) and 0.6 (sliding)"),
+        ("time step", "1/60 s, 60 steps"),
+    ),
+    theory=(
+        "F_t = m g sin θ while it stands, F_t = µ F_n once it slides.",
+        "F_t/F_n = min(tan θ, µ) in every direction α, opposite to the motion.",
+        "Box model: |F_x| ≤ µ F_n and |F_y| ≤ µ F_n, up to √2 µ along the diagonals: at tan θ = 0.6 it reads "
+        "0.5 along the axes and 0.6 along the diagonals.",
+    ),
+    reference="Coulomb's law (closed form).",
+    conclusion=(
+        "Green: the friction force has the right size and direction everywhere. Red: the bound is taken per axis, "
+        "from the wrong normal force, or not at all."
+    ),
+    source="thesis, sections 3.2.4 and 4.2",
+    misprints=(
+        "Equations 3.11 and 3.12 have sine and cosine swapped: F_t = m g sin θ and F_n = m g cos θ.",
+        "The printed test measures at tan θ = µ, where the box only stands; there even the box model reads 0.5.",
+    ),
+    measurements=(
+        Measurement(
+            configuration="cone",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="force_ratio",
+                    description="F_t/F_n at tan θ = 0.5, the worst of 36 directions",
+                    unit="1",
+                    role="gate",
+                    better="inside",
+                    limit=(FRICTION - 1e-4, FRICTION + 1e-4),
+                    limit_source="thesis, section 4.2",
+                    set_point=(FRICTION - 1e-9, FRICTION + 1e-9),
+                    set_point_source="Coulomb's law to the solver's tolerance",
+                    reference=FRICTION,
+                    tolerance=1e-12,
+                ),
+                Metric(
+                    name="standing_error",
+                    description="deviation of F_t/F_n from 0.5 at tan θ = 0.5, the worst of 36 directions",
+                    unit="1",
+                    role="companion",
+                    limit=1e-9,
+                    limit_source="set point: Coulomb's law to rounding",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+                Metric(
+                    name="sliding_error",
+                    description="deviation of F_t/F_n from 0.5 when sliding at tan θ = 0.6, worst of 36 directions",
+                    unit="1",
+                    role="companion",
+                    limit=1e-9,
+                    limit_source="set point: Coulomb's law to rounding",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+                Metric(
+                    name="direction_error",
+                    description="angle between friction and slope when sliding, the worst of 36 directions",
+                    unit="degrees",
+                    role="companion",
+                    limit=1e-6,
+                    limit_source="set point: friction opposes the motion",
+                    reference=0.0,
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=_measure_cone,
+            note="Cone friction, direct solver.",
+        ),
+        Measurement(
+            configuration="box",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="anisotropy",
+                    description="largest minus smallest F_t/F_n when sliding at tan θ = 0.6",
+                    unit="1",
+                    role="companion",
+                    better="inside",
+                    limit=(0.09, 0.11),
+                    limit_source="the box model holds the diagonals at 0.6 and slides along the axes at 0.5",
+                    reference=0.1,
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=_measure_anisotropy(BOX),  # type: ignore[arg-type]
+            note="Box friction: proves that the test can see anisotropy.",
+        ),
+        Measurement(
+            configuration="scaled box",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="anisotropy",
+                    description="largest minus smallest F_t/F_n when sliding at tan θ = 0.6",
+                    unit="1",
+                    role="reported",
+                    reference=0.1,
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=_measure_anisotropy(SCALED_BOX),  # type: ignore[arg-type]
+            note="Scaled box: the box with the current normal force.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(SLIDING), time_step=TIME_STEP),
+    figures=(
+        Figure(
+            name="force-ratio-against-direction-standing",
+            title="Force ratio against direction at tan θ = µ",
+            draw=_draw_polar(FRICTION),  # type: ignore[arg-type]
+            thesis="Fig 3.18",
+        ),
+        Figure(
+            name="force-ratio-against-direction-sliding",
+            title="Force ratio against direction, sliding at tan θ = 0.6",
+            draw=_draw_polar(SLIDING),  # type: ignore[arg-type]
+        ),
+    ),
+    seven=True,
+    ladders=(
+        Ladder(
+            name="sliding",
+            description="largest error of F_t/F_n over six directions, sliding at tan θ = 0.6 for 1 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="cone", method=CONE, expected_order=None),
+                Configuration(name="cone, hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="cone, iterative", method=Method(solver="iterative"), expected_order=None),
+                Configuration(name="box", method=BOX, expected_order=None),
+                Configuration(name="scaled box", method=SCALED_BOX, expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.2,
+            target_seconds=0.1,
+        ),
+    ),
+)

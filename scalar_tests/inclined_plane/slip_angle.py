@@ -1,0 +1,159 @@
+"""At which slope does a box start to slide?"""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine import PLAIN, Final, Method, Result, Velocity
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.inclined_plane.scene import (
+    FRICTION,
+    GRAVITY,
+    TIME_STEP,
+    scene,
+    slip_slope,
+    slips,
+)
+
+LADDER_SLOPE = 0.51
+COEFFICIENTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+
+
+def _measure_slope(simulate: Simulate) -> dict[str, float]:
+    return {"slip_slope_error": slip_slope(simulate, FRICTION) - FRICTION}
+
+
+def _measure_bracket(simulate: Simulate) -> dict[str, float]:
+    stands = not slips(simulate, FRICTION - 1e-4, FRICTION)
+    slides = slips(simulate, FRICTION + 1e-4, FRICTION)
+    return {"bracket_held": float(stands) + float(slides)}
+
+
+def _draw_angle(simulate: Simulate) -> Drawing:
+    found = tuple(math.atan(slip_slope(simulate, mu, resolution=1e-3)) for mu in COEFFICIENTS)
+    return Drawing(
+        curves=(
+            Curve(name="simulation", x=COEFFICIENTS, y=found, style="points"),
+            Curve(
+                name="θ = atan µ",
+                x=COEFFICIENTS,
+                y=tuple(math.atan(mu) for mu in COEFFICIENTS),
+                style="reference",
+            ),
+        ),
+        x_label="friction coefficient µ",
+        y_label="angle at which the box slides [rad]",
+        note="Above µ = 1 a cube tips over before it slides, so the sweep ends at 0.9.",
+    )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Speed after 1 s just beyond the friction angle minus g (sin θ − µ cos θ) t [m/s]."""
+    observe = {"velocity": Final(quantity=Velocity("box"))}
+    result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
+    tilt = math.atan(LADDER_SLOPE)
+    x, y, _ = result["velocity"]
+    return math.hypot(x, y) - GRAVITY * (math.sin(tilt) - FRICTION * math.cos(tilt))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
+
+
+TEST = ScalarTest(
+    title="Slip angle",
+    question="At which slope does a box on an inclined plane start to slide?",
+    why="A box must stand for ever below its friction angle, and must not be held above it.",
+    model=(
+        "A box lies on a plane; for each slope a new run tells whether its speed exceeds 1e-3 m/s within four "
+        "seconds, and the slope is found by bisection. The thesis raises the slope during one run instead, which "
+        "adds the delay of the ramp."
+    ),
+    parameters=(
+        ("box", "1 × 1 × 1 m, 1 kg"),
+        ("friction coefficient", "µ = 0.5 (swept 0.1 … 0.9)"),
+        ("gravity", "10 m/s²"),
+        ("slip limit", "1e-3 m/s"),
+        ("time step", "1/60 s"),
+    ),
+    theory=("The box slides iff tan θ > µ.",),
+    reference="θ = atan µ (closed form).",
+    conclusion="Green: no creep below the friction angle, no hold above it. Red: one of the two.",
+    source="thesis, section 3.2.4",
+    measurements=(
+        Measurement(
+            configuration="cone",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="slip_slope_error",
+                    description="tan of the slope at which the box slides, minus µ = 0.5",
+                    unit="1",
+                    role="gate",
+                    limit=2e-4,
+                    limit_source="Coulomb's law; the bisection resolves 1e-4",
+                    reference=0.0,
+                    tolerance=1e-4,
+                ),
+            ),
+            measure=_measure_slope,
+            note="Cone friction, direct solver.",
+        ),
+        Measurement(
+            configuration="cone",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="bracket_held",
+                    description="stands at tan θ = 0.4999 and slides at 0.5001: 2 if both",
+                    unit="1",
+                    role="companion",
+                    better="larger",
+                    limit=2.0,
+                    limit_source="Coulomb's law",
+                    reference=2.0,
+                ),
+            ),
+            measure=_measure_bracket,
+            note="Cone friction, direct solver.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(FRICTION), time_step=TIME_STEP),
+    figures=(
+        Figure(
+            name="slip-angle-against-friction",
+            title="Angle at which the box slides against the friction coefficient",
+            draw=_draw_angle,
+            thesis="Fig 3.16",
+        ),
+    ),
+    ladders=(
+        Ladder(
+            name="slide",
+            description="speed after 1 s at tan θ = 0.51 against g (sin θ − µ cos θ) t, µ = 0.5",
+            unit="m/s",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.01,
+        ),
+    ),
+)

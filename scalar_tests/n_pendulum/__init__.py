@@ -1,0 +1,1 @@
+"""A chain of many links that falls from the horizontal."""

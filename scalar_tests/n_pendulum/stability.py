@@ -1,0 +1,143 @@
+"""How long a chain, how long a time step, how little damping the N-pendulum survives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import PLAIN, Energy, Method, Trace, Violation
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, is_stable, table
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
+from spook_tracker.scalar_tests.chain import COMPLIANCE, LENGTH, fall_to_hanging, level_chain
+from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, DURATION, TIME_STEP
+
+FOUR_SUBSTEPS = Method(substeps=4)
+EIGHT_SUBSTEPS = Method(substeps=8)
+COUNTS = (2, 5, 10, 15, 20, 26, 30, 40, 50, 60, 80, 100, 130, 150, 170, 200, 230, 300, 400)
+STRETCH_BOUND, ENERGY_BOUND = 1.0, 0.15  # of a link's length; of the fall to hanging
+RELATIVE_DAMPINGS = (0.01, 0.03, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)  # τ/h
+COMPLIANCES = tuple(float(value) for value in np.geomspace(1e-13, 1e-3, 11))  # m/N
+OBSERVE: dict[str, Observable] = {
+    "violation": Trace(quantity=Violation()),
+    "energy": Trace(quantity=Energy(), from_start=True),
+}
+HOLDS = (
+    "22 s without any link ever off by more than its own length, or the energy above its start by more than 15 % of the "
+    "fall to hanging"
+)
+
+
+def _kind(
+    simulate: Simulate,
+    count: int,
+    time_step: float = TIME_STEP,
+    method: Method = PLAIN,
+    *,
+    relative_damping: float = 1.0,
+    compliance: float = COMPLIANCE,
+) -> str:
+    step = time_step / method.substeps
+    result = simulate(
+        level_chain(count, relative_damping * step, compliance=compliance),
+        time_step=time_step,
+        duration=DURATION,
+        method=method,
+        observe=OBSERVE,
+    )
+    stretch = np.abs(result.partial["violation"]).max(axis=1) / (STRETCH_BOUND * LENGTH)
+    gain = result.partial["energy"] / fall_to_hanging(count) / ENERGY_BOUND
+    # A whip comes when it comes: only the bounds count, not that the last third has more of it.
+    return cell(result, np.maximum(stretch, gain), bound=1.0, rest=1.0).replace("settled", "bounded")
+
+
+def _longest(method: Method) -> Any:
+    def study(simulate: Simulate) -> BreakPoint:
+        return break_count(lambda count: is_stable(_kind(simulate, count, method=method)), COUNTS)
+
+    return study
+
+
+def _largest_step(method: Method) -> Any:
+    def study(simulate: Simulate) -> BreakPoint:
+        return break_point(
+            lambda h: is_stable(_kind(simulate, COUNT, h, method)), 0.002, 0.2, resolution=0.02, walk=15
+        )
+
+    return study
+
+
+def smallest_damping(simulate: Simulate) -> BreakPoint:
+    """Smallest τ/h for 26 spheres."""
+    return break_point(
+        lambda theta: is_stable(_kind(simulate, COUNT, relative_damping=theta)),
+        1.0,
+        1e-6,
+        resolution=0.05,
+        walk=13,
+    )
+
+
+def damping_map(simulate: Simulate) -> StabilityMap:
+    """(τ/h, compliance) for 26 spheres at h = 1/60 s."""
+
+    def kind(theta: float, compliance: float) -> str:
+        return _kind(simulate, COUNT, relative_damping=theta, compliance=compliance)
+
+    return StabilityMap(
+        x=RELATIVE_DAMPINGS,
+        y=COMPLIANCES,
+        cells=table(COMPLIANCES, RELATIVE_DAMPINGS, kind),
+        x_label="damping, τ/h",
+        y_label="compliance [m/N]",
+        note="Too little damping feeds on the whip of the free end; too much stretches every link, since damping "
+        "holds on to the linearised row.",
+    )
+
+
+STUDIES = (
+    *(
+        StabilityStudy(
+            name=f"longest-chain-{name.replace(' ', '-')}",
+            title="Longest chain that swings down from the level",
+            configuration=name,
+            definition=HOLDS,
+            study=_longest(method),
+            unit="spheres",
+        )
+        for name, method in (
+            ("plain", PLAIN),
+            ("curved twice", CURVED_TWICE),
+            ("four substeps", FOUR_SUBSTEPS),
+            ("eight substeps", EIGHT_SUBSTEPS),
+        )
+    ),
+    *(
+        StabilityStudy(
+            name=f"largest-time-step-{name.replace(' ', '-')}",
+            title="Largest time step for 26 spheres",
+            configuration=name,
+            definition=HOLDS,
+            study=_largest_step(method),
+            unit="s",
+        )
+        for name, method in (("plain", PLAIN), ("curved twice", CURVED_TWICE))
+    ),
+    StabilityStudy(
+        name="smallest-damping",
+        title="Smallest τ/h that holds 26 spheres",
+        configuration="plain",
+        definition=HOLDS,
+        study=smallest_damping,
+        unit="1",
+        better="smaller",
+    ),
+    StabilityStudy(
+        name="damping-compliance-map",
+        title="Damping and compliance, 26 spheres",
+        configuration="plain",
+        definition=HOLDS,
+        study=damping_map,
+    ),
+)

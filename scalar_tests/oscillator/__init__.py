@@ -1,0 +1,1 @@
+"""One mass on one spring or one row: the studies of the thesis' chapter 2."""

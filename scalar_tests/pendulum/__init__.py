@@ -1,0 +1,1 @@
+"""A bob on a distance constraint."""

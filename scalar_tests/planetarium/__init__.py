@@ -1,0 +1,1 @@
+"""A planet on a slightly eccentric orbit."""
