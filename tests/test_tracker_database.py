@@ -269,7 +269,7 @@ def test_a_password_is_never_shown(tmp_path):
 def test_opening_at_head_does_not_import_alembic(file):
     """It takes longer than everything else `tracker compare` does."""
     program = (
-        "import sys; from tracker.database import open_database; "
+        "import sys; from spook_tracker.tracker.database import open_database; "
         f"open_database({str(file)!r}, readonly=True).dispose(); print('alembic' in sys.modules)"
     )
 

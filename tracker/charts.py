@@ -91,6 +91,7 @@ def drawable(chart: Chart) -> Chart:
     positive = [y for y in finite if y > 0.0]
     zeros = chart.y_scale == "log" and len(positive) < len(finite)
     floor = 10.0 ** (math.floor(math.log10(min(positive))) - 1) if positive else 1e-16
+    floor = floor or math.ulp(0.0)  # there is no double a decade under the smallest
     log_y = chart.y_scale == "log"
     if log_y:
         top = 10.0 ** math.ceil(math.log10(max(positive)) + 0.3) if positive else 1.0
@@ -141,7 +142,10 @@ def names_on_lines(chart: Chart) -> list[tuple[float, str]]:
 
 
 def flattened(chart: Chart) -> Chart:
-    """A polar chart as points of the plane, with the rings of its grid; another chart as it is."""
+    """A polar chart as points of the plane, with the rings of its grid; another chart as it is.
+
+    A band of radii is no band of heights, so none is left: its place would have nothing to do with its ends.
+    """
     if not chart.polar:
         return chart
     radii = [abs(y) for line in chart.lines for y in line.y if math.isfinite(y)]
@@ -159,6 +163,7 @@ def flattened(chart: Chart) -> Chart:
         lines=tuple(lines),
         rings=rings,
         reach=1.12 * max(radii, default=1.0) or 1.0,
+        bands=(),
         x_scale="linear",
         y_scale="linear",
     )

@@ -6,13 +6,14 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Engine, inspect, text
+from sqlalchemy import URL, Connection, Engine, inspect, text
+from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.connection import connected, database_url, in_words, is_file, shown
 from spook_tracker.tracker.errors import DatabaseError
 from spook_tracker.tracker.resources import resource
 
-__all__ = ["database_url", "head", "in_words", "open_database", "shown", "upgrade"]
+__all__ = ["database_url", "head", "in_words", "one_writer", "open_database", "shown", "upgrade"]
 
 
 def open_database(url: str | URL | None = None, readonly: bool = False) -> Engine:
@@ -27,11 +28,12 @@ def open_database(url: str | URL | None = None, readonly: bool = False) -> Engin
     engine = connected(url, readonly)
     try:
         with in_words(engine):
-            revision = _revision(engine)
+            with _one_moment(engine) as connection:
+                revision = _current(connection)
+                _refuse_strange(connection, revision)
+                _refuse_triggers(connection)
             if revision == head():
-                _refuse_triggers(engine)
                 return engine
-            _refuse_strange(engine, revision)
             if readonly:
                 raise DatabaseError(
                     f"{shown(url)} has an older schema than this tracker; run: tracker db upgrade"
@@ -68,15 +70,22 @@ def upgrade(engine: Engine, target: str = "head", *, keep_copy: bool = True) -> 
             _pragma(connection, "foreign_keys = OFF")  # has an effect only outside a transaction
         try:
             with connection.begin():
-                if not sqlite:
-                    connection.execute(text("SELECT pg_advisory_xact_lock(5755)"))
+                one_writer(connection)
                 revision = _current(connection)
+                _refuse_strange(connection, revision)  # another process may have been here meanwhile
                 if sqlite and keep_copy and revision is not None and revision != target:
                     _keep_copy(engine.url, revision)
                 migrate(connection, target)
         finally:
             if sqlite:
                 _pragma(connection, "foreign_keys = ON")
+
+
+def one_writer(on: Connection | Session) -> None:
+    """Wait until this transaction is the only one that writes. SQLite does so at its beginning, by itself."""
+    connection = on if isinstance(on, Connection) else on.connection()
+    if connection.dialect.name == "postgresql":
+        connection.execute(text("SELECT pg_advisory_xact_lock(5755)"))
 
 
 def _pragma(connection: Any, words: str) -> None:
@@ -117,9 +126,12 @@ def _check_file(url: URL, readonly: bool) -> None:
         raise DatabaseError(f"{path} is not a SQLite database, or it is damaged; restore it from a copy")
 
 
-def _revision(engine: Engine) -> str | None:
-    with engine.connect() as connection:
-        return _current(connection)
+def _one_moment(engine: Engine) -> Connection:
+    """A connection whose transaction sees one state: between two, another process could make the tables."""
+    connection = engine.connect()
+    if engine.dialect.name != "sqlite":  # SQLite knows nothing else
+        connection.execution_options(isolation_level="REPEATABLE READ")
+    return connection
 
 
 def _current(connection: Any) -> str | None:
@@ -129,25 +141,26 @@ def _current(connection: Any) -> str | None:
     return str(found[0]) if len(found) == 1 else "+".join(found) or None
 
 
-def _refuse_strange(engine: Engine, revision: str | None) -> None:
+def _refuse_strange(connection: Connection, revision: str | None) -> None:
+    name = shown(connection.engine.url)
     if revision is not None and revision not in _revisions():
         raise DatabaseError(
-            f"{shown(engine.url)} has schema revision {revision[:40]}, this tracker knows up to {head()}; "
+            f"{name} has schema revision {revision[:40]}, this tracker knows up to {head()}; "
             "update the tracker"
         )
-    if revision is None and (strange := inspect(engine).get_table_names()):
+    if revision is None and (strange := inspect(connection).get_table_names()):
         raise DatabaseError(
-            f"{shown(engine.url)} holds something else (a table {strange[0][:40]!r}); choose another database"
+            f"{name} holds something else (a table {strange[0][:40]!r}); choose another database"
         )
 
 
-def _refuse_triggers(engine: Engine) -> None:
+def _refuse_triggers(connection: Connection) -> None:
     """A trigger in a file from elsewhere would run whenever a night is recorded."""
-    if engine.dialect.name == "sqlite":
-        with engine.connect() as connection:
-            query = text("SELECT name FROM sqlite_master WHERE type = 'trigger'")
-            name = connection.execute(query).scalar()
+    if connection.dialect.name == "sqlite":
+        query = text("SELECT name FROM sqlite_master WHERE type = 'trigger'")
+        name = connection.execute(query).scalar()
         if name is not None:
             raise DatabaseError(
-                f"{shown(engine.url)} holds a trigger {name[:40]!r}, which is not the tracker's; drop it"
+                f"{shown(connection.engine.url)} holds a trigger {name[:40]!r}, "
+                "which is not the tracker's; drop it"
             )

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from spook_tracker.tracker import models, rows
 from spook_tracker.tracker.border import checked
-from spook_tracker.tracker.database import in_words
+from spook_tracker.tracker.database import in_words, one_writer
 from spook_tracker.tracker.document import RunDocument
 from spook_tracker.tracker.errors import DatabaseError
 from spook_tracker.tracker.models import identity
@@ -52,6 +52,7 @@ def _known(session: Session, run: RunDocument) -> bool:
 
 
 def _store(session: Session, run: RunDocument) -> bool:
+    one_writer(session)  # two that insert the same rows in another order would wait for each other
     if _known(session, run):
         return False
     engine, machine = rows.engine_row(run.engine), rows.machine_row(run.machine)
