@@ -67,7 +67,8 @@ void sine_and_cosine_are_within_0_9_ulp() {
         for (const double x : {std::nextafter(near, 0.0), near, std::nextafter(near, infinite)}) turn(x);
     }
     // The double nearest to a multiple of pi/2 of all: 2^-61 away.
-    for (const double x : {0x1.6ac5b262ca1ffp+849, 0x1p1023, DBL_MAX, DBL_MIN, smallest, 0x1p-27, 1e22}) turn(x);
+    for (const double x : {0x1.6ac5b262ca1ffp+849, 0x1p1023, DBL_MAX, DBL_MIN, smallest, 0x1p-27, 1e22})
+        turn(x);
     EXPECT(sine_error.within(0.9, "sine"));
     EXPECT(cosine_error.within(0.9, "cosine"));
 }
@@ -95,7 +96,8 @@ void the_arc_tangent_is_within_0_6_ulp() {
         for (const double x : {1.0, -1.0, std::sqrt(1.0 - small * small)}) see(small, x), see(x, small);
     }
     for (int k = 0; k <= 32; ++k)  // where one constant of the table takes over from the next
-        for (int i = -2; i <= 2; ++i) see(k / 32.0 + i * 0x1p-53, 1.0), see(3.0 * k / 32.0 + i * 0x1p-52, 3.0);
+        for (int i = -2; i <= 2; ++i)
+            see(k / 32.0 + i * 0x1p-53, 1.0), see(3.0 * k / 32.0 + i * 0x1p-52, 3.0);
     for (const double a : {smallest, DBL_MIN, 1.0, DBL_MAX})
         for (const double b : {smallest, -smallest, DBL_MIN, -1.0, 1.0, -DBL_MAX}) see(a, b);
     EXPECT(worst.within(0.6, "arc tangent"));
@@ -114,7 +116,8 @@ void a_length_has_a_relative_error_below_2_to_the_minus_52() {
     double worst = 0.0;
     for (int i = 0; i < 500'000; ++i) {
         const double a = uniform(-1.0, 1.0), b = uniform(-1.0, 1.0) * std::exp2(-uniform(0.0, 30.0));
-        const long double right = std::sqrt(static_cast<long double>(a) * a + static_cast<long double>(b) * b);
+        const long double right =
+            std::sqrt(static_cast<long double>(a) * a + static_cast<long double>(b) * b);
         worst = std::max(worst, static_cast<double>(std::fabs(length(a, b) - right) / right));
     }
     EXPECT(worst <= 0x1p-52);

@@ -24,8 +24,7 @@ struct Live {
 std::unique_ptr<Live> live = std::make_unique<Live>();
 char name[64];
 
-template <class Program, class Scene>
-RunReport run(const Scene& scene, int steps, double time_limit) {
+template <class Program, class Scene> RunReport run(const Scene& scene, int steps, double time_limit) {
     return Program(scene, live->quantities, live->observations).run(steps, time_limit, false);
 }
 
@@ -37,7 +36,9 @@ void shape(const Primitive& primitive) {
     live->bodies.colliders.push_back(collider);
 }
 
-const Recording& recording(int observable) { return live->report.recordings[static_cast<std::size_t>(observable)]; }
+const Recording& recording(int observable) {
+    return live->report.recordings[static_cast<std::size_t>(observable)];
+}
 
 }  // namespace
 
@@ -46,10 +47,12 @@ void live_begin(int rigid) {
     live->rigid = rigid != 0;
 }
 
-void live_gravity(double x, double y, double z) { live->particles.gravity = live->bodies.gravity = {x, y, z}; }
+void live_gravity(double x, double y, double z) {
+    live->particles.gravity = live->bodies.gravity = {x, y, z};
+}
 
-void live_method(double time_step, int substeps, int corrections, int composition, int half_step_velocities, int solver,
-                 int friction, int iterations, double residual_tolerance) {
+void live_method(double time_step, int substeps, int corrections, int composition, int half_step_velocities,
+                 int solver, int friction, int iterations, double residual_tolerance) {
     ParticleMethod& p = live->particles.method;
     p.time_step = time_step;
     p.substeps = substeps;
@@ -77,8 +80,8 @@ void live_particle(double mass, double x, double y, double z, double vx, double 
     live->particles.bodies.push_back(body);
 }
 
-void live_body(int motion, double mass, double ix, double iy, double iz, double x, double y, double z, double qw, double qx,
-               double qy, double qz) {
+void live_body(int motion, double mass, double ix, double iy, double iz, double x, double y, double z,
+               double qw, double qx, double qy, double qz) {
     RigidBodySpec body;
     body.motion = static_cast<Motion>(motion);
     body.mass = mass;
@@ -93,7 +96,8 @@ void live_velocity(double vx, double vy, double vz, double wx, double wy, double
     live->bodies.bodies.back().angular_velocity = {wx, wy, wz};
 }
 
-void live_material(double friction, double restitution, double compliance, double damping, double slip_compliance) {
+void live_material(double friction, double restitution, double compliance, double damping,
+                   double slip_compliance) {
     live->bodies.bodies.back().material = {friction, restitution, compliance, damping, slip_compliance};
 }
 
@@ -112,8 +116,8 @@ void live_distance(int first, int second, double x1, double y1, double z1, doubl
     live->particles.rows.push_back(row);
 }
 
-void live_spring(int first, int second, double x1, double y1, double z1, double x2, double y2, double z2, double stiffness,
-                 double rest_length, double viscosity) {
+void live_spring(int first, int second, double x1, double y1, double z1, double x2, double y2, double z2,
+                 double stiffness, double rest_length, double viscosity) {
     SpringForce spring;
     spring.ends[0] = {first, {x1, y1, z1}};
     spring.ends[1] = {second, {x2, y2, z2}};
@@ -123,9 +127,12 @@ void live_spring(int first, int second, double x1, double y1, double z1, double 
     live->particles.springs.push_back(spring);
 }
 
-void live_centre(double strength, double x, double y, double z) { live->particles.fields.push_back({strength, {x, y, z}}); }
+void live_centre(double strength, double x, double y, double z) {
+    live->particles.fields.push_back({strength, {x, y, z}});
+}
 
-void live_lock(int first, int second, double x, double y, double z, double along, double about, double damping) {
+void live_lock(int first, int second, double x, double y, double z, double along, double about,
+               double damping) {
     JointSpec joint;
     joint.kind = JointKind::lock;
     joint.first = first;

@@ -14,8 +14,8 @@ struct PreparedBlock {
     std::array<Vec6, 6> first, second;  // M⁻¹ Gᵀ, one per row
     Mat6 schur{};
     bool bilateral = true;
-    int point = -1;               // its friction point
-    double step = 0.0;            // 1/lambda_max of the tangents' part
+    int point = -1;                   // its friction point
+    double step = 0.0;                // 1/lambda_max of the tangents' part
     std::array<double, 36> factor{};  // of schur, of a bilateral block
 };
 
@@ -43,10 +43,10 @@ public:
                 if (!friction_only) change = std::max(change, update_row(k, 0));
                 change = std::max(change, update_tangents(k));
             } else if (!friction_only) {
-                if (prepared.bilateral)
-                    change = std::max(change, update_block(k));
+                if (prepared.bilateral) change = std::max(change, update_block(k));
                 else
-                    for (int i = 0; i < system_.rows[k].size; ++i) change = std::max(change, update_row(k, i));
+                    for (int i = 0; i < system_.rows[k].size; ++i)
+                        change = std::max(change, update_row(k, i));
             }
         }
         return change;
@@ -62,7 +62,8 @@ private:
             prepared.second[i] = block.second_jacobian[i];
             if (block.first >= 0) solve_six(mass_factor[block.first], prepared.first[i]);
             if (block.second >= 0) solve_six(mass_factor[block.second], prepared.second[i]);
-            prepared.bilateral = prepared.bilateral && block.lower[i] == -unbounded && block.upper[i] == unbounded;
+            prepared.bilateral =
+                prepared.bilateral && block.lower[i] == -unbounded && block.upper[i] == unbounded;
         }
         for (int i = 0; i < n; ++i)
             for (int j = 0; j < n; ++j) {
@@ -96,7 +97,8 @@ private:
         RowBlock& block = system_.rows[k];
         const double own = blocks_[k].schur[7 * i], old = block.multiplier[i];
         if (!(own > 0.0)) return 0.0;
-        block.multiplier[i] = std::clamp(old - row_residual(block, i, system_.velocity) / own, block.lower[i], block.upper[i]);
+        block.multiplier[i] =
+            std::clamp(old - row_residual(block, i, system_.velocity) / own, block.lower[i], block.upper[i]);
         push(k, i, block.multiplier[i] - old);
         return std::abs(block.multiplier[i] - old) * own;
     }
@@ -122,7 +124,9 @@ private:
         const PreparedBlock& prepared = blocks_[k];
         const FrictionPoint& point = points_[prepared.point];
         if (model_ != FrictionModel::cone) {
-            const double bound = point.coefficient * std::max(0.0, model_ == FrictionModel::box ? point.normal : block.multiplier[0]);
+            const double bound =
+                point.coefficient *
+                std::max(0.0, model_ == FrictionModel::box ? point.normal : block.multiplier[0]);
             double change = 0.0;
             for (int i = 1; i <= 2; ++i) {
                 block.lower[i] = -bound;

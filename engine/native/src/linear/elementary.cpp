@@ -41,7 +41,8 @@ SineCosine near_zero(Twin r) noexcept {
     for (int n = 17; n >= 5; n -= 4) p = z * (z * p + 1.0 / factorial(n)) - 1.0 / factorial(n - 2);
     for (int n = 18; n >= 6; n -= 4) q = 1.0 / factorial(n - 2) - z * (1.0 / factorial(n) - z * q);
     const double sine = x + (x * z * p + r.low);
-    const double half = 0.5 * z, rough = 1.0 - half;  // the cosine's largest error is that of z: carry it along
+    const double half = 0.5 * z,
+                 rough = 1.0 - half;  // the cosine's largest error is that of z: carry it along
     const double lost = ((1.0 - rough) - half) - 0.5 * exact_product(x, x).low;
     return {sine, rough + (lost + (z * z * q - x * r.low))};
 }
@@ -107,7 +108,8 @@ Reduced reduce(double x) noexcept {
         part = {next.high, part.low + next.low};
     }
     const Twin scaled = exact_product(part.high, half_pi.high);
-    const Twin rest = exact_sum(scaled.high, scaled.low + (part.high * half_pi.low + part.low * half_pi.high));
+    const Twin rest =
+        exact_sum(scaled.high, scaled.low + (part.high * half_pi.low + part.low * half_pi.high));
     return {quarters & 3, {sign * rest.high, sign * rest.low}};
 }
 

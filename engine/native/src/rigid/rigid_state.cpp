@@ -29,8 +29,15 @@ Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept {
 }
 
 BodyConstants constants_of(const RigidBodySpec& spec) noexcept {
-    return {spec.motion,      spec.particle,    spec.mass,  spec.inertia, spec.position,
-            spec.orientation, rotation(spec.orientation), spec.force, spec.torque};
+    return {spec.motion,
+            spec.particle,
+            spec.mass,
+            spec.inertia,
+            spec.position,
+            spec.orientation,
+            rotation(spec.orientation),
+            spec.force,
+            spec.torque};
 }
 
 BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept {
@@ -85,7 +92,8 @@ bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
     return true;
 }
 
-void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity, BodyState& state) noexcept {
+void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity,
+              BodyState& state) noexcept {
     state.displacement += h * velocity;
     if (body.particle) return;
     state.turn = unit(turn_of(h, angular_velocity) * state.turn);
