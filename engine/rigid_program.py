@@ -125,7 +125,7 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
         "body_kinds": indices(body_kinds, 2),
         "bodies": table(body_rows, 28),
         "joint_kinds": indices(joint_kinds, 6),
-        "joints": table(joint_rows, 37),
+        "joints": table(joint_rows, 38),
         "spring_ends": indices(spring_ends, 2),
         "springs": table(springs, 9),
         "fields": table(fields, 4),
@@ -199,7 +199,7 @@ def _constraint(
         points = (*scene.anchor(constraint, 0), *scene.anchor(constraint, 1))
         kinds: tuple[int, ...] = (0, first, second, 0, 0, 0)
         softness = (*_six(constraint.compliance), *_six(_or(constraint.damping, default)))
-        return kinds, (*points, *_WORLD_AXES, length, *softness, *[0.0] * 9)
+        return kinds, (*points, *_WORLD_AXES, length, *softness, *[0.0] * 10)
     at = constraint.at
     if at is None:
         end = constraint.between[1] if second >= 0 else constraint.between[0]
@@ -216,6 +216,7 @@ def _constraint(
         [limit.lower, limit.upper, limit.compliance, _or(limit.damping, default)] if limit else [0.0] * 4
     )
     numbers += [spring.stiffness, spring.rest, _or(spring.damping, default)] if spring else [1.0, 0.0, 0.0]
+    numbers.append(limit.restitution if limit else 0.0)
     free = (int(motor is not None), int(limit is not None), int(spring is not None))
     return (_JOINTS[type(constraint)], first, second, *free), tuple(numbers)
 

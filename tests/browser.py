@@ -10,13 +10,15 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 MISSING = "no Chromium with its driver here; .ci/install-system installs both"
+PATIENCE = 60.0  # s, on a machine whose cores are busy; a page that never gets there fails then
+SEEN = """[...document.querySelectorAll('figure.chart')].every((box) => 'drawn' in box.dataset ||
+  !box.checkVisibility() || box.getBoundingClientRect().top > innerHeight)"""
 CHROMES = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -58,6 +60,21 @@ def look(driver: Any, *, width: int = 1280, height: int = 900, dark: bool = Fals
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
 
 
+def arrive(driver: Any, address: str) -> None:
+    """Open a page and wait until it says that its scripts have run."""
+    driver.get(address)
+    there = "location.href.split('#')[0] === arguments[0] && 'ready' in document.documentElement.dataset"
+    wait_for(driver, there, address.partition("#")[0])
+
+
+def wait_for(driver: Any, condition: str, *arguments: Any) -> None:
+    """Wait until a condition of JavaScript holds; a busy machine may take its time."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    waiting = WebDriverWait(driver, PATIENCE, poll_frequency=0.02)
+    waiting.until(lambda d: d.execute_script(f"return {condition};", *arguments), condition)
+
+
 def photograph(page: Path, picture: Path, *, width: int = 1280, most: int = 1500) -> None:
     """A picture of a page of the website, from its top down to `most` pixels."""
     found = programs()
@@ -65,10 +82,10 @@ def photograph(page: Path, picture: Path, *, width: int = 1280, most: int = 1500
         raise SystemExit(MISSING)
     with browser(*found) as driver:
         look(driver, width=width)
-        driver.get(page.resolve().as_uri())
+        arrive(driver, page.resolve().as_uri())
         tall = driver.execute_script("return document.documentElement.scrollHeight")
         look(driver, width=width, height=min(most, tall))
-        time.sleep(1.0)  # charts are drawn as they come into view
+        wait_for(driver, SEEN)  # charts are drawn as they come into view
         picture.parent.mkdir(parents=True, exist_ok=True)
         driver.save_screenshot(str(picture))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,28 +13,8 @@ from spook_tracker.scalar_tests import cantilever
 from spook_tracker.scalar_tests.beam import scene as beam_scene
 from spook_tracker.scalar_tests.case import Measurement, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from tests.broken_engines import with_scene
 
-RIGID_TESTS = [
-    name
-    for name in CATALOGUE
-    if name
-    in (
-        "beam",
-        "door",
-        "friction",
-        "cantilever",
-        "slip_angle",
-        "force_ratio",
-        "bouncing_ball",
-        "rotating_box",
-        "swinging_door",
-        "lock_ring",
-        "resting_stack",
-        "rolling_sphere",
-        "spinning_top",
-        "motor",
-    )
-]
 SLOW = {("beam", 2000.0)}  # a beam of 250 m takes seconds; every night runs it
 # test, configuration, metric, value known from a closed form or an independent prototype, |difference| allowed
 KNOWN = (
@@ -76,23 +55,7 @@ def test_the_ringing_of_the_printed_door_is_the_known_one() -> None:
     assert abs(abs(printed.measure(simulate)["weight_error_to_65_s"]) - 0.0193) < 5e-5
 
 
-@pytest.mark.parametrize("test", RIGID_TESTS)
-def test_everything_is_green_and_at_its_set_point(test: str) -> None:
-    for measurement in measurements(test):
-        values = measurement.measure(simulate)
-        assert set(values) >= {metric.name for metric in measurement.metrics}
-        for metric in measurement.metrics:
-            value = float(values[metric.name])
-            assert metric.passes(value), (metric.name, value)
-            assert metric.holds_set_point(value), (metric.name, value)
-
-
 # --- a broken engine ------------------------------------------------------------------------------------
-
-
-def with_scene(change: Callable[[Scene], Scene]) -> Simulate:
-    """An engine that simulates another scene than it was given."""
-    return lambda scene, **options: simulate(change(scene), **options)
 
 
 def with_joints(**fields: Any) -> Simulate:

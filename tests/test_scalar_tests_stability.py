@@ -18,13 +18,7 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.oscillator.stability import growth_error, measured_growth, predicted_growth
 
 KINDS = {"settled", "bounded", "growing", "diverged", "not_finite"}
-SLOW = {"map-string", "longest-beam"}  # seconds each; every night runs them
-STUDIES = [
-    (name, study)
-    for name, test in CATALOGUE.items()
-    for study in test.stability
-    if study.name not in SLOW and (name, study.name) != ("beam", "damping-compliance-map")
-]
+STUDIES = [(name, study) for name, test in CATALOGUE.items() for study in test.stability]
 
 
 def study_of(test: str, name: str) -> StabilityStudy:

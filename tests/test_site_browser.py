@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.tracker.analyse import commit_of
-from spook_tracker.tracker.compare import Measured, compare, side_of
-from spook_tracker.tracker.publish import publish
-from tests.browser import MISSING, browser, look, programs
+from spook_tracker.tracker.judge.compare import Measured, compare, side_of
+from spook_tracker.tracker.judge.series_history import commit_of
+from spook_tracker.tracker.website.publish import publish
+from tests.browser import MISSING, arrive, browser, look, programs, wait_for
 from tests.synthetic_history import SEVEN, history
 
 PAGES = (
@@ -55,9 +55,8 @@ let i = 0;
 (function next() {
   if (i === boxes.length) { done(boxes.map((b) => b.querySelectorAll('.main-svg .trace, .main-svg .heatmaplayer image').length)); return; }
   boxes[i].scrollIntoView();
-  const from = Date.now();
-  (function wait() {
-    if (boxes[i].querySelector('.main-svg') || Date.now() - from > 8000) { i += 1; next(); } else { setTimeout(wait, 20); }
+  (function wait() {  // as long as the script may take: the page says when it has drawn
+    if ('drawn' in boxes[i].dataset) { i += 1; next(); } else { setTimeout(wait, 20); }
   })();
 })();
 """
@@ -87,12 +86,16 @@ def driver() -> Iterator[Any]:
         yield opened
 
 
-def visit(driver: Any, site: Path, page: str, **how: Any) -> None:
+def visit(driver: Any, site: Path, page: str, *, scripts: bool = True, **how: Any) -> None:
     """Open a page afresh, with a clean log."""
     look(driver, **how)
     driver.get("about:blank")
     driver.get_log("browser")
-    driver.get((site / page.partition("#")[0]).as_uri() + page[len(page.partition("#")[0]) :])
+    address = (site / page.partition("#")[0]).as_uri() + page[len(page.partition("#")[0]) :]
+    if scripts:
+        arrive(driver, address)
+    else:
+        driver.get(address)
 
 
 def complaints(driver: Any) -> list[str]:
@@ -182,7 +185,7 @@ def test_choosing_versions_changes_the_address_and_the_address_restores_the_choi
     text = driver.execute_script("return document.getElementById('told').innerText")
 
     driver.get("about:blank")
-    driver.get(address)
+    arrive(driver, address)
 
     assert "before=run-spook-0015" in address
     assert "REGRESSED" in text.upper()
@@ -200,7 +203,7 @@ def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
     address = driver.current_url
 
     driver.get("about:blank")
-    driver.get(address)
+    arrive(driver, address)
     driver.execute_async_script(DRAWN)
 
     assert f"z.{name}=1" in address
@@ -216,7 +219,7 @@ def test_the_filter_of_the_index_is_kept_in_the_address(driver: Any, site: Path)
 
     assert driver.execute_script(hidden) == [True]
     driver.execute_script("location.hash = '#q=img'")
-    driver.execute_async_script("setTimeout(arguments[0], 50)")
+    wait_for(driver, "document.getElementById('search').value === 'img'")  # the page has taken it over
     assert driver.execute_script(hidden) == [False]
 
 
@@ -236,7 +239,7 @@ def test_the_reader_chooses_light_or_dark_and_keeps_it(driver: Any, site: Path) 
     visit(driver, site, "tests/pendulum.html")
     driver.execute_async_script(DRAWN)
     driver.execute_script("document.getElementById('theme').click()")
-    driver.get((site / "index.html").as_uri())
+    arrive(driver, (site / "index.html").as_uri())
 
     assert driver.execute_script("return document.documentElement.dataset.theme") == "dark"
     driver.execute_script("localStorage.clear()")
@@ -262,11 +265,11 @@ def test_the_keyboard_reaches_content_links_and_buttons(driver: Any, site: Path)
 def test_without_scripts_tables_and_pictures_remain(driver: Any, site: Path) -> None:
     driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
-        visit(driver, site, "tests/pendulum.html")
+        visit(driver, site, "tests/pendulum.html", scripts=False)
         pictures = driver.find_elements("css selector", "main figure.chart .static svg")
         assert len(pictures) > 6
         assert all(picture.is_displayed() for picture in pictures[:3])
-        visit(driver, site, "compare.html")
+        visit(driver, site, "compare.html", scripts=False)
         assert "→" in driver.find_element("id", "told").text
     finally:
         driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from spook_tracker.tracker import charts
-from spook_tracker.tracker.charts import Band, Chart, Grid, Line
-from spook_tracker.tracker.figures import figure, grid_figure
-from spook_tracker.tracker.svg import grid_picture, picture, sparkline
-from spook_tracker.tracker.templates import environment
+from spook_tracker.tracker.website import charts
+from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line
+from spook_tracker.tracker.website.figures import figure, grid_figure
+from spook_tracker.tracker.website.svg import grid_picture, picture, sparkline
+from spook_tracker.tracker.website.templates import environment
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
 
@@ -52,6 +52,13 @@ def test_a_polar_chart_is_drawn_in_the_plane() -> None:
     assert 0.5 < max(flat.rings) <= flat.reach
 
 
+def test_a_polar_chart_has_no_band_of_heights() -> None:
+    made = chart((2.0, 2.0), polar=True, bands=(Band(low=1.0, high=3.0, name="b"),))
+
+    assert picture(made).bands == []
+    assert picture(chart((2.0, 2.0), bands=made.bands)).bands != []
+
+
 @given(st.lists(NUMBERS, min_size=1, max_size=60))
 def test_dropping_what_stands_still_loses_nothing(values: list[float]) -> None:
     kept = charts.turning(values)
@@ -74,6 +81,8 @@ def test_ticks_are_few_round_and_inside(low: float, width: float) -> None:
     )
 
 
+@example(y=[2.225073858507203e-309], x_scale="linear", y_scale="linear", polar=True)  # a band far outside
+@example(y=[0.0, 5e-324], x_scale="linear", y_scale="log", polar=False)
 @example(y=[2e295, 1e-38], x_scale="linear", y_scale="log", polar=False)  # padding left the doubles here
 @given(
     st.lists(NUMBERS, max_size=12),

@@ -11,19 +11,20 @@ import time
 import pytest
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.database_check import check
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store import connection
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.database_check import check
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 from tests.run_documents import figure, run, run_of
 
 WRITER = """
 import sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run_of
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.record import record
 engine = open_database(sys.argv[1])
 name, count = sys.argv[2], int(sys.argv[3])
 with Session(engine) as session:
@@ -34,6 +35,43 @@ with Session(engine) as session:
 engine.dispose()
 """
 SERIES = 40  # samples in each of its runs
+
+
+AT_ONCE = """
+import os, sys
+from sqlalchemy.orm import Session
+from tests.run_documents import run_of
+from spook_tracker.tracker.store import revisions  # what is imported takes no time any more
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.record import record
+
+def write(name):
+    numbers = range(40) if name % 2 else range(39, -1, -1)
+    for k in range(1):
+        run = run_of({f"series {n} of {k}": n / 7 for n in numbers}, id=f"{name}-{k}", idempotency_key=f"{name}-{k}")
+        engine = open_database(sys.argv[1])
+        with Session(engine) as session:
+            record(session, run)
+        engine.dispose()
+
+start, go = os.pipe()
+children = []
+for name in range(int(sys.argv[2])):
+    child = os.fork()
+    if child == 0:
+        os.close(go)
+        os.read(start, 1)  # until the parent closes its end: all begin at the same moment
+        failed = 1
+        try:
+            write(name)
+            failed = 0
+        except BaseException as error:
+            print(error, flush=True)
+        os._exit(failed)
+    children.append(child)
+os.close(go)
+sys.exit(sum(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children))
+"""
 
 
 def writer(url: str, name: str, count: int) -> subprocess.Popen[str]:
@@ -84,6 +122,23 @@ def test_writers_at_the_same_time_wait_for_each_other(url):
     assert stored_runs(url) == {f"{name}-{number}" for name in ("one", "two") for number in range(10)}
 
 
+@pytest.mark.parametrize("kind", ["sqlite", "postgresql"])
+def test_nine_writers_that_meet_on_a_new_database_lose_nothing(kind, request, tmp_path):
+    """Whoever comes first makes the tables; the others neither take them for something strange nor collide."""
+    for attempt in range(2):
+        url = f"sqlite:///{tmp_path}/{attempt}.db"
+        if kind == "postgresql":
+            url = request.getfixturevalue("postgresql_server").new_database()
+
+        done = subprocess.run(
+            [sys.executable, "-c", AT_ONCE, url, "9"], capture_output=True, text=True, check=False
+        )
+
+        assert done.stdout == ""
+        assert done.returncode == 0, done.stderr
+        assert stored_runs(url) == {f"{name}-{number}" for name in range(9) for number in range(1)}
+
+
 def test_writers_of_the_same_run_store_it_once(url):
     processes = [writer(url, "same", 8) for _ in range(2)]
     for process in processes:
@@ -97,9 +152,9 @@ FULL_DISK = """
 import resource, signal, sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.record import record
 engine = open_database(sys.argv[1])
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -136,7 +191,7 @@ def test_a_full_disk_is_one_sentence_and_costs_nothing_stored(sqlite_url, tmp_pa
 
 
 def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
-    monkeypatch.setattr("tracker.connection.LOCK_TIMEOUT", 0.2)
+    monkeypatch.setattr(connection, "LOCK_TIMEOUT", 0.2)
     engine, other = open_database(sqlite_url), open_database(sqlite_url)
     with Session(engine) as holding, Session(other) as waiting:
         History(holding)  # a transaction of a writer, left open
@@ -148,7 +203,7 @@ def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
 
 def test_a_failure_in_the_middle_leaves_nothing(session, monkeypatch):
     """Samples are written before figures: an error there takes everything back."""
-    from spook_tracker.tracker import rows
+    from spook_tracker.tracker.store import rows
 
     def broken(part):
         raise RuntimeError("the power went")

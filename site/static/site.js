@@ -101,7 +101,7 @@ function drawChart(box) {
   }
   plot.hidden = false;
   box.classList.add("drawn");
-  Plotly.react(plot, data.data.map(dressTrace), layout, CONFIG);
+  Plotly.react(plot, data.data.map(dressTrace), layout, CONFIG).then(() => { box.dataset.drawn = ""; });
   if (!plot.dataset.live) {
     plot.dataset.live = "1";
     plot.on("plotly_relayout", () => {
@@ -220,3 +220,5 @@ switches();
 openDetails();
 late();
 document.querySelectorAll("svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });
+// The page says itself when every script has run: whoever drives it need not guess.
+document.addEventListener("DOMContentLoaded", () => { document.documentElement.dataset.ready = ""; });

@@ -29,21 +29,24 @@ struct Contact {
 class Detection {
 public:
     /// `dynamic` has one entry per body; `excluded` lists pairs of body indices in either order.
-    Detection(std::vector<Collider> colliders, std::vector<char> dynamic, const std::vector<IndexPair>& excluded);
+    Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
+              const std::vector<IndexPair>& excluded);
 
     /// Whether any pair of colliders could ever touch; if not, the stage can be left out.
     bool possible() const noexcept { return possible_; }
 
     /// Replaces `out` by all points with a gap of at most margin[first] + margin[second] [m], in ascending order
     /// of key (so by body, collider and feature). `bodies` and `margin` have one entry per body.
-    void detect(const std::vector<Pose>& bodies, const std::vector<double>& margin, std::vector<Contact>& out);
+    void detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,
+                std::vector<Contact>& out);
 
     /// The same in two calls, for a stage that looks at pairs: the colliders that may come as near as that, as
     /// indices (i, j), i < j, in ascending order; then the points of one pair, in order of feature.
     const std::vector<IndexPair>& near(const std::vector<Pose>& bodies, const std::vector<double>& margin);
     void touch(IndexPair pair, double margin, std::vector<Contact>& out) const;
     /// As touch(), with the bodies of the pair elsewhere.
-    void touch(IndexPair pair, const Pose& first, const Pose& second, double margin, std::vector<Contact>& out) const;
+    void touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
+               std::vector<Contact>& out) const;
     const Collider& collider(int index) const noexcept { return colliders_[index]; }
 
     /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.

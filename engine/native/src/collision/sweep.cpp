@@ -5,13 +5,15 @@
 
 #include "collision/bounds.hpp"
 #include "collision/segment.hpp"
+#include "linear/elementary.hpp"
 
 namespace spook {
 
 namespace {
 
 Segment core(const Primitive& shape, const Pose& at) noexcept {
-    return shape.kind == ShapeKind::capsule ? capsule_core(shape, at) : Segment{at.position, {0.0, 0.0, 1.0}, 0.0};
+    return shape.kind == ShapeKind::capsule ? capsule_core(shape, at)
+                                            : Segment{at.position, {0.0, 0.0, 1.0}, 0.0};
 }
 
 double box_reach(const Primitive& box, const Pose& at, Vec3 n) noexcept {
@@ -24,18 +26,21 @@ Separation from_points(Vec3 between, double radii, Vec3 fallback) noexcept {
     return {distance - radii, distance > 1e-14 * radii ? (1.0 / distance) * between : fallback};
 }
 
-Separation round_round(const Primitive& first, const Pose& at_first, const Primitive& second, const Pose& at_second) noexcept {
+Separation round_round(const Primitive& first, const Pose& at_first, const Primitive& second,
+                       const Pose& at_second) noexcept {
     const double radii = first.radius + second.radius;
     if (first.kind == ShapeKind::sphere && second.kind == ShapeKind::sphere)
         return from_points(at_first.position - at_second.position, radii, {0, 0, 1});
     const Segment one = core(first, at_first), two = core(second, at_second);
     if (one.half == 0.0)
-        return from_points(one.centre - two.at(closest_parameter(two, one.centre)), radii, any_normal_to(two.direction));
+        return from_points(one.centre - two.at(closest_parameter(two, one.centre)), radii,
+                           any_normal_to(two.direction));
     const SegmentPair closest = closest_parameters(one, two);
     return from_points(one.at(closest.first) - two.at(closest.second), radii, any_normal_to(one.direction));
 }
 
-Separation round_box(const Primitive& round, const Pose& at, const Primitive& box, const Pose& at_box) noexcept {
+Separation round_box(const Primitive& round, const Pose& at, const Primitive& box,
+                     const Pose& at_box) noexcept {
     Segment segment = core(round, at);
     segment.centre = local(at_box.rotation, segment.centre - at_box.position);
     segment.direction = local(at_box.rotation, segment.direction);
@@ -44,7 +49,8 @@ Separation round_box(const Primitive& round, const Pose& at, const Primitive& bo
         const SegmentBox closest = closest_to_box(segment, box.half);
         p = segment.at(0.5 * (closest.low + closest.high));
     }
-    const Vec3 on{clamped(p.x, -box.half.x, box.half.x), clamped(p.y, -box.half.y, box.half.y), clamped(p.z, -box.half.z, box.half.z)};
+    const Vec3 on{clamped(p.x, -box.half.x, box.half.x), clamped(p.y, -box.half.y, box.half.y),
+                  clamped(p.z, -box.half.z, box.half.z)};
     const double distance = norm(p - on);
     if (distance > 0.0) return {distance - round.radius, at_box.rotation * ((1.0 / distance) * (p - on))};
     int face = 0;
@@ -55,7 +61,8 @@ Separation round_box(const Primitive& round, const Pose& at, const Primitive& bo
     return {std::abs(p[face]) - box.half[face] - round.radius, at_box.rotation * normal};
 }
 
-Separation box_box(const Primitive& first, const Pose& at_first, const Primitive& second, const Pose& at_second) noexcept {
+Separation box_box(const Primitive& first, const Pose& at_first, const Primitive& second,
+                   const Pose& at_second) noexcept {
     const Vec3 between = at_first.position - at_second.position;
     Separation best{-1e300, {}};
     auto improve = [&](Vec3 n) noexcept {
@@ -74,7 +81,8 @@ Separation box_box(const Primitive& first, const Pose& at_first, const Primitive
     return best;
 }
 
-Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& plane, const Pose& at_plane) noexcept {
+Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& plane,
+                      const Pose& at_plane) noexcept {
     const Vec3 n = at_plane.rotation * plane.normal;
     const double height = dot(n, at.position - at_plane.position);
     switch (shape.kind) {
@@ -93,7 +101,8 @@ double arm(const Mover& m) noexcept {
 
 }  // namespace
 
-Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second, const Pose& at_second) noexcept {
+Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second,
+                      const Pose& at_second) noexcept {
     if (first.kind > second.kind) {
         Separation swapped = separation(second, at_second, first, at_first);
         swapped.normal = -swapped.normal;
@@ -110,7 +119,8 @@ Pose Mover::body_at(double time) const noexcept {
     Pose pose{body.position + time * velocity, body.rotation};
     if (angle == 0.0 || (shape.kind == ShapeKind::sphere && norm(part.position) == 0.0)) return pose;
     const Vec3 n = (1.0 / rate) * spin;
-    const double s = std::sin(angle), c = 1.0 - std::cos(angle);
+    const SineCosine turn = sine_cosine(angle);
+    const double s = turn.sine, c = 1.0 - turn.cosine;
     for (int k = 0; k < 3; ++k) {  // Rodrigues, column by column
         const Vec3 e = column(body.rotation, k), ne = cross(n, e);
         const Vec3 turned = e + s * ne + c * cross(n, ne);
@@ -120,7 +130,8 @@ Pose Mover::body_at(double time) const noexcept {
 }
 
 double first_touch(const Mover& first, const Mover& second, double duration, double slop) noexcept {
-    const double far = norm(first.body.position - second.body.position) + duration * norm(first.velocity - second.velocity);
+    const double far =
+        norm(first.body.position - second.body.position) + duration * norm(first.velocity - second.velocity);
     const auto sweep = [&](const Mover& m, const Mover& other) {
         const double rate = norm(m.spin);
         return rate == 0.0 ? 0.0 : rate * (m.shape.kind == ShapeKind::plane ? far + arm(other) : arm(m));
@@ -133,7 +144,8 @@ double first_touch(const Mover& first, const Mover& second, double duration, dou
         const Separation apart = separation(first.shape, first.at(time), second.shape, second.at(time));
         const double closing = dot(apart.normal, approach), speed = std::max(0.0, closing) + turning;
         if (apart.gap <= -0.5 * slop) {
-            const double back = closing > 0.0 ? apart.gap / closing : 0.0;  // negative: to where the gap is zero
+            const double back =
+                closing > 0.0 ? apart.gap / closing : 0.0;  // negative: to where the gap is zero
             return std::max(0.0, -back < 0.1 * duration ? time + back : time);
         }
         if (!(speed * (duration - time) > apart.gap + slop)) return -1.0;

@@ -12,7 +12,8 @@ struct Separation {
     double gap = 0.0;
     Vec3 normal;
 };
-Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second, const Pose& at_second) noexcept;
+Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second,
+                      const Pose& at_second) noexcept;
 
 /// A shape on a body that moves on steadily from `body`: velocity [m/s] of its centre, spin [rad/s], world axes.
 struct Mover {

@@ -11,7 +11,7 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
+constexpr double closed = 1e-9;   // gaps up to this part of the larger body's radius count as closed
 constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
 std::uint64_t pair_of(IndexPair pair) noexcept {
     return (static_cast<std::uint64_t>(pair.first) << 24) | static_cast<std::uint64_t>(pair.second);
@@ -45,9 +45,11 @@ bool ContactStage::reachable(const Contact& contact) const {
     auto speed = [&](int b) {
         const Vec6 free = sum(velocity_[b], kick_[b]);
         const double spin = std::max(norm(angular(velocity_[b])), norm(angular(free)));
-        return std::max(std::abs(dot(n, linear(velocity_[b]))), std::abs(dot(n, linear(free)))) + spin * radius[b];
+        return std::max(std::abs(dot(n, linear(velocity_[b]))), std::abs(dot(n, linear(free)))) +
+               spin * radius[b];
     };
-    return contact.point.gap <= options_.time_step * (speed(contact.first) + speed(contact.second)) + closed * size(contact);
+    return contact.point.gap <=
+           options_.time_step * (speed(contact.first) + speed(contact.second)) + closed * size(contact);
 }
 
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
@@ -100,7 +102,8 @@ void ContactStage::find_open() {
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
         scratch_.clear();
         detection_.touch(pair, margin_[first.body] + margin_[second.body], scratch_);
-        const bool touching = std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
+        const bool touching =
+            std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
         // Any two shapes apart give a point, if they are near enough to meet; but not boxes corner to corner.
         const bool boxes = first.shape.kind == ShapeKind::box && second.shape.kind == ShapeKind::box;
         if (!touching) {
@@ -136,7 +139,8 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     int found = 0;
     auto moved = [&](int b) {  // an event's bodies have gone part of their way with another velocity
         Pose pose = poses_[b];
-        if (event_time_[b] >= 0.0) pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
+        if (event_time_[b] >= 0.0)
+            pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
         return pose;
     };
     std::erase_if(open_, [&](const IndexPair pair) {
@@ -146,7 +150,8 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
         const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
         const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
-        const double time = first_touch(first, second, h, closed * radius + 2.0 * std::max(depth_[a], depth_[b]));
+        const double time =
+            first_touch(first, second, h, closed * radius + 2.0 * std::max(depth_[a], depth_[b]));
         if (time < 0.0) return false;
         const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
         found += met;
@@ -186,24 +191,31 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
     for (std::size_t k = from; k < points_.size();) {
         const Point point = points_[k];
         std::size_t end = k;
-        while (end < points_.size() && (points_[end].contact.key >> feature_bits) == (point.contact.key >> feature_bits)) ++end;
+        while (end < points_.size() &&
+               (points_[end].contact.key >> feature_bits) == (point.contact.key >> feature_bits))
+            ++end;
         if (point.strike < 0.0 || point.event) {
             k = end;
             continue;
         }
         const Contact& meeting = point.contact;
-        const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)), static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
+        const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
+                             static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
         std::vector<Contact> now;
         detection_.touch(pair, margin_[meeting.first] + margin_[meeting.second], now);
         const std::size_t old = points_.size();
         bool stops = false;
         for (const Contact& contact : now) {
             add_point(contact, poses_[contact.first], poses_[contact.second], point.strike);
-            stops = stops || contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
+            stops =
+                stops ||
+                contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
         }
         if (stops) {
-            std::rotate(points_.begin() + static_cast<std::ptrdiff_t>(end), points_.begin() + static_cast<std::ptrdiff_t>(old), points_.end());
-            points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(k), points_.begin() + static_cast<std::ptrdiff_t>(end));
+            std::rotate(points_.begin() + static_cast<std::ptrdiff_t>(end),
+                        points_.begin() + static_cast<std::ptrdiff_t>(old), points_.end());
+            points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(k),
+                          points_.begin() + static_cast<std::ptrdiff_t>(end));
             k += now.size();
             continue;
         }
@@ -246,7 +258,8 @@ void ContactStage::find_events() {
         const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
         if (point.strike < 0.0) {
             const double approach = -relative(point, contact.point.normal, predicted_, false);
-            if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step) plain[island] = 0;
+            if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
+                plain[island] = 0;
             continue;
         }
         const std::uint64_t pair = (contact.key >> feature_bits) + 1;
@@ -273,7 +286,8 @@ void ContactStage::find_events() {
 
 /// Sorts the points by key and finds each one's predecessor in the step before.
 void ContactStage::order_points() {
-    std::stable_sort(points_.begin(), points_.end(), [](const Point& a, const Point& b) { return a.contact.key < b.contact.key; });
+    std::stable_sort(points_.begin(), points_.end(),
+                     [](const Point& a, const Point& b) { return a.contact.key < b.contact.key; });
     std::size_t old = 0;
     for (Point& point : points_) {
         while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
@@ -297,7 +311,8 @@ void ContactStage::measure_points() {
         if (is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
         } else if (speed > 0.0 && psi > 0.0 && gap + h * (point.approach + point.push) < 0.0) {
-            const double left = psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
+            const double left =
+                psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
         }
         const double kick = norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second]));

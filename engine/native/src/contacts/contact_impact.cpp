@@ -54,14 +54,16 @@ void ContactStage::impact(MixedSystem& system) {
         for (int i = 0; i < block.size; ++i) pushed_by_motion = pushed_by_motion || block.right[i] != 0.0;
         block.right[0] += std::max(0.0, -point.bounce * point.approach);
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
-        if (block.size == 3) friction.push_back({static_cast<int>(hit.rows.size()), point.material.friction, 0.0, -1.0});
+        if (block.size == 3)
+            friction.push_back({static_cast<int>(hit.rows.size()), point.material.friction, 0.0, -1.0});
         hit.rows.push_back(block);
         who.push_back(k);
     }
     std::vector<Vec6> before = hit.momentum;
     for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
     // No step before has anything to say about a blow: the box takes this one's own normal impulses.
-    const FrictionModel model = options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
+    const FrictionModel model =
+        options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
     const MixedSystem start = hit;
     const std::vector<FrictionPoint> fresh = friction;
     run(hit, friction, impact_solver_, model);
@@ -94,7 +96,8 @@ void ContactStage::impact(MixedSystem& system) {
     auto impulse_of = [](const RowBlock& block) {
         Vec3 impulse;  // the solver may have turned the tangents: read them from the rows
         for (int i = 0; i < block.size; ++i)
-            impulse += block.multiplier[i] * (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
+            impulse += block.multiplier[i] * (block.first >= 0 ? linear(block.first_jacobian[i])
+                                                               : -linear(block.second_jacobian[i]));
         return impulse;
     };
     for (std::size_t j = 0; j < who.size(); ++j) {
@@ -133,8 +136,8 @@ void ContactStage::after_impact(const MixedSystem& system) {
     if (!successive) {  // who was hit already is not hit again
         impact_needed_ = false;
         for (const Point& point : points_)
-            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.strike >= 0.0 && point.bounce > 0.0 &&
-                                                point.approach < -point.rounding);
+            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.strike >= 0.0 &&
+                                                point.bounce > 0.0 && point.approach < -point.rounding);
         if (impact_rounds_ >= simultaneous_rounds) impact_needed_ = false;
     } else {
         for (const Point& point : points_)

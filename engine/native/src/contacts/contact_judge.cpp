@@ -4,21 +4,20 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "linear/elementary.hpp"
 
 namespace spook {
 
 namespace {
 
-/// (G M⁻¹ Gᵀ + Sig) of one row.
+/// About (G M⁻¹ Gᵀ + Sig) of one row: the scale between an impulse and a velocity, off-diagonal inertia left out.
 double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
     double own = block.softness[i];
     for (const bool first : {true, false}) {
         const int body = first ? block.first : block.second;
         if (body < 0) continue;
         const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
-        Vec6 x = jacobian;
-        solve_six(factor_six(system.mass[body]), x);
-        own += dot(jacobian, x);
+        for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
     }
     return own;
 }
@@ -31,7 +30,8 @@ double bounded_residual(const RowBlock& block, int i, double own, const std::vec
 
 }  // namespace
 
-RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
+RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+                           FrictionModel model) {
     RowsResidual worst;
     std::vector<const FrictionPoint*> friction(system.rows.size(), nullptr);
     for (const FrictionPoint& point : points) friction[point.block] = &point;
@@ -45,24 +45,27 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
         }
         if (point) {
             const double own = own_inertia(system, block, 1) + own_inertia(system, block, 2);
-            const double nu = std::max(0.0, model == FrictionModel::box ? point->normal : block.multiplier[0]);
+            const double nu =
+                std::max(0.0, model == FrictionModel::box ? point->normal : block.multiplier[0]);
             const double bound = point->coefficient * nu;
             const double b1 = block.multiplier[1], b2 = block.multiplier[2];
-            double d1 = b1 - slip(block, *point, 1, system.velocity) / own, d2 = b2 - slip(block, *point, 2, system.velocity) / own;
+            double d1 = b1 - slip(block, *point, 1, system.velocity) / own,
+                   d2 = b2 - slip(block, *point, 2, system.velocity) / own;
             if (model == FrictionModel::cone) {
-                const double reach = std::hypot(d1, d2);
+                const double reach = length(d1, d2);
                 if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
             } else {
                 d1 = std::clamp(d1, -bound, bound), d2 = std::clamp(d2, -bound, bound);
             }
-            residual = std::max(residual, own * std::hypot(b1 - d1, b2 - d2));
+            residual = std::max(residual, own * length(b1 - d1, b2 - d2));
         }
         if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
     }
     return worst;
 }
 
-void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPoint>& points, const FrictionReport& report) {
+void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+                         const FrictionReport& report) {
     residual_ = report.residual;
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
@@ -75,7 +78,8 @@ void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPo
     unsettled_by_ = worst.residual;
     const RowBlock& block = system.rows[worst.row];
     const int unknown = std::max(block.first, block.second);
-    unsettled_body_ = static_cast<int>(std::find(unknown_.begin(), unknown_.end(), unknown) - unknown_.begin());
+    unsettled_body_ =
+        static_cast<int>(std::find(unknown_.begin(), unknown_.end(), unknown) - unknown_.begin());
 }
 
 }  // namespace spook

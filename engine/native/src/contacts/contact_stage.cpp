@@ -10,15 +10,19 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;       // of the larger body's radius: a depth that is rounding
+constexpr double closed = 1e-9;        // of the larger body's radius: a depth that is rounding
 constexpr double parting_rate = 15.0;  // 1/s, at most; default damping at 1/60 s asks for 12.6
-constexpr int late_rounds = 3;        // of solves that set others in motion towards a third
+constexpr int late_rounds = 3;         // of solves that set others in motion towards a third
 
 }  // namespace
 
-ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
-                           const ContactOptions& options, std::vector<IndexPair> joints)
-    : detection_(std::move(detection)), materials_(std::move(materials)), unknown_(std::move(unknown)), options_(options),
+ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials,
+                           std::vector<int> unknown, const ContactOptions& options,
+                           std::vector<IndexPair> joints)
+    : detection_(std::move(detection)),
+      materials_(std::move(materials)),
+      unknown_(std::move(unknown)),
+      options_(options),
       joints_(std::move(joints)) {
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
         solver->floor = options.floor;
@@ -37,7 +41,8 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
             if (body >= 0) jointed_[body] = 1;
 }
 
-double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const {
+double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
+                              bool only_prescribed) const {
     const Contact& contact = point.contact;
     double total = 0.0;
     if (!only_prescribed || unknown_[contact.first] < 0)
@@ -53,7 +58,8 @@ RowBlock ContactStage::row_block(const Point& point, bool tangents) const {
     block.first = unknown_[contact.first];
     block.second = unknown_[contact.second];
     block.size = tangents ? 3 : 1;
-    const Vec3 directions[3] = {contact.point.normal, point.tangent, cross(contact.point.normal, point.tangent)};
+    const Vec3 directions[3] = {contact.point.normal, point.tangent,
+                                cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
@@ -63,13 +69,18 @@ RowBlock ContactStage::row_block(const Point& point, bool tangents) const {
     return block;
 }
 
-FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& islands, FrictionModel model) {
+FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
+                                 IslandSolver& islands, FrictionModel model) {
     const ContactOptions& o = options_;
+    if (o.solver == SolverKind::direct && still_right(system, points, model)) return {};
     const FrictionReport report = islands.run(
-        system, points, [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
+        system, points,
+        [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
             switch (o.solver) {
-                case SolverKind::iterative: return solve_iterative(island, own, model, o.iterations, o.residual_tolerance);
-                case SolverKind::hybrid: return solve_hybrid(island, own, model, solver, o.iterations, o.residual_tolerance);
+                case SolverKind::iterative:
+                    return solve_iterative(island, own, model, o.iterations, o.residual_tolerance);
+                case SolverKind::hybrid:
+                    return solve_hybrid(island, own, model, solver, o.iterations, o.residual_tolerance);
                 default: return solve_friction_direct(island, own, model, solver);
             }
         });
@@ -98,7 +109,8 @@ RowBlock ContactStage::resting_row(Point& point) const {
     const bool touching = is_closed(point.contact);
     if (!point.event)
         block.right[0] += !touching ? -gap / h
-                                    : -row.violation_gain * std::max(gap, -explained_depth(point)) + row.upsilon * point.approach;
+                                    : -row.violation_gain * std::max(gap, -explained_depth(point)) +
+                                          row.upsilon * point.approach;
     block.softness[0] = row.softness;
     const bool pressed = point.before > 0.0 || point.strike >= 0.0 ||
                          (point.before < 0.0 && (touching || gap + h * (point.approach + point.push) < 0.0));
@@ -148,8 +160,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         touch.normal = block.multiplier[0];
         touch.impact = point.impact;
         Vec3 along;
-        for (int i = 1; i < block.size; ++i)  // the solver may have turned the tangents: read them from the rows
-            along += block.multiplier[i] * (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
+        for (int i = 1; i < block.size;
+             ++i)  // the solver may have turned the tangents: read them from the rows
+            along += block.multiplier[i] *
+                     (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
         touch.impulse = touch.normal * normal + along + point.impact_impulse;
         touch.tangent[0] = dot(along, point.tangent);
         touch.tangent[1] = dot(along, cross(normal, point.tangent));
@@ -198,7 +212,8 @@ void ContactStage::correct_events(const MixedSystem& system) {
         if (u < 0 || event_time_[b] < 0.0 || !held_[u]) continue;
         if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
         for (int i = 0; i < 3; ++i)
-            correction_[u][i] += event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
+            correction_[u][i] +=
+                event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
     }
 }
 
@@ -222,9 +237,11 @@ void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) 
     for (std::size_t k = 0; k < points_.size(); ++k) {
         RowBlock block = row_block(points_[k], false);
         const double gap = points_[k].contact.point.gap;
-        const double ahead = gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
+        const double ahead =
+            gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
         const double excess = -gap - explained_depth(points_[k]);
-        const double rate = std::min(regularise(0.0, points_[k].material.damping, h).violation_gain, parting_rate);
+        const double rate =
+            std::min(regularise(0.0, points_[k].material.damping, h).violation_gain, parting_rate);
         block.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
         block.state[0] = excess > 0.0 ? RowState::free : RowState::at_lower;
         parting.rows.push_back(block);
@@ -245,7 +262,8 @@ Vec3 ContactStage::force(int body, int other) const noexcept {
 }
 
 int ContactStage::count() const noexcept {
-    return static_cast<int>(std::count_if(touches_.begin(), touches_.end(), [](const Touch& t) { return t.active; }));
+    return static_cast<int>(
+        std::count_if(touches_.begin(), touches_.end(), [](const Touch& t) { return t.active; }));
 }
 
 double ContactStage::penetration() const noexcept {

@@ -61,7 +61,7 @@ struct ContactOptions {
     SolverKind solver = SolverKind::direct;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
-    double floor = 1e-12;  // of pivots, in the factor only
+    double floor = 1e-12;               // of pivots, in the factor only
     int refinements = 1;
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
@@ -114,11 +114,11 @@ public:
     /// What this step's contacts did.
     struct Touch {
         Contact contact;
-        Vec3 impulse;          // on the first body, impact and resting, N s
-        double normal = 0.0;   // nu of the resting stage, N s
-        double impact = 0.0;   // normal impulse of the impact, N s
+        Vec3 impulse;                    // on the first body, impact and resting, N s
+        double normal = 0.0;             // nu of the resting stage, N s
+        double impact = 0.0;             // normal impulse of the impact, N s
         double tangent[2] = {0.0, 0.0};  // of the resting stage along world tangents, for a warm start
-        bool active = false;   // pushes, or closed
+        bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
 
@@ -146,7 +146,7 @@ public:
 
 private:
     struct Point {
-        Contact contact;             // of a strike: where it will touch, the gap along that normal
+        Contact contact;  // of a strike: where it will touch, the gap along that normal
         SurfaceMaterial material;
         Vec3 first_arm, second_arm;  // from the centres of mass, m
         Vec3 tangent;                // first tangent along world axes, unit
@@ -164,7 +164,8 @@ private:
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void find_open();
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
-    bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time, const std::vector<Vec6>& velocity, bool late);
+    bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
+                    const std::vector<Vec6>& velocity, bool late);
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
     void order_points();
@@ -172,15 +173,18 @@ private:
     void set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other);
     bool reachable(const Contact& contact) const;
     RowBlock row_block(const Point& point, bool tangents) const;
-    double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const;
+    double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
+                    bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
-    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver, FrictionModel model);
+    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
+                       FrictionModel model);
     void after_impact(const MixedSystem& system);
     void mark_held(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
     bool outrun(const std::vector<Vec6>& velocity);
     RowBlock resting_row(Point& point) const;
-    void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points, const FrictionReport& report);
+    void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+               const FrictionReport& report);
     void correct_events(const MixedSystem& system);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
     double explained_depth(const Point& point) const noexcept;
@@ -197,9 +201,9 @@ private:
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
-    std::vector<IndexPair> open_;   // pairs that may still meet in this step
-    std::vector<char> supported_;   // bodies with a closed contact
-    std::vector<double> depth_;     // of a body's closed contacts, m
+    std::vector<IndexPair> open_;                    // pairs that may still meet in this step
+    std::vector<char> supported_;                    // bodies with a closed contact
+    std::vector<double> depth_;                      // of a body's closed contacts, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;

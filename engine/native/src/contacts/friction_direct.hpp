@@ -17,7 +17,12 @@ namespace spook {
 /// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
 /// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// On return FrictionPoint::normal is the normal impulse.
-FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                                     PivotSolver& solver, int max_rounds = 60);
+FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
+                                     FrictionModel model, PivotSolver& solver, int max_rounds = 60);
+
+/// Whether the multipliers in `system` are the answer already; then system.velocity is filled. At rest those of the
+/// step before are: looking costs one pass over the rows, and no factor. The velocities that follow from them are
+/// M⁻¹ (p + Gᵀ z); the law must hold to what a direct solve reaches itself, 1e-13 of the fastest body's speed.
+bool still_right(MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model);
 
 }  // namespace spook

@@ -28,16 +28,17 @@ struct RigidBodySpec {
 /// Rows of a joint in the order of engine/joints.py, then those of its free coordinate: motor, limit, spring.
 struct JointSpec {
     JointKind kind = JointKind::lock;
-    int first = -1, second = -1;           // body, −1 the world
-    Vec3 first_point, second_point;        // where the joint holds each end at the start, world
-    std::array<Vec3, 3> axes;              // unit, right-handed, at the start; the first is the joint's axis.
-                                           // universal: axis, cross axis, their product
-    double rest_length = 0.0;              // distance
+    int first = -1, second = -1;     // body, −1 the world
+    Vec3 first_point, second_point;  // where the joint holds each end at the start, world
+    std::array<Vec3, 3> axes;        // unit, right-handed, at the start; the first is the joint's axis.
+                                     // universal: axis, cross axis, their product
+    double rest_length = 0.0;        // distance
     std::array<double, 6> compliance{}, damping{};
 
     bool has_motor = false, has_limit = false, has_spring = false;
     double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
     double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
+    double limit_restitution = 0.0;
     double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
 };
 
@@ -52,8 +53,8 @@ constexpr int row_count(JointKind kind) noexcept {
 }
 
 struct RigidSpring {
-    int first = -1, second = -1;      // body, −1 the point
-    Vec3 first_point, second_point;   // world, of ends that are no body
+    int first = -1, second = -1;     // body, −1 the point
+    Vec3 first_point, second_point;  // world, of ends that are no body
     double stiffness = 0.0, rest_length = 0.0, viscosity = 0.0;
 };
 
@@ -72,8 +73,8 @@ struct RigidMethod {
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
     ImpactOrder impacts = ImpactOrder::simultaneous;
-    double unsettled_residual = 0.1;    // m/s
-    bool force_collision = false;       // look for contacts even where none are possible, to measure what it costs
+    double unsettled_residual = 0.1;  // m/s
+    bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs
 };
 
 struct RigidScene {

@@ -52,7 +52,7 @@ public:
     /// concerns, and the largest such residual of the run.
     struct Unsettled {
         int body = -1;
-        std::int64_t step = 0;   // of h, counted from 1
+        std::int64_t step = 0;  // of h, counted from 1
         double residual = 0.0;  // m/s
     };
     const Unsettled& unsettled() const noexcept { return live_.unsettled; }
@@ -84,9 +84,9 @@ public:
 private:
     struct Live {
         LargeArray<BodyState> bodies;
-        int too_fast = -1;   // the first body that turned too fast
+        int too_fast = -1;    // the first body that turned too fast
         int not_solved = -1;  // a body of a system that could not be factored
-        double share = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
+        double share = 0.0;  // how redundant rows share their load: a softness in the factor; −1: they do not
         int contradicted = -1;  // a body held by rows that cannot hold together
         std::int64_t step = 0;  // steps of h done
         Unsettled unsettled;
@@ -139,11 +139,11 @@ private:
     LargeArray<JointSet::State> saved_joints_;
 
     // One step's work.
-    std::vector<Vec3> force_;           // of springs and centres, per body
-    std::vector<int> tied_;             // dynamic bodies that have rows
-    std::vector<int> free_, driven_;    // dynamic bodies that never have rows; kinematic ones
+    std::vector<Vec3> force_;         // of springs and centres, per body
+    std::vector<int> tied_;           // dynamic bodies that have rows
+    std::vector<int> free_, driven_;  // dynamic bodies that never have rows; kinematic ones
     bool tied_are_moved_ = false;
-    std::vector<int> slot_;             // per body: its place among the tied bodies, −1
+    std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     LargeArray<double> right_, solution_, left_;
     struct BlockPlace {
@@ -151,17 +151,17 @@ private:
         bool first_particle = false, second_particle = false;
     };
     std::vector<BlockPlace> places_;
-    LargeArray<double> spare_;         // Jacobians with nowhere else to go, per block 2 × rows × 6
+    LargeArray<double> spare_;  // Jacobians with nowhere else to go, per block 2 × rows × 6
     std::vector<std::size_t> spare_at_;
-    bool mixed_values_ = false;         // whether the last step's rows are in mixed_ or in matrix_
+    bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_, saved_mixed_;
     PivotSolver pivot_;
     std::optional<ContactStage> contacts_, fresh_contacts_;
     ContactStage::Memory saved_contacts_;
-    std::vector<double> share_;         // of a body's forces that is still to act in this step; empty: all of it
+    std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
-    double residual_ = 0.0;             // largest an iterative solve stopped at, m/s
+    double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
     std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;
     StageClock* clock_ = nullptr;
 };

@@ -1,0 +1,81 @@
+"""Engines with one fault each: what they simulate is not quite the scene or the method they were given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from spook_tracker.engine import PLAIN, Scene, simulate
+from spook_tracker.scalar_tests.case import Simulate
+
+
+def with_scene(change: Callable[[Scene], Scene]) -> Simulate:
+    """An engine that simulates another scene than it was given."""
+    return lambda scene, **options: simulate(change(scene), **options)
+
+
+def scaled(thing: Any, factor: float, names: tuple[str, ...]) -> Any:
+    """`thing` with every number or vector of these names times `factor`, wherever it lies inside."""
+    if isinstance(thing, tuple):
+        return tuple(scaled(part, factor, names) for part in thing)
+    if not is_dataclass(thing) or isinstance(thing, type):
+        return thing
+    changed = {}
+    for field in fields(thing):
+        value = getattr(thing, field.name)
+        if field.name in names and isinstance(value, float):
+            changed[field.name] = factor * value
+        elif field.name in names and isinstance(value, tuple) and all(isinstance(v, float) for v in value):
+            changed[field.name] = tuple(factor * part for part in value)
+        elif isinstance(value, tuple) or is_dataclass(value):
+            inside = scaled(value, factor, names)
+            if inside is not value and inside != value:
+                changed[field.name] = inside
+    return replace(thing, **changed) if changed else thing
+
+
+def off_by(factor: float, *names: str) -> Simulate:
+    """An engine that takes these quantities of a scene `factor` times too large."""
+    return with_scene(lambda scene: scaled(scene, factor, names))
+
+
+def deaf(scene: Scene, **options: Any) -> Any:
+    """Ignores every option of the method."""
+    return simulate(scene, **(options | {"method": PLAIN}))
+
+
+def soft(scene: Scene, **options: Any) -> Any:
+    """Gives every joint a compliance of its own."""
+
+    def softened(row: Any) -> Any:
+        return replace(row, compliance=1e-6) if getattr(row, "compliance", None) is not None else row
+
+    return simulate(replace(scene, constraints=tuple(softened(row) for row in scene.constraints)), **options)
+
+
+def restless(scene: Scene, *, time_step: float, **options: Any) -> Any:
+    """Steps 3 % further than it says."""
+    return simulate(scene, time_step=1.03 * time_step, **options)
+
+
+def lopsided(scene: Scene, **options: Any) -> Any:
+    """Has every inertia 1 % off along one axis."""
+
+    def tilted(body: Any) -> Any:
+        inertia = getattr(body, "inertia", None)
+        return replace(body, inertia=(1.01 * inertia[0], *inertia[1:])) if inertia else body
+
+    return simulate(replace(scene, bodies=tuple(tilted(body) for body in scene.bodies)), **options)
+
+
+BROKEN: dict[str, Simulate] = {
+    "soft joints": soft,
+    "deaf to options": deaf,
+    **{
+        f"{name} 3 % too small": off_by(0.97, name)
+        for name in ("friction", "restitution", "strength", "gravity", "stiffness", "force", "speed")
+    },
+    "lopsided": lopsided,
+    "restless clock": restless,
+}
