@@ -27,6 +27,7 @@ check: develop
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/clang-format --dry-run -Werror $$(git ls-files 'engine/native/*.[ch]pp' 'engine/native/*.inl')
 
 mutants: develop
 	$(BIN)/python bench/mutants.py

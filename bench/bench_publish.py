@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from spook_tracker.tracker.publish import publish
+from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import decade
 
 

@@ -18,10 +18,16 @@ from contextlib import contextmanager
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.document import EngineVersion, Machine, RunDocument, Sample, SeriesDefinition
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document.run_document import (
+    EngineVersion,
+    Machine,
+    RunDocument,
+    Sample,
+    SeriesDefinition,
+)
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 
 SERIES = 1000  # in one night
 

@@ -1,4 +1,4 @@
-"""Run revisions on the connection handed over by tracker/revisions.py; there is no second way to connect."""
+"""Run revisions on the connection handed over by tracker/store/revisions.py; there is no second way to connect."""
 
 from alembic import context
 

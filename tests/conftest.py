@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.database import open_database
+from spook_tracker.tracker.store.database import open_database
 from tests import postgresql
 
 

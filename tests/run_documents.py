@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-from spook_tracker.tracker.document import (
+from spook_tracker.tracker.document.run_document import (
     Curve,
     EngineVersion,
     FigureData,

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from spook_tracker.tracker.document import (
+from spook_tracker.tracker.document.run_document import (
     Curve,
     DrawnLink,
     DrawnSolid,
@@ -289,7 +289,7 @@ class _Series:
 
 
 class DocumentHistory:
-    """The reading interface of `tracker.series.History` over documents in memory, oldest first."""
+    """The reading interface of `tracker.store.history.History` over documents in memory, oldest first."""
 
     def __init__(self, documents: Sequence[RunDocument]) -> None:
         self.documents = {d.id: d for d in documents}

@@ -33,6 +33,20 @@ def test_only_the_engine_touches_its_binary() -> None:
     assert outside == []
 
 
+def test_native_code_takes_nothing_from_the_c_library_that_it_may_round_as_it_likes() -> None:
+    """sqrt, abs, round, ldexp and frexp are exact by definition; the others differ between C libraries."""
+    inexact = r"std::(sin|cos|tan|a(sin|cos|tan|tan2)|(sin|cos|tan)h|hypot|pow|exp2?|expm1|log(2|10|1p)?|cbrt|fma)\("
+
+    found = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in sorted((ROOT / "engine" / "native" / "src").rglob("*.[chi]*"))
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if re.search(inexact, line)
+    ]
+
+    assert found == []
+
+
 def test_all_names_of_the_engine_exist_and_are_public() -> None:
     assert len(engine.__all__) == len(set(engine.__all__))
     for name in engine.__all__:

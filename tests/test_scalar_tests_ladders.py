@@ -10,7 +10,7 @@ import pytest
 from spook_tracker.engine import PLAIN, simulate
 from spook_tracker.scalar_tests.case import Configuration, Ladder, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.tracker.order import in_range, observed_order
+from spook_tracker.tracker.document.order import in_range, observed_order
 
 BAND = 0.1
 LADDERS = [

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.tracker.analyse import commit_of
-from spook_tracker.tracker.compare import Measured, compare, side_of
-from spook_tracker.tracker.publish import publish
+from spook_tracker.tracker.judge.compare import Measured, compare, side_of
+from spook_tracker.tracker.judge.series_history import commit_of
+from spook_tracker.tracker.website.publish import publish
 from tests.browser import MISSING, arrive, browser, look, programs, wait_for
 from tests.synthetic_history import SEVEN, history
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from spook_tracker.tracker.accepted import AcceptedError, acceptance, read_accepted
+from spook_tracker.tracker.judge.accepted import AcceptedError, acceptance, read_accepted
 
 ENTRY = """
 [[accepted]]

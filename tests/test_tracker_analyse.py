@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from spook_tracker.tracker.accepted import Accepted
-from spook_tracker.tracker.analyse import Night, judge_history, judge_run, telling
-from spook_tracker.tracker.document import (
+from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
     MapData,
@@ -19,7 +17,9 @@ from spook_tracker.tracker.document import (
     Timing,
     to_number,
 )
-from spook_tracker.tracker.tonight import run_time_histories
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.series_history import Night, judge_history, judge_run, telling
+from spook_tracker.tracker.judge.tonight import run_time_histories
 
 SERIES = SeriesDefinition(
     key="t/c/m",
@@ -252,7 +252,7 @@ def test_nights_between_equal_nights_say_nothing():
 
 
 def test_maps_are_judged_cell_by_cell():
-    from spook_tracker.tracker.analyse import judge_maps
+    from spook_tracker.tracker.judge.series_history import judge_maps
 
     facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
     before = MapData(

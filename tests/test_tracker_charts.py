@@ -11,11 +11,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from spook_tracker.tracker import charts
-from spook_tracker.tracker.charts import Band, Chart, Grid, Line
-from spook_tracker.tracker.figures import figure, grid_figure
-from spook_tracker.tracker.svg import grid_picture, picture, sparkline
-from spook_tracker.tracker.templates import environment
+from spook_tracker.tracker.website import charts
+from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line
+from spook_tracker.tracker.website.figures import figure, grid_figure
+from spook_tracker.tracker.website.svg import grid_picture, picture, sparkline
+from spook_tracker.tracker.website.templates import environment
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
 

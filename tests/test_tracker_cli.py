@@ -13,10 +13,10 @@ import jsonschema
 import pytest
 from click.testing import CliRunner, Result
 
-from spook_tracker.tracker.cli import main
-from spook_tracker.tracker.cli_options import OneLineErrors
-from spook_tracker.tracker.compare_document import compare_schema
-from spook_tracker.tracker.schema import document_schema
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.cli.options import OneLineErrors
+from spook_tracker.tracker.document.schema import document_schema
+from spook_tracker.tracker.judge.comparison_document import compare_schema
 
 ROOT = Path(__file__).resolve().parents[1]
 GOOD, BAD = "a" * 40, "b" * 40
@@ -197,7 +197,7 @@ def test_compare_ends_with_2_for_an_unknown_version_and_for_no_data(two_versions
 
 
 def test_compare_ends_with_3_where_nothing_can_be_compared(monkeypatch, two_versions):
-    monkeypatch.setattr("spook_tracker.tracker.machine.float_environment", lambda: "another")
+    monkeypatch.setattr("spook_tracker.tracker.measure.machine.float_environment", lambda: "another")
     measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
     shown = tracker("compare", "1.1.0", "1.2.0")
 
@@ -281,7 +281,7 @@ def test_errors_are_one_line_that_names_what_to_do(arguments, hint):
 
 
 def test_a_defect_is_one_line_too(monkeypatch):
-    monkeypatch.setattr("spook_tracker.tracker.report_catalogue.catalogue_table", lambda tests: 1 / 0)
+    monkeypatch.setattr("spook_tracker.tracker.cli.report_catalogue.catalogue_table", lambda tests: 1 / 0)
     shown = tracker("list")
 
     assert shown.exit_code == 2

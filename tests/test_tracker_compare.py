@@ -8,10 +8,10 @@ import random
 import msgspec
 import pytest
 
-from spook_tracker.tracker.accepted import Accepted
-from spook_tracker.tracker.compare import Measured, compare
-from spook_tracker.tracker.compare_document import CompareDocument, Side
-from spook_tracker.tracker.document import MapData, Sample, SeriesDefinition, Timing, to_number
+from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, Timing, to_number
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.compare import Measured, compare
+from spook_tracker.tracker.judge.comparison_document import CompareDocument, Side
 
 STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)
 

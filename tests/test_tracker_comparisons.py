@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.tracker import comparisons as module
-from spook_tracker.tracker.comparisons import chosen, comparisons, page_data
-from spook_tracker.tracker.events import all_events
-from spook_tracker.tracker.nights import book
+from spook_tracker.tracker.website import comparisons as module
+from spook_tracker.tracker.website.comparisons import chosen, comparisons, page_data
+from spook_tracker.tracker.website.events import all_events
+from spook_tracker.tracker.website.nights import book
 from tests.synthetic_history import DocumentHistory, document, history
 
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spook_tracker.tracker.data_files import inert, records, table
-from spook_tracker.tracker.templates import embedded, environment
+from spook_tracker.tracker.website.data_files import inert, records, table
+from spook_tracker.tracker.website.templates import embedded, environment
 from tests.synthetic_history import HOSTILE
 
 

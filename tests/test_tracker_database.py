@@ -14,12 +14,12 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.connection import file_system
-from spook_tracker.tracker.database import open_database, shown
-from spook_tracker.tracker.database_check import check
-from spook_tracker.tracker.errors import DatabaseError, UnknownName
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document.errors import DatabaseError, UnknownName
+from spook_tracker.tracker.store.connection import file_system
+from spook_tracker.tracker.store.database import open_database, shown
+from spook_tracker.tracker.store.database_check import check
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 from tests.run_documents import run, run_of
 
 
@@ -76,7 +76,7 @@ def test_every_connection_is_told_what_sqlite_forgets(sqlite_url):
 
 
 def test_a_network_drive_gets_a_journal_that_works_there(sqlite_url, monkeypatch):
-    monkeypatch.setattr("spook_tracker.tracker.connection.file_system", lambda path: "nfs4")
+    monkeypatch.setattr("spook_tracker.tracker.store.connection.file_system", lambda path: "nfs4")
     engine = open_database(sqlite_url)
     with engine.connect() as connection:
         assert connection.execute(text("PRAGMA journal_mode")).scalar_one() == "delete"
@@ -215,10 +215,10 @@ AS_ANOTHER = """
 import os, sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.history import History
 
 History(Session(open_database("sqlite://")))  # everything is imported while we may still read it
 if os.geteuid() == 0:
@@ -269,7 +269,7 @@ def test_a_password_is_never_shown(tmp_path):
 def test_opening_at_head_does_not_import_alembic(file):
     """It takes longer than everything else `tracker compare` does."""
     program = (
-        "import sys; from spook_tracker.tracker.database import open_database; "
+        "import sys; from spook_tracker.tracker.store.database import open_database; "
         f"open_database({str(file)!r}, readonly=True).dispose(); print('alembic' in sys.modules)"
     )
 

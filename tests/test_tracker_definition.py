@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from spook_tracker.tracker.definition import definition_hash
+from spook_tracker.tracker.measure.definition import definition_hash
 
 MODULE = '''"""A question."""
 from spook_tracker.engine.method import Method

@@ -11,20 +11,20 @@ import time
 import pytest
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker import connection
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.database_check import check
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store import connection
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.database_check import check
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 from tests.run_documents import figure, run, run_of
 
 WRITER = """
 import sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run_of
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.record import record
 engine = open_database(sys.argv[1])
 name, count = sys.argv[2], int(sys.argv[3])
 with Session(engine) as session:
@@ -41,9 +41,9 @@ AT_ONCE = """
 import os, sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run_of
-from spook_tracker.tracker import revisions  # what is imported takes no time any more
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store import revisions  # what is imported takes no time any more
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.record import record
 
 def write(name):
     numbers = range(40) if name % 2 else range(39, -1, -1)
@@ -152,9 +152,9 @@ FULL_DISK = """
 import resource, signal, sys
 from sqlalchemy.orm import Session
 from tests.run_documents import run
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.record import record
 engine = open_database(sys.argv[1])
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -203,7 +203,7 @@ def test_a_writer_that_waits_too_long_says_so(sqlite_url, monkeypatch):
 
 def test_a_failure_in_the_middle_leaves_nothing(session, monkeypatch):
     """Samples are written before figures: an error there takes everything back."""
-    from spook_tracker.tracker import rows
+    from spook_tracker.tracker.store import rows
 
     def broken(part):
         raise RuntimeError("the power went")

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.tracker import events
-from spook_tracker.tracker.accepted import Accepted
-from spook_tracker.tracker.events import all_events, events_of, telling_nights
-from spook_tracker.tracker.nights import Book, book
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.website import events
+from spook_tracker.tracker.website.events import all_events, events_of, telling_nights
+from spook_tracker.tracker.website.nights import Book, book
 from tests.synthetic_history import DocumentHistory, document, engine, sample, series
 
 GATE = series("t", "m", role="gate", limit=1.0, unit="m")

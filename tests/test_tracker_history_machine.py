@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.database import open_database, upgrade
-from spook_tracker.tracker.database_check import check
-from spook_tracker.tracker.database_copy import copy_database
-from spook_tracker.tracker.document import to_number
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.retention import drop_old_figures
-from spook_tracker.tracker.revisions import revert
-from spook_tracker.tracker.series import History
-from spook_tracker.tracker.transfer import export_runs, import_files
+from spook_tracker.tracker.document.run_document import to_number
+from spook_tracker.tracker.store.database import open_database, upgrade
+from spook_tracker.tracker.store.database_check import check
+from spook_tracker.tracker.store.database_copy import copy_database
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.retention import drop_old_figures
+from spook_tracker.tracker.store.revisions import revert
+from spook_tracker.tracker.store.transfer import export_runs, import_files
 from tests.run_documents import engine, run_of
 
 COMMITS = [f"{number:x}" * 40 for number in range(1, 7)]  # each the parent of the next

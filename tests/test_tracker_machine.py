@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.tracker import machine as module
-from spook_tracker.tracker.instructions import InstructionCounter, can_count
-from spook_tracker.tracker.machine import float_environment, machine
+from spook_tracker.tracker.measure import machine as module
+from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
+from spook_tracker.tracker.measure.machine import float_environment, machine
 
 
 def test_the_same_machine_has_the_same_fingerprint_and_environment():

@@ -9,14 +9,14 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import DateTime, create_engine, inspect, select, text
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker import models
-from spook_tracker.tracker.database import database_url, head, open_database, upgrade
-from spook_tracker.tracker.database_copy import digest
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.record import record
+from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.revisions import configuration, differences, revert
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.database import database_url, head, open_database, upgrade
+from spook_tracker.tracker.store.database_copy import digest
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.revisions import configuration, differences, revert
 from tests.run_documents import definition, run, run_of, sample
 
 SCRIPTS = ScriptDirectory.from_config(configuration())
@@ -107,8 +107,8 @@ def pretend_a_newer_tracker(monkeypatch, tmp_path, body):
         f"revision = {number!r}\ndown_revision = {REVISIONS[-1]!r}\n\n"
         f"def upgrade():\n{body}\n\ndef downgrade():\n    pass\n"
     )
-    monkeypatch.setattr("spook_tracker.tracker.database.resource", lambda name: folder)
-    monkeypatch.setattr("spook_tracker.tracker.revisions.resource", lambda name: folder)
+    monkeypatch.setattr("spook_tracker.tracker.store.database.resource", lambda name: folder)
+    monkeypatch.setattr("spook_tracker.tracker.store.revisions.resource", lambda name: folder)
     return number
 
 

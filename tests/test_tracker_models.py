@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from sqlalchemy import insert, select
 from sqlalchemy.exc import IntegrityError
 
-from spook_tracker.tracker import models
-from spook_tracker.tracker.border import checked, clean_text
-from spook_tracker.tracker.document import RunDocument, from_number, to_number
-from spook_tracker.tracker.errors import DatabaseError
-from spook_tracker.tracker.models import identity
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.rows import joined, split
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.document.run_document import RunDocument, from_number, to_number
+from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.border import checked, clean_text
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.models import identity
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.rows import joined, split
 from tests.run_documents import KEY, definition, run, sample
 
 ANY_TEXT = st.text(st.characters(), max_size=60)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from spook_tracker.tracker.change_points import change_points
-from spook_tracker.tracker.document import Timing
-from spook_tracker.tracker.noise import judge_noisy
-from spook_tracker.tracker.timing_statistics import compare_times, rank_test
+from spook_tracker.tracker.document.run_document import Timing
+from spook_tracker.tracker.judge.change_points import change_points
+from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.timing_statistics import compare_times, rank_test
 
 
 def noisy(count: int, seed: int, level: float = 1e-3, noise: float = 0.01) -> list[float]:

@@ -17,10 +17,10 @@ import plotly.graph_objects as go
 import plotly.offline
 import pytest
 
-from spook_tracker.tracker.document import to_number
-from spook_tracker.tracker.folder import MARKER, FolderError, replacing
-from spook_tracker.tracker.publish import publish
+from spook_tracker.tracker.document.run_document import to_number
 from spook_tracker.tracker.resources import resource
+from spook_tracker.tracker.website.folder import MARKER, FolderError, replacing
+from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import SEVEN, DocumentHistory, decade, document, history
 
 
@@ -240,7 +240,7 @@ def test_the_site_can_be_swapped_without_exchanging_folders(
     """Where the system cannot exchange two folders in one step, the old one steps aside."""
     out = tmp_path / "public"
     publish(history(1), out)
-    monkeypatch.setattr("spook_tracker.tracker.folder._exchange", lambda one, other: False)
+    monkeypatch.setattr("spook_tracker.tracker.website.folder._exchange", lambda one, other: False)
     publish(history(2), out)
 
     assert (out / MARKER).is_file()

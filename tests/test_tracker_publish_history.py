@@ -6,10 +6,10 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.publish import publish
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import DocumentHistory, document
 
 

@@ -9,12 +9,12 @@ import msgspec
 import pytest
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker import document
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.document import from_number
-from spook_tracker.tracker.errors import DatabaseError, DocumentError
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.document import run_document as document
+from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
+from spook_tracker.tracker.document.run_document import from_number
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 from tests.run_documents import KEY, definition, figure, run, run_of, sample, stability_map
 
 

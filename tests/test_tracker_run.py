@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from spook_tracker.tracker.document import RunDocument, from_number
-from spook_tracker.tracker.run import Request, RunError, Source, ci_address, run
+from spook_tracker.tracker.document.run_document import RunDocument, from_number
+from spook_tracker.tracker.measure.run import Request, RunError, Source, ci_address, run
 
 SOURCE = Source(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
 

@@ -13,9 +13,9 @@ from spook_tracker.engine.joints import Distance, Hinge
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Sphere
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.tracker.document import SceneDrawing
-from spook_tracker.tracker.scene_drawing import drawing
-from spook_tracker.tracker.scenery import scenery, turned
+from spook_tracker.tracker.document.run_document import SceneDrawing
+from spook_tracker.tracker.measure.scene_drawing import drawing
+from spook_tracker.tracker.website.scenery import scenery, turned
 
 HALF_TURN_ABOUT_X = (0.0, 1.0, 0.0, 0.0)
 QUARTER_TURN_ABOUT_Z = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))

@@ -6,9 +6,9 @@ import subprocess
 
 import pytest
 
-from spook_tracker.tracker.ancestry import commit_order
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.series import History
+from spook_tracker.tracker.store.ancestry import commit_order
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
 from tests.run_documents import KEY, definition, engine, run, run_of, sample
 
 A, B, C, D = ("1a" * 20, "2b" * 20, "3c" * 20, "4d" * 20)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from spook_tracker.tracker.nights import book
-from spook_tracker.tracker.stage_times import stage_times
+from spook_tracker.tracker.website.nights import book
+from spook_tracker.tracker.website.stage_times import stage_times
 from tests.synthetic_history import history
 
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from spook_tracker.tracker.order import error_in_time, in_range, observed_order, time_at_error
-from spook_tracker.tracker.timing import MOST_RUNS, Stopwatch, interleaved, once
+from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
+from spook_tracker.tracker.measure.timing import MOST_RUNS, Stopwatch, interleaved, once
 
 
 class Clockwork:

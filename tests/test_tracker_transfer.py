@@ -10,17 +10,17 @@ import pytest
 from sqlalchemy import delete, select, text, update
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker import border, models
-from spook_tracker.tracker.database import open_database
-from spook_tracker.tracker.database_check import check
-from spook_tracker.tracker.database_copy import copy_database
-from spook_tracker.tracker.errors import DatabaseError, DocumentError
-from spook_tracker.tracker.record import record
-from spook_tracker.tracker.retention import drop_old_figures
-from spook_tracker.tracker.schema import document_schema
-from spook_tracker.tracker.series import History
-from spook_tracker.tracker.statistics import statistics
-from spook_tracker.tracker.transfer import encoded, export_runs, import_files, read_document
+from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
+from spook_tracker.tracker.document.schema import document_schema
+from spook_tracker.tracker.store import border, models
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.database_check import check
+from spook_tracker.tracker.store.database_copy import copy_database
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.retention import drop_old_figures
+from spook_tracker.tracker.store.storage_counts import statistics
+from spook_tracker.tracker.store.transfer import encoded, export_runs, import_files, read_document
 from tests.run_documents import KEY, definition, engine, figure, run, run_of, stability_map
 
 
@@ -148,8 +148,8 @@ def test_text_of_other_tools_is_made_storable(written, read):
 
 
 def test_a_file_too_large_is_refused_before_it_is_read_whole(tmp_path, monkeypatch):
-    monkeypatch.setattr("spook_tracker.tracker.transfer.MAX_BYTES", 1000)
-    monkeypatch.setattr("spook_tracker.tracker.border.MAX_BYTES", 1000)
+    monkeypatch.setattr("spook_tracker.tracker.store.transfer.MAX_BYTES", 1000)
+    monkeypatch.setattr("spook_tracker.tracker.store.border.MAX_BYTES", 1000)
     (tmp_path / "a.json").write_bytes(encoded(run()))
 
     with pytest.raises(DocumentError, match="at most 1000"):
@@ -217,7 +217,7 @@ def test_a_copy_into_a_used_database_is_refused(session, url, tmp_path):
 def test_a_copy_that_arrives_changed_is_taken_back(session, url, tmp_path, monkeypatch):
     recorded(session, run())
     session.close()
-    monkeypatch.setattr("spook_tracker.tracker.database_copy.digest", lambda connection, table: None)
+    monkeypatch.setattr("spook_tracker.tracker.store.database_copy.digest", lambda connection, table: None)
 
     with pytest.raises(DatabaseError, match="arrived changed; nothing was copied"):
         copy_database(url, f"sqlite:///{tmp_path}/copy.db")

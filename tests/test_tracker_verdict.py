@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from spook_tracker.tracker.document import MapData, Sample, SeriesDefinition, to_number
-from spook_tracker.tracker.verdict import RANK, Verdict, judge, judge_map, ulp_distance
+from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, to_number
+from spook_tracker.tracker.judge.verdict import RANK, Verdict, judge, judge_map, ulp_distance
 
 
 def series(**facts) -> SeriesDefinition:

@@ -7,8 +7,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from spook_tracker.tracker.errors import UnknownName
-from spook_tracker.tracker.versions import RunInfo, resolve
+from spook_tracker.tracker.document.errors import UnknownName
+from spook_tracker.tracker.store.versions import RunInfo, resolve
 from tests.run_documents import engine, machine
 
 A, B, C = "1a" * 20, "2b" * 20, "3c" * 20

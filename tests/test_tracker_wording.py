@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spook_tracker.tracker import wording
+from spook_tracker.tracker.document import wording
 from tests.synthetic_history import engine, series
 
 

@@ -7,7 +7,7 @@
 
 struct ContactBody {
     spook::Primitive shape;
-    double mass = 1.0;         // kg; 0 does not move
+    double mass = 1.0;             // kg; 0 does not move
     spook::Vec3 inertia{1, 1, 1};  // principal, kg m²
     spook::Vec3 position, velocity, spin;
     spook::Quat turn;
@@ -15,7 +15,9 @@ struct ContactBody {
 };
 
 inline spook::Vec3 box_inertia(double mass, spook::Vec3 size) {
-    return mass / 12.0 * spook::Vec3{size.y * size.y + size.z * size.z, size.x * size.x + size.z * size.z, size.x * size.x + size.y * size.y};
+    return mass / 12.0 *
+           spook::Vec3{size.y * size.y + size.z * size.z, size.x * size.x + size.z * size.z,
+                       size.x * size.x + size.y * size.y};
 }
 
 class ContactWorld {
@@ -81,9 +83,11 @@ public:
             }
             if (b.mass > 0.0) ++u;
             b.position += h * moved;
-            const double angle = h * norm(turned), s = angle > 1e-12 ? std::sin(0.5 * angle) / norm(turned) : 0.5 * h;
+            const double angle = h * norm(turned),
+                         s = angle > 1e-12 ? std::sin(0.5 * angle) / norm(turned) : 0.5 * h;
             b.turn = Quat{std::cos(0.5 * angle), s * turned.x, s * turned.y, s * turned.z} * b.turn;
-            const double n = std::sqrt(b.turn.w * b.turn.w + b.turn.x * b.turn.x + b.turn.y * b.turn.y + b.turn.z * b.turn.z);
+            const double n = std::sqrt(b.turn.w * b.turn.w + b.turn.x * b.turn.x + b.turn.y * b.turn.y +
+                                       b.turn.z * b.turn.z);
             b.turn = {b.turn.w / n, b.turn.x / n, b.turn.y / n, b.turn.z / n};
         }
     }
@@ -106,7 +110,9 @@ public:
     spook::ContactStage stage;
 
 private:
-    static spook::Vec6 packed(const ContactBody& b) { return {b.velocity.x, b.velocity.y, b.velocity.z, b.spin.x, b.spin.y, b.spin.z}; }
+    static spook::Vec6 packed(const ContactBody& b) {
+        return {b.velocity.x, b.velocity.y, b.velocity.z, b.spin.x, b.spin.y, b.spin.z};
+    }
     static spook::Mat6 mass_block(const ContactBody& b, const spook::Mat3& turn) {
         using namespace spook;
         const Mat3 inertia = turn * Mat3::diagonal(b.inertia) * transpose(turn);
@@ -117,7 +123,8 @@ private:
         }
         return m;
     }
-    static spook::ContactStage make(const std::vector<ContactBody>& bodies, const spook::ContactOptions& options) {
+    static spook::ContactStage make(const std::vector<ContactBody>& bodies,
+                                    const spook::ContactOptions& options) {
         using namespace spook;
         std::vector<Collider> colliders;
         std::vector<char> dynamic;

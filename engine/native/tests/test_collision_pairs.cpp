@@ -17,7 +17,8 @@ Pose turned(Vec3 position, Vec3 axis, double angle) {
 }
 void expect_vector(Vec3 v, Vec3 reference, double tolerance, int line) {
     if (norm(v - reference) <= tolerance) return;
-    std::printf("line %d: (%g %g %g) is not (%g %g %g)\n", line, v.x, v.y, v.z, reference.x, reference.y, reference.z);
+    std::printf("line %d: (%g %g %g) is not (%g %g %g)\n", line, v.x, v.y, v.z, reference.x, reference.y,
+                reference.z);
     ++failures;
 }
 #define EXPECT_VECTOR(v, ...) expect_vector(v, __VA_ARGS__, __LINE__)
@@ -32,7 +33,7 @@ void spheres() {
         EXPECT_VECTOR(m.points[0].position, {0, 0, 2.25 * s}, 1e-15 * s);
         EXPECT(collide(one, at(0, 0, 3.5 * s), two, at(0, 0, 0), 0.4 * s).count == 0);
         EXPECT(collide(one, at(0, 3.0 * s, 0), two, at(0, 0, 0), 1e-15 * s).count == 1);  // touching
-        m = collide(one, at(0, 0, 0), two, at(0, 0, 0), 0.0);                       // coincident centres
+        m = collide(one, at(0, 0, 0), two, at(0, 0, 0), 0.0);  // coincident centres
         EXPECT(m.count == 1);
         EXPECT_NEAR(m.points[0].gap, -3.0 * s, 1e-15 * s);
         EXPECT_NEAR(norm(m.points[0].normal), 1.0, 1e-15);
@@ -45,17 +46,20 @@ void planes() {
     EXPECT(m.count == 1);
     EXPECT_NEAR(m.points[0].gap, -0.1, 1e-15);
     EXPECT_VECTOR(m.points[0].position, {5, 6, -0.05}, 1e-15);
-    m = collide(ground, at(0, 0, 0), Primitive::sphere(1.0), at(5, 6, 0.9), 0.0);  // swapped: normal from second
+    m = collide(ground, at(0, 0, 0), Primitive::sphere(1.0), at(5, 6, 0.9),
+                0.0);  // swapped: normal from second
     EXPECT_VECTOR(m.points[0].normal, {0, 0, -1}, 0.0);
 
     m = collide(Primitive::box({1, 2, 4}), at(0, 0, 2), ground, at(0, 0, 0), 0.0);
     EXPECT(m.count == 4);
     for (int k = 0; k < m.count; ++k) EXPECT(m.points[k].gap == 0.0 && m.points[k].normal.z == 1.0);
-    m = collide(Primitive::box({1, 1, 1}), turned({0, 0, 0}, {1, 0, 0}, 0.25 * M_PI), ground, at(0, 0, 0), -0.5);
+    m = collide(Primitive::box({1, 1, 1}), turned({0, 0, 0}, {1, 0, 0}, 0.25 * M_PI), ground, at(0, 0, 0),
+                -0.5);
     EXPECT(m.count == 2);  // on its edge, √½ deep
     EXPECT_NEAR(m.points[0].gap, -std::sqrt(0.5), 1e-15);
 
-    m = collide(Primitive::capsule(0.5, 2.0), turned({0, 0, 0.5}, {0, 1, 0}, 0.5 * M_PI), ground, at(0, 0, 0), 1e-12);
+    m = collide(Primitive::capsule(0.5, 2.0), turned({0, 0, 0.5}, {0, 1, 0}, 0.5 * M_PI), ground, at(0, 0, 0),
+                1e-12);
     EXPECT(m.count == 2);
     m = collide(Primitive::capsule(0.5, 2.0), at(0, 0, 1.4), ground, at(0, 0, 0), 0.0);
     EXPECT(m.count == 1);
@@ -71,7 +75,8 @@ void sphere_and_box() {
     m = collide(ball, at(2, 2, 2), box, at(0, 0, 0), 2.0);  // off a corner
     EXPECT_NEAR(m.points[0].gap, std::sqrt(3.0) - 0.5, 1e-15);
     EXPECT_VECTOR(m.points[0].normal, std::sqrt(1.0 / 3.0) * Vec3{1, 1, 1}, 1e-15);
-    m = collide(ball, at(0, -0.9, 0.1), box, at(0, 0, 0), 0.0);  // centre inside: out through the nearest face
+    m = collide(ball, at(0, -0.9, 0.1), box, at(0, 0, 0),
+                0.0);  // centre inside: out through the nearest face
     EXPECT_NEAR(m.points[0].gap, -0.6, 1e-15);
     EXPECT_VECTOR(m.points[0].normal, {0, -1, 0}, 0.0);
     m = collide(ball, at(0, 0, 0), box, at(0, 0, 0), 0.0);  // coincident centres
@@ -80,7 +85,8 @@ void sphere_and_box() {
 
 void capsules() {
     const Primitive c = Primitive::capsule(0.5, 2.0);
-    Manifold m = collide(c, turned({0, 0, 1.2}, {0, 1, 0}, 0.5 * M_PI), c, turned({0, 0, 0}, {1, 0, 0}, 0.5 * M_PI), 0.5);
+    Manifold m = collide(c, turned({0, 0, 1.2}, {0, 1, 0}, 0.5 * M_PI), c,
+                         turned({0, 0, 0}, {1, 0, 0}, 0.5 * M_PI), 0.5);
     EXPECT(m.count == 1);  // crossing
     EXPECT_NEAR(m.points[0].gap, 0.2, 1e-15);
     EXPECT_VECTOR(m.points[0].normal, {0, 0, 1}, 1e-15);
@@ -174,13 +180,15 @@ void edges_of_boxes() {
     const Primitive unit = Primitive::box({1, 1, 1});
     const double r = std::sqrt(0.5);
     // Two boxes standing on edges, crossed: the upper one's lowest edge along y, the lower one's highest along x.
-    Manifold m = collide(unit, turned({0, 0, 2 * r - 0.01}, {0, 1, 0}, 0.25 * M_PI), unit, turned({0, 0, 0}, {1, 0, 0}, 0.25 * M_PI), 0.0);
+    Manifold m = collide(unit, turned({0, 0, 2 * r - 0.01}, {0, 1, 0}, 0.25 * M_PI), unit,
+                         turned({0, 0, 0}, {1, 0, 0}, 0.25 * M_PI), 0.0);
     EXPECT(m.count == 1);
     EXPECT_NEAR(m.points[0].gap, -0.01, 1e-15);
     EXPECT_VECTOR(m.points[0].normal, {0, 0, 1}, 1e-15);
     EXPECT_VECTOR(m.points[0].position, {0, 0, r - 0.005}, 1e-15);
     // A corner on a face.
-    const Pose corner = turned({0, 0, 0.5 + 0.5 * std::sqrt(3.0) - 0.01}, {1, -1, 0}, std::acos(std::sqrt(1.0 / 3.0)));
+    const Pose corner =
+        turned({0, 0, 0.5 + 0.5 * std::sqrt(3.0) - 0.01}, {1, -1, 0}, std::acos(std::sqrt(1.0 / 3.0)));
     m = collide(unit, corner, unit, at(0, 0, 0), 0.0);
     EXPECT(m.count == 1);
     EXPECT_NEAR(m.points[0].gap, -0.01, 1e-14);
@@ -191,7 +199,8 @@ void edges_of_boxes() {
 double separation(Vec3 half_a, const Pose& a, Vec3 half_b, const Pose& b, Vec3 n) {
     double reach = 0.0;
     for (int i = 0; i < 3; ++i)
-        reach += half_a[i] * std::abs(dot(n, column(a.rotation, i))) + half_b[i] * std::abs(dot(n, column(b.rotation, i)));
+        reach += half_a[i] * std::abs(dot(n, column(a.rotation, i))) +
+                 half_b[i] * std::abs(dot(n, column(b.rotation, i)));
     return dot(n, a.position - b.position) - reach;
 }
 
@@ -201,11 +210,15 @@ void random_boxes_keep_their_promises() {
     auto vector = [&] { return Vec3{unit(random), unit(random), unit(random)}; };
     int touching = 0;
     for (int trial = 0; trial < 20000; ++trial) {
-        const Vec3 half_a{0.2 + std::abs(unit(random)), 0.2 + std::abs(unit(random)), 0.2 + std::abs(unit(random))};
-        const Vec3 half_b{0.2 + std::abs(unit(random)), 0.2 + std::abs(unit(random)), 0.2 + std::abs(unit(random))};
+        const Vec3 half_a{0.2 + std::abs(unit(random)), 0.2 + std::abs(unit(random)),
+                          0.2 + std::abs(unit(random))};
+        const Vec3 half_b{0.2 + std::abs(unit(random)), 0.2 + std::abs(unit(random)),
+                          0.2 + std::abs(unit(random))};
         const Primitive a = Primitive::box(2.0 * half_a), b = Primitive::box(2.0 * half_b);
-        const Pose pa = turned(1.5 * vector(), vector(), 3.0 * unit(random)), pb = turned(vector(), vector(), 3.0 * unit(random));
-        const Manifold m = collide(a, pa, b, pb, 0.0), again = collide(a, pa, b, pb, 0.0), swapped = collide(b, pb, a, pa, 0.0);
+        const Pose pa = turned(1.5 * vector(), vector(), 3.0 * unit(random)),
+                   pb = turned(vector(), vector(), 3.0 * unit(random));
+        const Manifold m = collide(a, pa, b, pb, 0.0), again = collide(a, pa, b, pb, 0.0),
+                       swapped = collide(b, pb, a, pa, 0.0);
         EXPECT(std::memcmp(&m, &again, sizeof m) == 0);
         EXPECT((m.count > 0) == (swapped.count > 0));
         double best = -1e300;  // along sampled directions, faces included
@@ -220,7 +233,8 @@ void random_boxes_keep_their_promises() {
                 for (int j = 0; j < 3; ++j) {
                     const Vec3 axis = cross(column(pa.rotation, i), column(pb.rotation, j));
                     if (norm(axis) < 1e-6) continue;
-                    for (const double sign : {-1.0, 1.0}) best = std::max(best, separation(half_a, pa, half_b, pb, (sign / norm(axis)) * axis));
+                    for (const double sign : {-1.0, 1.0})
+                        best = std::max(best, separation(half_a, pa, half_b, pb, (sign / norm(axis)) * axis));
                 }
             EXPECT(best >= 0.0);
             continue;
@@ -251,12 +265,14 @@ void random_capsules_match_sampling() {
     int apart = 0;
     for (int trial = 0; trial < 3000; ++trial) {
         const Primitive c = Primitive::capsule(0.3, 2.0), box = Primitive::box({1.0, 1.4, 0.8});
-        const Pose pc = turned(2.0 * vector(), vector(), 3.0 * unit(random)), pb = turned({}, vector(), 3.0 * unit(random));
+        const Pose pc = turned(2.0 * vector(), vector(), 3.0 * unit(random)),
+                   pb = turned({}, vector(), 3.0 * unit(random));
         const Manifold m = collide(c, pc, box, pb, 100.0);
         EXPECT(m.count >= 1);
         double sampled = 1e300;
         for (int k = 0; k <= 2000; ++k) {
-            const Vec3 p = local(pb.rotation, pc.position + (k / 1000.0 - 1.0) * column(pc.rotation, 2) - pb.position);
+            const Vec3 p =
+                local(pb.rotation, pc.position + (k / 1000.0 - 1.0) * column(pc.rotation, 2) - pb.position);
             Vec3 out;
             for (int i = 0; i < 3; ++i) out[i] = std::max(0.0, std::abs(p[i]) - box.half[i]);
             sampled = std::min(sampled, norm(out));

@@ -30,7 +30,8 @@ ContactBody box(Vec3 size, Vec3 position, SurfaceMaterial m, double mass = 1.0) 
 
 void one_contact_reverses_its_velocity() {
     for (const double psi : {0.0, 0.3, 0.5, 1.0}) {
-        ContactWorld world({ground(material(0, psi)), ball(0.5, {0, 0, 0.5}, material(0, psi))}, {0, 0, 0}, options());
+        ContactWorld world({ground(material(0, psi)), ball(0.5, {0, 0, 0.5}, material(0, psi))}, {0, 0, 0},
+                           options());
         world.bodies[1].velocity = {0.7, 0, -3.0};
         world.step();
         EXPECT_NEAR(world.bodies[1].velocity.z, 3.0 * psi, 1e-14);
@@ -60,7 +61,8 @@ void impacts_never_raise_the_energy() {
         for (int k = 0; k < 6; ++k) {  // a cluster of touching boxes and balls
             const SurfaceMaterial m = material(0, 0.5 + 0.5 * unit(random));
             const Vec3 where{0.9 * (k % 3), 0.3 * unit(random), 0.5 + 0.95 * (k / 3)};
-            bodies.push_back(k % 2 ? ball(0.5, where, m, std::exp(3 * unit(random))) : box({1, 1, 1}, where, m, std::exp(3 * unit(random))));
+            bodies.push_back(k % 2 ? ball(0.5, where, m, std::exp(3 * unit(random)))
+                                   : box({1, 1, 1}, where, m, std::exp(3 * unit(random))));
             bodies.back().velocity = {unit(random), unit(random), unit(random)};
             bodies.back().spin = {unit(random), unit(random), unit(random)};
         }
@@ -73,12 +75,15 @@ void impacts_never_raise_the_energy() {
 
 void overlapping_starts_are_not_launched() {
     for (const double depth : {1e-3, 0.1, 0.4}) {
-        ContactWorld world({ball(0.5, {0, 0, 0}, material()), ball(0.5, {0, 0, 1.0 - depth}, material())}, {0, 0, 0}, options());
+        ContactWorld world({ball(0.5, {0, 0, 0}, material()), ball(0.5, {0, 0, 1.0 - depth}, material())},
+                           {0, 0, 0}, options());
         for (int k = 0; k < 300; ++k) world.step();
         EXPECT_NEAR(world.bodies[1].velocity.z - world.bodies[0].velocity.z, 0.0, 1e-6);
         EXPECT_NEAR(world.bodies[1].position.z - world.bodies[0].position.z, 1.0, 1e-6);
     }
-    ContactWorld world({ground(material(0.5)), box({1, 1, 1}, {0, 0, 0.3}, material(0.5)), box({1, 1, 1}, {0.1, 0, 1.0}, material(0.5))}, down, options());
+    ContactWorld world({ground(material(0.5)), box({1, 1, 1}, {0, 0, 0.3}, material(0.5)),
+                        box({1, 1, 1}, {0.1, 0, 1.0}, material(0.5))},
+                       down, options());
     double fastest = 0.0;
     for (int k = 0; k < 300; ++k) {
         world.step();
@@ -93,7 +98,8 @@ void resting_depth_is_compliance_times_load() {
     for (const double theta : {0.5, 4.5}) {
         SurfaceMaterial m = material(0, 0, 1e-4);
         m.damping = theta * h;
-        ContactWorld world({ground({0, 0, 0, theta * h, 0}), box({1, 1, 1}, {0, 0, 0.5}, m, 3.0)}, down, options());
+        ContactWorld world({ground({0, 0, 0, theta * h, 0}), box({1, 1, 1}, {0, 0, 0.5}, m, 3.0)}, down,
+                           options());
         for (int k = 0; k < 600; ++k) world.step();
         EXPECT_NEAR(world.bodies[1].position.z - 0.5, -1e-4 * 3.0 * 9.81 / 4.0, 1e-13);
         EXPECT_NEAR(world.stage.force(1, -1).z, 3.0 * 9.81, 1e-9);
@@ -113,7 +119,8 @@ void every_contact_of_a_stack_carries_what_stands_on_it() {
         world.step();
         highest = std::max(highest, world.energy());
         for (int i = 1; i <= count; ++i)
-            worst = std::max(worst, std::abs(world.stage.force(i, i - 1).z / ((count - i + 1) * 2.0 * 9.81) - 1.0));
+            worst = std::max(worst,
+                             std::abs(world.stage.force(i, i - 1).z / ((count - i + 1) * 2.0 * 9.81) - 1.0));
     }
     std::printf("stack: load error %.2g, energy gained %.2g J of %.4g J\n", worst, highest - start, start);
     EXPECT(worst < 1e-9);
@@ -125,7 +132,8 @@ void a_ball_bounces_lower_and_stops() {
     for (const double fine : {1.0, 16.0}) {  // first order: each bounce loses about a g h of speed
         ContactOptions o = options();
         o.time_step = h / fine;
-        ContactWorld world({ground(material(0, e)), ball(0.1, {0, 0, 0.1 + height}, material(0, e))}, down, o);
+        ContactWorld world({ground(material(0, e)), ball(0.1, {0, 0, 0.1 + height}, material(0, e))}, down,
+                           o);
         const double stop = std::sqrt(2.0 * height / g) * (1.0 + e) / (1.0 - e);
         double top = 0.0, before = -1.0, time = 0.0, rest = -1.0;
         int bounces = 0;
@@ -143,7 +151,8 @@ void a_ball_bounces_lower_and_stops() {
         std::printf("bounce h=%g: heights", o.time_step);
         for (double t : tops) std::printf(" %.5f", t);
         std::printf(" (exact .25 .0625 .015625), stop %.4f (exact %.4f)\n", rest, stop);
-        for (std::size_t k = 0; k < tops.size(); ++k) EXPECT_NEAR(tops[k], height * std::pow(e, 2.0 * (k + 1)), 2.0 * o.time_step);
+        for (std::size_t k = 0; k < tops.size(); ++k)
+            EXPECT_NEAR(tops[k], height * std::pow(e, 2.0 * (k + 1)), 2.0 * o.time_step);
         EXPECT_NEAR(rest, stop, 6.0 * o.time_step * (1.0 + std::log2(4.43 / (g * o.time_step)) / 2.0));
         EXPECT(tops.size() == 3);
     }
@@ -159,7 +168,8 @@ void a_perfect_bounce_goes_on() {
         world.step();
         highest = std::max(highest, world.energy());
     }
-    std::printf("perfect bounce: energy %.4f of %.4f after 4 s, at most %.4f\n", world.energy(), start, highest);
+    std::printf("perfect bounce: energy %.4f of %.4f after 4 s, at most %.4f\n", world.energy(), start,
+                highest);
 }
 
 }  // namespace

@@ -69,7 +69,8 @@ Pair moved(Pair pair, double h) {
 }
 
 double row_rate(const double* row, const BodyState& state) {
-    return dot({row[0], row[1], row[2]}, state.velocity) + dot({row[3], row[4], row[5]}, state.angular_velocity);
+    return dot({row[0], row[1], row[2]}, state.velocity) +
+           dot({row[3], row[4], row[5]}, state.angular_velocity);
 }
 
 void rates_are_derivatives_of_violations() {
@@ -80,7 +81,8 @@ void rates_are_derivatives_of_violations() {
             for (int k = 0; k < pair.joint.rows; ++k) {
                 const double slope = (after.rows.violation[k] - before.rows.violation[k]) / 2e-5;
                 EXPECT_NEAR(here.rows.rate[k], slope, 1e-8);
-                const double product = row_rate(here.first + 6 * k, pair.states[0]) + row_rate(here.second + 6 * k, pair.states[1]);
+                const double product = row_rate(here.first + 6 * k, pair.states[0]) +
+                                       row_rate(here.second + 6 * k, pair.states[1]);
                 EXPECT_NEAR(product, here.rows.rate[k], 1e-13);
             }
         }
@@ -90,10 +92,12 @@ void reactions_leave_momentum_and_angular_momentum_alone() {
     for (JointKind kind : kKinds) {
         const Pair pair = disturbed(kind, 0.5);
         const Rows rows(pair);
-        const Vec3 x[2] = {position(pair.bodies[0], pair.states[0]), position(pair.bodies[1], pair.states[1])};
+        const Vec3 x[2] = {position(pair.bodies[0], pair.states[0]),
+                           position(pair.bodies[1], pair.states[1])};
         for (int k = 0; k < pair.joint.rows; ++k) {
             const double *a = rows.first + 6 * k, *b = rows.second + 6 * k;
-            const Vec3 f[2] = {{a[0], a[1], a[2]}, {b[0], b[1], b[2]}}, t[2] = {{a[3], a[4], a[5]}, {b[3], b[4], b[5]}};
+            const Vec3 f[2] = {{a[0], a[1], a[2]}, {b[0], b[1], b[2]}},
+                       t[2] = {{a[3], a[4], a[5]}, {b[3], b[4], b[5]}};
             EXPECT_NEAR(norm(f[0] + f[1]), 0.0, 1e-15);
             EXPECT_NEAR(norm(cross(x[0], f[0]) + t[0] + cross(x[1], f[1]) + t[1]), 0.0, 1e-14);
         }
@@ -134,7 +138,8 @@ void free_motions_violate_nothing() {
         for (int k = 0; k < pair.joint.rows; ++k) EXPECT_NEAR(rows.rows.violation[k], 0.0, 1e-14);
         const AxialRow row = axial_row(pair.joint, pair.states[0], pair.states[1]);
         EXPECT_NEAR(row.coordinate, 2.0, 1e-14);
-        EXPECT_NEAR(row.rate, row_rate(row.first, pair.states[0]) + row_rate(row.second, pair.states[1]), 1e-14);
+        EXPECT_NEAR(row.rate, row_rate(row.first, pair.states[0]) + row_rate(row.second, pair.states[1]),
+                    1e-14);
     }
 }
 

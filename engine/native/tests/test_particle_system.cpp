@@ -51,8 +51,9 @@ void a_step_allocates_nothing() {
         if (kind == 5) scene.rows.clear();
         if (kind >= 6) scene.method.composition = 4;
         if (kind == 7) scene.method.time_step = 0.2;  // steps are halved
-        ParticleProgram program(scene, {{"violation", -1, {}}, {"energy", -1, {}}},
-                                {{0, Reduction::maximum_absolute, 0, -1, false, 1}, {1, Reduction::final, 0, -1, false, 1}});
+        ParticleProgram program(
+            scene, {{"violation", -1, {}}, {"energy", -1, {}}},
+            {{0, Reduction::maximum_absolute, 0, -1, false, 1}, {1, Reduction::final, 0, -1, false, 1}});
         ParticleSystem system(scene);
         system.reset(nullptr);
         system.advance(1);
@@ -145,12 +146,14 @@ void every_way_through_a_step_gives_the_same_bits() {
             for (const int composition : {2, 4})
                 for (const int links : {1, 7}) {
                     ParticleScene scene = chain(links);
-                    scene.bodies.push_back({2.0, {0.0, 5.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 3.0, 0.0}});  // without a row
+                    scene.bodies.push_back(
+                        {2.0, {0.0, 5.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 3.0, 0.0}});  // without a row
                     scene.method.corrections = corrections;
                     scene.method.half_step_velocities = half;
                     scene.method.composition = composition;
                     ParticleProgram silent(scene, {}, {});
-                    ParticleProgram program(scene, {{"energy", -1, {}}}, {{0, Reduction::maximum, 0, -1, false, 1}});
+                    ParticleProgram program(scene, {{"energy", -1, {}}},
+                                            {{0, Reduction::maximum, 0, -1, false, 1}});
                     const RunReport first = program.run(300, 0.0, false), again = program.run(300, 0.0, true);
                     EXPECT(first.state_hash == again.state_hash);
                     EXPECT(first.recordings[0].values == again.recordings[0].values);

@@ -64,7 +64,8 @@ Flat flatten(const MixedSystem& system) {
         flat.lower.push_back(rows[r].block->lower[rows[r].i]);
         flat.upper.push_back(rows[r].block->upper[rows[r].i]);
         for (int b = 0; b < static_cast<int>(system.mass.size()); ++b)
-            for (int a = 0; a < 6; ++a) flat.q[r] += jacobian(rows[r], b)[a] * system.momentum[b][a] / system.mass[b][7 * a];
+            for (int a = 0; a < 6; ++a)
+                flat.q[r] += jacobian(rows[r], b)[a] * system.momentum[b][a] / system.mass[b][7 * a];
         for (std::size_t c = 0; c < n; ++c) {
             for (int b = 0; b < static_cast<int>(system.mass.size()); ++b)
                 for (int a = 0; a < 6; ++a)

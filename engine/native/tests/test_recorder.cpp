@@ -55,13 +55,15 @@ void a_nan_is_never_lost() {
 }
 
 void only_wanted_samples_are_read() {
-    Recorder recorder = recorder_of({{0, Reduction::final, 0, -1, false, 1}, {0, Reduction::final, 0, -1, false, 1}});
+    Recorder recorder =
+        recorder_of({{0, Reduction::final, 0, -1, false, 1}, {0, Reduction::final, 0, -1, false, 1}});
     feed(recorder, std::vector<double>(1000, 1.0));
     EXPECT(recorder.samples_read() == 1);
 }
 
 void a_restored_recorder_forgets_what_came_after() {
-    Recorder recorder = recorder_of({{0, Reduction::maximum, 0, -1, false, 1}, {0, Reduction::trace, 0, -1, false, 1}});
+    Recorder recorder =
+        recorder_of({{0, Reduction::maximum, 0, -1, false, 1}, {0, Reduction::trace, 0, -1, false, 1}});
     recorder.prepare(3);
     now = 1.0;
     recorder.sample(0);

@@ -91,7 +91,8 @@ void a_kinematic_body_turns_at_its_rate() {
     spec.motion = Motion::kinematic;
     spec.velocity = {1, 0, 0};
     const BodyState state = spun(spec, 2.0, 0.5);
-    EXPECT_NEAR(2.0 * std::atan2(state.turn.z, state.turn.w) + 4.0 * std::acos(-1.0), 6.0 + 4.0 * std::acos(-1.0), 1e-14);
+    EXPECT_NEAR(2.0 * std::atan2(state.turn.z, state.turn.w) + 4.0 * std::acos(-1.0),
+                6.0 + 4.0 * std::acos(-1.0), 1e-14);
     EXPECT_NEAR(state.displacement.x, 2.0, 1e-15);
 }
 

@@ -10,12 +10,14 @@
 namespace spook {
 
 std::vector<Observation> to_observations(const std::vector<ObservationTuple>& tuples) {
-    static constexpr const char* NAMES[] = {"trace", "final", "maximum", "minimum", "maximum_absolute", "mean"};
+    static constexpr const char* NAMES[] = {"trace", "final", "maximum", "minimum", "maximum_absolute",
+                                            "mean"};
     std::vector<Observation> observations;
     for (const auto& [quantity, reduction, first, last, from_start, every] : tuples) {
         const auto name = std::find(std::begin(NAMES), std::end(NAMES), reduction);
         if (name == std::end(NAMES)) throw std::invalid_argument("there is no reduction " + reduction);
-        observations.push_back({quantity, static_cast<Reduction>(name - std::begin(NAMES)), first, last, from_start, every});
+        observations.push_back(
+            {quantity, static_cast<Reduction>(name - std::begin(NAMES)), first, last, from_start, every});
     }
     return observations;
 }
@@ -55,11 +57,14 @@ nb::dict to_dict(const RunReport& report) {
 
 NB_MODULE(_core, m) {
     m.doc() = "The native SPOOK engine. Use the names of the package `engine`; this module is a detail.";
-    m.def("build_facts", [] {
-        nanobind::dict facts;
-        for (const auto& [name, text] : spook::build_facts()) facts[name] = text;
-        return facts;
-    }, "What was baked in at build time, all texts; empty where it was not known.");
+    m.def(
+        "build_facts",
+        [] {
+            nanobind::dict facts;
+            for (const auto& [name, text] : spook::build_facts()) facts[name] = text;
+            return facts;
+        },
+        "What was baked in at build time, all texts; empty where it was not known.");
     spook::interrupted = [] {
         nanobind::gil_scoped_acquire hold;
         return PyErr_CheckSignals() != 0;

@@ -12,7 +12,9 @@ namespace {
 /// (kind, index or −1, point)
 using QuantityTuple = std::tuple<std::string, int, std::tuple<double, double, double>>;
 
-Vec3 to_vec(const std::tuple<double, double, double>& t) { return {std::get<0>(t), std::get<1>(t), std::get<2>(t)}; }
+Vec3 to_vec(const std::tuple<double, double, double>& t) {
+    return {std::get<0>(t), std::get<1>(t), std::get<2>(t)};
+}
 
 void expect_columns(const Table& table, std::size_t columns, const char* name) {
     if (table.shape(1) != columns)
@@ -41,8 +43,8 @@ ParticleMethod to_method(const nb::dict& method) {
     return out;
 }
 
-void make(ParticleProgram* self, Table bodies, IndexTable row_ends, Table rows, IndexTable spring_ends, Table springs,
-          Table fields, std::tuple<double, double, double> gravity, const nb::dict& method,
+void make(ParticleProgram* self, Table bodies, IndexTable row_ends, Table rows, IndexTable spring_ends,
+          Table springs, Table fields, std::tuple<double, double, double> gravity, const nb::dict& method,
           const std::vector<QuantityTuple>& quantities, const std::vector<ObservationTuple>& observations) {
     expect_columns(bodies, 10, "bodies");
     expect_columns(rows, 9, "rows");
@@ -61,7 +63,8 @@ void make(ParticleProgram* self, Table bodies, IndexTable row_ends, Table rows, 
     }
     for (std::size_t i = 0; i < springs.shape(0); ++i) {
         const double* s = springs.data() + 9 * i;
-        scene.springs.push_back({{end_of(spring_ends, i, 0, s), end_of(spring_ends, i, 1, s + 3)}, s[6], s[7], s[8]});
+        scene.springs.push_back(
+            {{end_of(spring_ends, i, 0, s), end_of(spring_ends, i, 1, s + 3)}, s[6], s[7], s[8]});
     }
     for (std::size_t i = 0; i < fields.shape(0); ++i)
         scene.fields.push_back({fields.data()[4 * i], vec3(fields.data() + 4 * i + 1)});
@@ -83,15 +86,17 @@ nb::dict run(ParticleProgram& program, std::int64_t steps, double time_limit, bo
 
 void bind_particles(nb::module_& m) {
     nb::class_<ParticleProgram>(m, "ParticleProgram", "A compiled scene of particles.")
-        .def("__init__", &make, nb::arg("bodies"), nb::arg("row_ends"), nb::arg("rows"), nb::arg("spring_ends"),
-             nb::arg("springs"), nb::arg("fields"), nb::arg("gravity"), nb::arg("method"), nb::arg("quantities"),
-             nb::arg("observations"),
-             "bodies (n, 10): mass, position, velocity, load. rows (m, 9): world points of both ends, rest length,\n"
-             "compliance, damping; springs (k, 9): points, stiffness, rest length, viscosity; ends are body indices\n"
-             "or -1 for the point. fields (f, 4): strength, centre. quantities: (kind, index or -1, point).\n"
-             "observations: (quantity, reduction, first, last or -1, from_start, every).")
-        .def("run", &run, nb::arg("steps"), nb::arg("time_limit"), nb::arg("timed"),
-             "Run from the start, the GIL released; a dict with status, recordings, counters, final_state, ...")
+        .def(
+            "__init__", &make, nb::arg("bodies"), nb::arg("row_ends"), nb::arg("rows"),
+            nb::arg("spring_ends"), nb::arg("springs"), nb::arg("fields"), nb::arg("gravity"),
+            nb::arg("method"), nb::arg("quantities"), nb::arg("observations"),
+            "bodies (n, 10): mass, position, velocity, load. rows (m, 9): world points of both ends, rest length,\n"
+            "compliance, damping; springs (k, 9): points, stiffness, rest length, viscosity; ends are body indices\n"
+            "or -1 for the point. fields (f, 4): strength, centre. quantities: (kind, index or -1, point).\n"
+            "observations: (quantity, reduction, first, last or -1, from_start, every).")
+        .def(
+            "run", &run, nb::arg("steps"), nb::arg("time_limit"), nb::arg("timed"),
+            "Run from the start, the GIL released; a dict with status, recordings, counters, final_state, ...")
         .def_prop_ro("solver", &ParticleProgram::solver, "none, path, block or iterative")
         .def_prop_ro("held_twice", &ParticleProgram::held_twice,
                      "whether a path of rows without compliance is held by the world at both ends");

@@ -17,7 +17,8 @@ Vec3 to_vec(const Point& t) { return {std::get<0>(t), std::get<1>(t), std::get<2
 Quat quat(const double* p) noexcept { return {p[0], p[1], p[2], p[3]}; }
 
 void expect_columns(std::size_t found, std::size_t columns, const char* name) {
-    if (found != columns) throw std::invalid_argument(std::string(name) + " needs " + std::to_string(columns) + " columns");
+    if (found != columns)
+        throw std::invalid_argument(std::string(name) + " needs " + std::to_string(columns) + " columns");
 }
 
 RigidBodySpec to_body(const std::int64_t* kind, const double* b) {
@@ -91,8 +92,8 @@ RigidMethod to_method(const nb::dict& method) {
 
 void make(RigidProgram* self, IndexTable body_kinds, Table bodies, IndexTable joint_kinds, Table joints,
           IndexTable spring_ends, Table springs, Table fields, IndexTable collider_kinds, Table colliders,
-          IndexTable no_contact, Point gravity, const nb::dict& method, const std::vector<QuantityTuple>& quantities,
-          const std::vector<ObservationTuple>& observations) {
+          IndexTable no_contact, Point gravity, const nb::dict& method,
+          const std::vector<QuantityTuple>& quantities, const std::vector<ObservationTuple>& observations) {
     expect_columns(body_kinds.shape(1), 2, "body_kinds");
     expect_columns(bodies.shape(1), 28, "bodies");
     expect_columns(joint_kinds.shape(1), 6, "joint_kinds");
@@ -110,14 +111,16 @@ void make(RigidProgram* self, IndexTable body_kinds, Table bodies, IndexTable jo
     for (std::size_t i = 0; i < springs.shape(0); ++i) {
         const double* s = springs.data() + 9 * i;
         const std::int64_t* ends = spring_ends.data() + 2 * i;
-        scene.springs.push_back({static_cast<int>(ends[0]), static_cast<int>(ends[1]), vec3(s), vec3(s + 3), s[6], s[7], s[8]});
+        scene.springs.push_back(
+            {static_cast<int>(ends[0]), static_cast<int>(ends[1]), vec3(s), vec3(s + 3), s[6], s[7], s[8]});
     }
     for (std::size_t i = 0; i < fields.shape(0); ++i)
         scene.fields.push_back({fields.data()[4 * i], vec3(fields.data() + 4 * i + 1)});
     for (std::size_t i = 0; i < colliders.shape(0); ++i)
         scene.colliders.push_back(to_collider(collider_kinds.data() + 2 * i, colliders.data() + 10 * i));
     for (std::size_t i = 0; i < no_contact.shape(0); ++i)
-        scene.no_contact.push_back({static_cast<int>(no_contact.data()[2 * i]), static_cast<int>(no_contact.data()[2 * i + 1])});
+        scene.no_contact.push_back(
+            {static_cast<int>(no_contact.data()[2 * i]), static_cast<int>(no_contact.data()[2 * i + 1])});
     std::vector<QuantityRequest> requests;
     for (const auto& [kind, index, point] : quantities) requests.push_back({kind, index, to_vec(point)});
     new (self) RigidProgram(scene, requests, to_observations(observations));
@@ -136,19 +139,21 @@ nb::dict run(RigidProgram& program, std::int64_t steps, double time_limit, bool 
 
 void bind_rigid(nb::module_& m) {
     nb::class_<RigidProgram>(m, "RigidProgram", "A compiled scene with rigid bodies.")
-        .def("__init__", &make, nb::arg("body_kinds"), nb::arg("bodies"), nb::arg("joint_kinds"), nb::arg("joints"),
-             nb::arg("spring_ends"), nb::arg("springs"), nb::arg("fields"), nb::arg("collider_kinds"),
-             nb::arg("colliders"), nb::arg("no_contact"), nb::arg("gravity"), nb::arg("method"),
-             nb::arg("quantities"), nb::arg("observations"),
-             "body_kinds (n, 2): motion, particle. bodies (n, 28): mass, inertia, position, orientation, velocity,\n"
-             "angular velocity, force, torque, friction, restitution, compliance, damping, slip compliance.\n"
-             "joint_kinds (m, 6): kind, first, second, has motor, limit, spring. joints (m, 37): points of both\n"
-             "ends, three axes, rest length, 6 compliances, 6 dampings, motor speed and force, limit lower, upper,\n"
-             "compliance, damping, spring stiffness, rest, damping. springs and fields as for ParticleProgram.\n"
-             "collider_kinds (c, 2): body, shape (sphere, capsule, box, plane). colliders (c, 10): position and\n"
-             "orientation in the body, then radius, length or edges or normal. no_contact (p, 2): body indices.")
-        .def("run", &run, nb::arg("steps"), nb::arg("time_limit"), nb::arg("timed"),
-             "Run from the start, the GIL released; a dict with status, recordings, counters, final_state, ...")
+        .def(
+            "__init__", &make, nb::arg("body_kinds"), nb::arg("bodies"), nb::arg("joint_kinds"),
+            nb::arg("joints"), nb::arg("spring_ends"), nb::arg("springs"), nb::arg("fields"),
+            nb::arg("collider_kinds"), nb::arg("colliders"), nb::arg("no_contact"), nb::arg("gravity"),
+            nb::arg("method"), nb::arg("quantities"), nb::arg("observations"),
+            "body_kinds (n, 2): motion, particle. bodies (n, 28): mass, inertia, position, orientation, velocity,\n"
+            "angular velocity, force, torque, friction, restitution, compliance, damping, slip compliance.\n"
+            "joint_kinds (m, 6): kind, first, second, has motor, limit, spring. joints (m, 37): points of both\n"
+            "ends, three axes, rest length, 6 compliances, 6 dampings, motor speed and force, limit lower, upper,\n"
+            "compliance, damping, spring stiffness, rest, damping. springs and fields as for ParticleProgram.\n"
+            "collider_kinds (c, 2): body, shape (sphere, capsule, box, plane). colliders (c, 10): position and\n"
+            "orientation in the body, then radius, length or edges or normal. no_contact (p, 2): body indices.")
+        .def(
+            "run", &run, nb::arg("steps"), nb::arg("time_limit"), nb::arg("timed"),
+            "Run from the start, the GIL released; a dict with status, recordings, counters, final_state, ...")
         .def_prop_ro("solver", &RigidProgram::solver, "none, block, pivot or iterative")
         .def_prop_ro("contacts_possible", &RigidProgram::contacts_possible);
 }

@@ -8,9 +8,12 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
     Vec3 half;
     for (int i = 0; i < 3; ++i) switch (shape.kind) {
             case ShapeKind::sphere: half[i] = shape.radius; break;
-            case ShapeKind::capsule: half[i] = shape.half_length * std::abs(at.rotation(i, 2)) + shape.radius; break;
+            case ShapeKind::capsule:
+                half[i] = shape.half_length * std::abs(at.rotation(i, 2)) + shape.radius;
+                break;
             case ShapeKind::box:
-                half[i] = shape.half.x * std::abs(at.rotation(i, 0)) + shape.half.y * std::abs(at.rotation(i, 1)) +
+                half[i] = shape.half.x * std::abs(at.rotation(i, 0)) +
+                          shape.half.y * std::abs(at.rotation(i, 1)) +
                           shape.half.z * std::abs(at.rotation(i, 2));
                 break;
             case ShapeKind::plane: half[i] = std::numeric_limits<double>::infinity(); break;

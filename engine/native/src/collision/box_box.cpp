@@ -21,7 +21,8 @@ Oriented oriented(const Primitive& box, const Pose& at) noexcept {
 }
 
 double reach(const Oriented& box, Vec3 direction) noexcept {
-    return box.half.x * std::abs(dot(direction, box.axis[0])) + box.half.y * std::abs(dot(direction, box.axis[1])) +
+    return box.half.x * std::abs(dot(direction, box.axis[0])) +
+           box.half.y * std::abs(dot(direction, box.axis[1])) +
            box.half.z * std::abs(dot(direction, box.axis[2]));
 }
 
@@ -42,7 +43,8 @@ struct Polygon {
 };
 
 /// Keeps what lies at or below `limit` along u (axis 0) or v (axis 1) times `sign`; `side` numbers the plane.
-Polygon clipped(const Polygon& in, int axis, double sign, double limit, double slop, std::uint32_t side) noexcept {
+Polygon clipped(const Polygon& in, int axis, double sign, double limit, double slop,
+                std::uint32_t side) noexcept {
     Polygon out;
     auto beyond = [&](const Vertex& p) noexcept { return sign * (axis == 0 ? p.u : p.v) - limit; };
     for (int k = 0; k < in.count; ++k) {
@@ -53,7 +55,8 @@ Polygon clipped(const Polygon& in, int axis, double sign, double limit, double s
         if (in0 != in1) {
             const double s = clamped(d0 / (d0 - d1), 0.0, 1.0);
             out.vertices[out.count++] = {from.u + s * (to.u - from.u), from.v + s * (to.v - from.v),
-                                         from.height + s * (to.height - from.height), 8 + 2 * side + (in1 ? 1u : 0u)};
+                                         from.height + s * (to.height - from.height),
+                                         8 + 2 * side + (in1 ? 1u : 0u)};
         }
     }
     return out;
@@ -61,19 +64,23 @@ Polygon clipped(const Polygon& in, int axis, double sign, double limit, double s
 
 /// The manifold of `reference`'s face (axis `face`, outward normal `outward`) against `incident`.
 /// `flip` is −1 if the outward normal points from first to second.
-void add_faces(Manifold& manifold, const Oriented& reference, int face, Vec3 outward, const Oriented& incident,
-               double flip, double margin, double slop, std::uint32_t tag) noexcept {
+void add_faces(Manifold& manifold, const Oriented& reference, int face, Vec3 outward,
+               const Oriented& incident, double flip, double margin, double slop,
+               std::uint32_t tag) noexcept {
     const int iu = (face + 1) % 3, iv = (face + 2) % 3;
     int opposite = 0;  // the incident face that looks most against `outward`
     for (int i = 1; i < 3; ++i)
-        if (std::abs(dot(incident.axis[i], outward)) > std::abs(dot(incident.axis[opposite], outward)) + 1e-9) opposite = i;
+        if (std::abs(dot(incident.axis[i], outward)) > std::abs(dot(incident.axis[opposite], outward)) + 1e-9)
+            opposite = i;
     const double side = dot(incident.axis[opposite], outward) > 0.0 ? -1.0 : 1.0;
     const int ju = (opposite + 1) % 3, jv = (opposite + 2) % 3;
-    const Vec3 middle = incident.centre + side * incident.half[opposite] * incident.axis[opposite] - reference.centre;
+    const Vec3 middle =
+        incident.centre + side * incident.half[opposite] * incident.axis[opposite] - reference.centre;
     Polygon polygon;
     const double signs[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     for (std::uint32_t k = 0; k < 4; ++k) {
-        const Vec3 p = middle + signs[k][0] * incident.half[ju] * incident.axis[ju] + signs[k][1] * incident.half[jv] * incident.axis[jv];
+        const Vec3 p = middle + signs[k][0] * incident.half[ju] * incident.axis[ju] +
+                       signs[k][1] * incident.half[jv] * incident.axis[jv];
         polygon.vertices[polygon.count++] = {dot(p, reference.axis[iu]), dot(p, reference.axis[iv]),
                                              dot(p, outward) - reference.half[face], k};
     }
@@ -87,7 +94,8 @@ void add_faces(Manifold& manifold, const Oriented& reference, int face, Vec3 out
         if (p.height > margin) continue;
         bool repeated = false;
         for (int j = 0; j < k && !repeated; ++j)
-            repeated = std::abs(p.u - polygon.vertices[j].u) <= slop && std::abs(p.v - polygon.vertices[j].v) <= slop;
+            repeated = std::abs(p.u - polygon.vertices[j].u) <= slop &&
+                       std::abs(p.v - polygon.vertices[j].v) <= slop;
         if (repeated) continue;
         const Vec3 position = reference.centre + p.u * reference.axis[iu] + p.v * reference.axis[iv] +
                               (reference.half[face] + 0.5 * p.height) * outward;
@@ -95,12 +103,17 @@ void add_faces(Manifold& manifold, const Oriented& reference, int face, Vec3 out
     }
 }
 
-void add_edges(Manifold& manifold, const Oriented& first, const Oriented& second, const Axis& edge, double margin) noexcept {
+void add_edges(Manifold& manifold, const Oriented& first, const Oriented& second, const Axis& edge,
+               double margin) noexcept {
     Segment one{first.centre, first.axis[edge.first], first.half[edge.first]};
     Segment two{second.centre, second.axis[edge.second], second.half[edge.second]};
     for (int i = 0; i < 3; ++i) {
-        if (i != edge.first) one.centre += (dot(edge.normal, first.axis[i]) > 0.0 ? -first.half[i] : first.half[i]) * first.axis[i];
-        if (i != edge.second) two.centre += (dot(edge.normal, second.axis[i]) > 0.0 ? second.half[i] : -second.half[i]) * second.axis[i];
+        if (i != edge.first)
+            one.centre +=
+                (dot(edge.normal, first.axis[i]) > 0.0 ? -first.half[i] : first.half[i]) * first.axis[i];
+        if (i != edge.second)
+            two.centre +=
+                (dot(edge.normal, second.axis[i]) > 0.0 ? second.half[i] : -second.half[i]) * second.axis[i];
     }
     const SegmentPair closest = closest_parameters(one, two);
     const Vec3 p = one.at(closest.first), q = two.at(closest.second);
@@ -128,7 +141,8 @@ Manifold box_box(const Primitive& first, const Pose& at_first, const Primitive& 
         for (int j = 0; j < 3; ++j) {
             const Vec3 axis = cross(a.axis[i], b.axis[j]);
             const double length = norm(axis);
-            if (length > 1e-4) improve(best_edge, (1.0 / length) * axis, i, j);  // parallel edges are covered by faces
+            if (length > 1e-4)
+                improve(best_edge, (1.0 / length) * axis, i, j);  // parallel edges are covered by faces
         }
     if (best_edge.separation > margin) return {};
 
@@ -142,8 +156,7 @@ Manifold box_box(const Primitive& first, const Pose& at_first, const Primitive& 
     }
     if (best_b.separation > best_a.separation + prefer)
         add_faces(manifold, b, best_b.second, best_b.normal, a, 1.0, margin, slop, 1u << 12);
-    else
-        add_faces(manifold, a, best_a.first, -best_a.normal, b, -1.0, margin, slop, 0);
+    else add_faces(manifold, a, best_a.first, -best_a.normal, b, -1.0, margin, slop, 0);
     // Overlapping, yet no vertex of a face inside the other: only near ties of the axes end here.
     if (manifold.count == 0 && face_separation <= 0.0 && best_edge.separation > -1e300)
         add_edges(manifold, a, b, best_edge, margin);

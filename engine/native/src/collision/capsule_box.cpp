@@ -23,7 +23,8 @@ struct Builder {
     void add(Vec3 surface, Vec3 normal, double height, std::uint32_t feature) noexcept {
         const double gap = height - radius;
         if (gap <= margin)
-            manifold.add(apply(box_pose, surface + 0.5 * gap * normal), box_pose.rotation * normal, gap, feature);
+            manifold.add(apply(box_pose, surface + 0.5 * gap * normal), box_pose.rotation * normal, gap,
+                         feature);
     }
 
     /// Both ends of the part of the core above face `axis`, `sign`; false if there is none.
@@ -66,7 +67,8 @@ struct Builder {
 void add_apart(Builder& builder, const SegmentBox& closest) noexcept {
     const Vec3 half = builder.half;
     const Vec3 p = builder.core.at(0.5 * (closest.low + closest.high));
-    const Vec3 on_box{clamped(p.x, -half.x, half.x), clamped(p.y, -half.y, half.y), clamped(p.z, -half.z, half.z)};
+    const Vec3 on_box{clamped(p.x, -half.x, half.x), clamped(p.y, -half.y, half.y),
+                      clamped(p.z, -half.z, half.z)};
     const Vec3 normal = (1.0 / closest.distance) * (p - on_box);
     for (int i = 0; i < 3; ++i)
         if (std::abs(normal[i]) > 1.0 - 1e-9 && builder.add_face(i, normal[i] > 0.0 ? 1.0 : -1.0)) return;
@@ -74,7 +76,8 @@ void add_apart(Builder& builder, const SegmentBox& closest) noexcept {
     std::uint32_t feature = line ? 25 : 24;
     for (const double t : {closest.low, closest.high}) {
         const Vec3 q = builder.core.at(t);
-        const Vec3 surface{clamped(q.x, -half.x, half.x), clamped(q.y, -half.y, half.y), clamped(q.z, -half.z, half.z)};
+        const Vec3 surface{clamped(q.x, -half.x, half.x), clamped(q.y, -half.y, half.y),
+                           clamped(q.z, -half.z, half.z)};
         builder.add(surface, normal, dot(normal, q - surface), feature++);
         if (!line) return;
     }
@@ -86,7 +89,8 @@ void add_cut(Builder& builder) noexcept {
     int face = 0, cross_axis = -1;
     double best = -1e300;
     for (int i = 0; i < 3; ++i) {
-        const double separation = std::abs(core.centre[i]) - core.half * std::abs(core.direction[i]) - half[i];
+        const double separation =
+            std::abs(core.centre[i]) - core.half * std::abs(core.direction[i]) - half[i];
         if (separation > best) best = separation, face = i;
     }
     const double slop = 1e-4 * std::min({half.x, half.y, half.z});
@@ -112,7 +116,8 @@ void add_cut(Builder& builder) noexcept {
     for (int i = 0; i < 3; ++i)
         if (i != cross_axis) edge.centre[i] = normal[i] < 0.0 ? -half[i] : half[i];
     const SegmentPair closest = closest_parameters(core, edge);
-    builder.add(edge.at(closest.second), normal, dot(normal, core.at(closest.first) - edge.at(closest.second)), 27 + cross_axis);
+    builder.add(edge.at(closest.second), normal,
+                dot(normal, core.at(closest.first) - edge.at(closest.second)), 27 + cross_axis);
 }
 
 }  // namespace
@@ -120,15 +125,17 @@ void add_cut(Builder& builder) noexcept {
 Manifold capsule_box(const Primitive& capsule, const Pose& at, const Primitive& box, const Pose& at_box,
                      double margin) noexcept {
     const Segment world = capsule_core(capsule, at);
-    Builder builder{at_box, box.half, capsule.radius, margin,
-                    {local(at_box.rotation, world.centre - at_box.position), local(at_box.rotation, world.direction), world.half},
+    Builder builder{at_box,
+                    box.half,
+                    capsule.radius,
+                    margin,
+                    {local(at_box.rotation, world.centre - at_box.position),
+                     local(at_box.rotation, world.direction), world.half},
                     {}};
     const SegmentBox closest = closest_to_box(builder.core, box.half);
     if (closest.distance - capsule.radius > margin) return {};
-    if (closest.distance > 1e-9 * capsule.radius)
-        add_apart(builder, closest);
-    else
-        add_cut(builder);
+    if (closest.distance > 1e-9 * capsule.radius) add_apart(builder, closest);
+    else add_cut(builder);
     return builder.manifold;
 }
 

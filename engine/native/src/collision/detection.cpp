@@ -16,9 +16,11 @@ std::uint64_t pair_key(int i, int j) noexcept {
 
 }  // namespace
 
-Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic, const std::vector<IndexPair>& excluded)
+Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
+                     const std::vector<IndexPair>& excluded)
     : colliders_(std::move(colliders)), dynamic_(std::move(dynamic)), radius_(dynamic_.size(), 0.0) {
-    std::stable_sort(colliders_.begin(), colliders_.end(), [](const Collider& a, const Collider& b) { return a.body < b.body; });
+    std::stable_sort(colliders_.begin(), colliders_.end(),
+                     [](const Collider& a, const Collider& b) { return a.body < b.body; });
     for (auto [i, j] : excluded) excluded_.push_back(pair_key(i, j));
     std::sort(excluded_.begin(), excluded_.end());
     for (int k = 0; k < static_cast<int>(colliders_.size()); ++k) {
@@ -41,7 +43,8 @@ Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
 bool Detection::may_touch(int i, int j) const noexcept {
     const int a = colliders_[i].body, b = colliders_[j].body;
     if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;
-    if (colliders_[i].shape.kind == ShapeKind::plane && colliders_[j].shape.kind == ShapeKind::plane) return false;
+    if (colliders_[i].shape.kind == ShapeKind::plane && colliders_[j].shape.kind == ShapeKind::plane)
+        return false;
     return !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
 }
 
@@ -56,9 +59,11 @@ void Detection::add(int i, int j, double margin, std::vector<Contact>& out) cons
     }
 }
 
-void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double>& margin, std::vector<Contact>& out) {
+void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,
+                       std::vector<Contact>& out) {
     out.clear();
-    for (std::size_t k = 0; k < colliders_.size(); ++k) poses_[k] = placed(bodies[colliders_[k].body], colliders_[k].part);
+    for (std::size_t k = 0; k < colliders_.size(); ++k)
+        poses_[k] = placed(bodies[colliders_[k].body], colliders_[k].part);
     for (std::size_t k = 0; k < bounded_.size(); ++k) {
         const Collider& c = colliders_[bounded_[k]];
         bounds_[k] = bounds(c.shape, poses_[bounded_[k]], margin[c.body]);

@@ -29,14 +29,16 @@ struct Contact {
 class Detection {
 public:
     /// `dynamic` has one entry per body; `excluded` lists pairs of body indices in either order.
-    Detection(std::vector<Collider> colliders, std::vector<char> dynamic, const std::vector<IndexPair>& excluded);
+    Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
+              const std::vector<IndexPair>& excluded);
 
     /// Whether any pair of colliders could ever touch; if not, the stage can be left out.
     bool possible() const noexcept { return possible_; }
 
     /// Replaces `out` by all points with a gap of at most margin[first] + margin[second] [m], in ascending order
     /// of key (so by body, collider and feature). `bodies` and `margin` have one entry per body.
-    void detect(const std::vector<Pose>& bodies, const std::vector<double>& margin, std::vector<Contact>& out);
+    void detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,
+                std::vector<Contact>& out);
 
     /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.
     const std::vector<double>& radius() const noexcept { return radius_; }

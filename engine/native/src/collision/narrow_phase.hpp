@@ -18,7 +18,8 @@ Manifold sphere_sphere(const Primitive&, const Pose&, const Primitive&, const Po
 Manifold sphere_capsule(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold sphere_box(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold sphere_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
-Manifold capsule_capsule(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+Manifold capsule_capsule(const Primitive&, const Pose&, const Primitive&, const Pose&,
+                         double margin) noexcept;
 Manifold capsule_box(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold capsule_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold box_box(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;

@@ -28,7 +28,8 @@ void add_balls(Manifold& manifold, Ball first, Ball second, Vec3 fallback, doubl
 Manifold sphere_sphere(const Primitive& first, const Pose& at_first, const Primitive& second,
                        const Pose& at_second, double margin) noexcept {
     Manifold manifold;
-    add_balls(manifold, {at_first.position, first.radius}, {at_second.position, second.radius}, {0, 0, 1}, margin, 0);
+    add_balls(manifold, {at_first.position, first.radius}, {at_second.position, second.radius}, {0, 0, 1},
+              margin, 0);
     return manifold;
 }
 
@@ -37,7 +38,8 @@ Manifold sphere_capsule(const Primitive& sphere, const Pose& at, const Primitive
     Manifold manifold;
     const Segment core = capsule_core(capsule, at_capsule);
     const Vec3 nearest = core.at(closest_parameter(core, at.position));
-    add_balls(manifold, {at.position, sphere.radius}, {nearest, capsule.radius}, any_normal_to(core.direction), margin, 0);
+    add_balls(manifold, {at.position, sphere.radius}, {nearest, capsule.radius},
+              any_normal_to(core.direction), margin, 0);
     return manifold;
 }
 
@@ -56,12 +58,14 @@ Manifold capsule_capsule(const Primitive& first, const Pose& at_first, const Pri
             std::uint32_t feature = 1;
             for (const double t : {low, high}) {
                 const Vec3 p = one.at(t);
-                add_balls(manifold, {p, first.radius}, {two.at(closest_parameter(two, p)), second.radius}, fallback, margin, feature++);
+                add_balls(manifold, {p, first.radius}, {two.at(closest_parameter(two, p)), second.radius},
+                          fallback, margin, feature++);
             }
             return manifold;
         }
     }
-    add_balls(manifold, {one.at(closest.first), first.radius}, {two.at(closest.second), second.radius}, fallback, margin, 0);
+    add_balls(manifold, {one.at(closest.first), first.radius}, {two.at(closest.second), second.radius},
+              fallback, margin, 0);
     return manifold;
 }
 
@@ -69,7 +73,8 @@ Manifold sphere_box(const Primitive& sphere, const Pose& at, const Primitive& bo
                     double margin) noexcept {
     Manifold manifold;
     const Vec3 p = local(at_box.rotation, at.position - at_box.position), half = box.half;
-    const Vec3 inside{clamped(p.x, -half.x, half.x), clamped(p.y, -half.y, half.y), clamped(p.z, -half.z, half.z)};
+    const Vec3 inside{clamped(p.x, -half.x, half.x), clamped(p.y, -half.y, half.y),
+                      clamped(p.z, -half.z, half.z)};
     const Vec3 outward = p - inside;
     const double distance = norm(outward);
     Vec3 normal, surface = inside;
@@ -86,7 +91,8 @@ Manifold sphere_box(const Primitive& sphere, const Pose& at, const Primitive& bo
         height = std::abs(p[face]) - half[face];
     }
     const double gap = height - sphere.radius;
-    if (gap <= margin) manifold.add(apply(at_box, surface + 0.5 * gap * normal), at_box.rotation * normal, gap, 0);
+    if (gap <= margin)
+        manifold.add(apply(at_box, surface + 0.5 * gap * normal), at_box.rotation * normal, gap, 0);
     return manifold;
 }
 

@@ -49,7 +49,8 @@ SegmentBox closest_to_box(const Segment& segment, Vec3 half) noexcept {
 
     const double scale = std::max({half.x, half.y, half.z, segment.half});
     const double flat = 1e-12 * scale;  // slopes below are rounding: parallel to a face
-    auto slope = [&](double t) noexcept { return dot(outside(t), segment.direction); };  // half of d(distance²)/dt
+    // half of d(distance²)/dt
+    auto slope = [&](double t) noexcept { return dot(outside(t), segment.direction); };
     auto crossing = [&](double level) noexcept {  // the first t whose slope reaches `level`, or the far end
         double before = slope(knots[0]);
         if (before >= level) return knots[0];

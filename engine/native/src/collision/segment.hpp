@@ -16,7 +16,9 @@ inline Segment capsule_core(const Primitive& capsule, const Pose& at) noexcept {
     return {at.position, column(at.rotation, 2), capsule.half_length};
 }
 
-inline double clamped(double t, double low, double high) noexcept { return t < low ? low : t > high ? high : t; }
+inline double clamped(double t, double low, double high) noexcept {
+    return t < low ? low : t > high ? high : t;
+}
 
 /// Parameter on `segment` of its point closest to `point`.
 inline double closest_parameter(const Segment& segment, Vec3 point) noexcept {

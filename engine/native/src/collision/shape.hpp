@@ -18,10 +18,10 @@ struct Pose {
 /// One convex primitive; fields not named for a kind are ignored.
 struct Primitive {
     ShapeKind kind = ShapeKind::sphere;
-    double radius = 0.0;           // sphere, capsule, m
-    double half_length = 0.0;      // capsule: half its cylinder, along local z, m
-    Vec3 half;                     // box: half its edges, m
-    Vec3 normal{0.0, 0.0, 1.0};    // plane: unit, out of the solid half-space, local axes
+    double radius = 0.0;         // sphere, capsule, m
+    double half_length = 0.0;    // capsule: half its cylinder, along local z, m
+    Vec3 half;                   // box: half its edges, m
+    Vec3 normal{0.0, 0.0, 1.0};  // plane: unit, out of the solid half-space, local axes
 
     static Primitive sphere(double radius) noexcept { return {ShapeKind::sphere, radius, 0.0, {}, {}}; }
     static Primitive capsule(double radius, double length) noexcept {

@@ -32,7 +32,8 @@ Islands find_islands(const MixedSystem& system) {
     return islands;
 }
 
-FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve) {
+FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points,
+                                 const Solve& solve) {
     const Islands islands = find_islands(system);
     auto solver_of = [&](int first_body) -> PivotSolver& {
         PivotSolver& solver = solvers_[first_body];
@@ -77,7 +78,8 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
 
     FrictionReport sum;
     for (int island = 0; island < islands.count; ++island) {
-        const FrictionReport report = solve(parts[island], part_points[island], solver_of(first_body[island]));
+        const FrictionReport report =
+            solve(parts[island], part_points[island], solver_of(first_body[island]));
         sum.rounds += report.rounds;
         sum.pivots += report.pivots;
         sum.sweeps += report.sweeps;

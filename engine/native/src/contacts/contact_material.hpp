@@ -16,8 +16,9 @@ struct SurfaceMaterial {
 
 /// Friction by the geometric mean, restitution and damping by the larger, compliances by the sum.
 inline SurfaceMaterial combined(const SurfaceMaterial& a, const SurfaceMaterial& b) noexcept {
-    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution), a.compliance + b.compliance,
-            std::max(a.damping, b.damping), a.slip_compliance + b.slip_compliance};
+    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution),
+            a.compliance + b.compliance, std::max(a.damping, b.damping),
+            a.slip_compliance + b.slip_compliance};
 }
 
 }  // namespace spook

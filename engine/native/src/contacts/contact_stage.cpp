@@ -31,9 +31,12 @@ constexpr double closed = 1e-9;  // gaps up to this part of the larger body's ra
 
 }  // namespace
 
-ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
-                           const ContactOptions& options)
-    : detection_(std::move(detection)), materials_(std::move(materials)), unknown_(std::move(unknown)), options_(options) {
+ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials,
+                           std::vector<int> unknown, const ContactOptions& options)
+    : detection_(std::move(detection)),
+      materials_(std::move(materials)),
+      unknown_(std::move(unknown)),
+      options_(options) {
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
@@ -42,7 +45,8 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     prescribed_.assign(unknown_.size(), Vec6{});
 }
 
-double ContactStage::relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const {
+double ContactStage::relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity,
+                              bool only_prescribed) const {
     const Contact& contact = contacts_[k];
     double sum = 0.0;
     if (!only_prescribed || unknown_[contact.first] < 0)
@@ -96,10 +100,12 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         if (is_closed(k)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
         } else if (speed > 0.0 && psi > 0.0 && gap + h * free_approach < 0.0) {
-            const double left = psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
+            const double left =
+                psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
         }
-        const double kick = speed_between(velocity, free_velocity, contact.first) + speed_between(velocity, free_velocity, contact.second);
+        const double kick = speed_between(velocity, free_velocity, contact.first) +
+                            speed_between(velocity, free_velocity, contact.second);
         const double rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
         point.rounding = rounding;
         if (point.bounce > 0.0 && speed > rounding) impact_needed_ = true;
@@ -109,17 +115,20 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     return true;
 }
 
-void ContactStage::drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity) {
+void ContactStage::drop_unreachable(const std::vector<Vec6>& velocity,
+                                    const std::vector<Vec6>& free_velocity) {
     const std::vector<double>& radius = detection_.radius();
     auto speed = [&](int body, Vec3 n) {
         const double spin = std::max(norm(angular(velocity[body])), norm(angular(free_velocity[body])));
-        return std::max(std::abs(dot(n, linear(velocity[body]))), std::abs(dot(n, linear(free_velocity[body])))) +
+        return std::max(std::abs(dot(n, linear(velocity[body]))),
+                        std::abs(dot(n, linear(free_velocity[body])))) +
                spin * radius[body];
     };
     std::erase_if(contacts_, [&](const Contact& contact) {
         const double size = std::max(radius[contact.first], radius[contact.second]);
         const Vec3 n = contact.point.normal;
-        return contact.point.gap > options_.time_step * (speed(contact.first, n) + speed(contact.second, n)) + closed * size;
+        return contact.point.gap >
+               options_.time_step * (speed(contact.first, n) + speed(contact.second, n)) + closed * size;
     });
 }
 
@@ -130,7 +139,8 @@ RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {
     block.first = unknown_[contact.first];
     block.second = unknown_[contact.second];
     block.size = tangents ? 3 : 1;
-    const Vec3 directions[3] = {contact.point.normal, point.tangent, cross(contact.point.normal, point.tangent)};
+    const Vec3 directions[3] = {contact.point.normal, point.tangent,
+                                cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = row(-directions[i], point.second_arm);
@@ -140,13 +150,16 @@ RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {
     return block;
 }
 
-FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& islands) {
+FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
+                                 IslandSolver& islands) {
     const ContactOptions& o = options_;
     const FrictionReport report = islands.run(
         system, points, [&o](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
             switch (o.solver) {
-                case SolverKind::iterative: return solve_iterative(island, own, o.friction, o.iterations, o.residual_tolerance);
-                case SolverKind::hybrid: return solve_hybrid(island, own, o.friction, solver, o.iterations, o.residual_tolerance);
+                case SolverKind::iterative:
+                    return solve_iterative(island, own, o.friction, o.iterations, o.residual_tolerance);
+                case SolverKind::hybrid:
+                    return solve_hybrid(island, own, o.friction, solver, o.iterations, o.residual_tolerance);
                 default: return solve_friction_direct(island, own, o.friction, solver);
             }
         });
@@ -254,15 +267,19 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
         if (point.approach < -point.rounding) point.approach = 0.0;
         block.right[0] += !is_closed(k) ? -gap / h
-                                        : -row.violation_gain * std::max(gap, -explained_depth(k)) + row.upsilon * point.approach;
+                                        : -row.violation_gain * std::max(gap, -explained_depth(k)) +
+                                              row.upsilon * point.approach;
         block.softness[0] = row.softness;
-        const bool pressed = point.before > 0.0 || (point.before < 0.0 && (is_closed(k) || gap + h * (point.approach + point.push) < 0.0));
+        const bool pressed =
+            point.before > 0.0 ||
+            (point.before < 0.0 && (is_closed(k) || gap + h * (point.approach + point.push) < 0.0));
         block.state[0] = pressed ? RowState::free : RowState::at_lower;
         block.multiplier[0] = std::max(0.0, point.before);
         if (block.size == 3) {
             block.softness[1] = block.softness[2] = material.slip_compliance / h;
             for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangent_before[i - 1];
-            friction.push_back({static_cast<int>(system.rows.size()), material.friction, material.slip_compliance / h, point.before});
+            friction.push_back({static_cast<int>(system.rows.size()), material.friction,
+                                material.slip_compliance / h, point.before});
         }
         system.rows.push_back(block);
     }
@@ -275,8 +292,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         Touch& touch = touches_[k];
         touch.normal = block.multiplier[0];
         touch.impulse = (touch.normal + touch.impact) * normal;
-        for (int i = 1; i < block.size; ++i) {  // the solver may have turned the tangents: read them from the rows
-            const Vec3 direction = block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]);
+        for (int i = 1; i < block.size;
+             ++i) {  // the solver may have turned the tangents: read them from the rows
+            const Vec3 direction =
+                block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]);
             touch.impulse += block.multiplier[i] * direction;
         }
         touch.tangent[0] = dot(touch.impulse, points_[k].tangent);
@@ -307,7 +326,8 @@ void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) 
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         RowBlock block = row_block(k, false);
         const double gap = contacts_[k].point.gap;
-        const double ahead = gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
+        const double ahead =
+            gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
         const double excess = -gap - explained_depth(k);
         const double rate = regularise(0.0, points_[k].material.damping, h).violation_gain;
         block.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
@@ -330,7 +350,8 @@ Vec3 ContactStage::force(int body, int other) const noexcept {
 }
 
 int ContactStage::count() const noexcept {
-    return static_cast<int>(std::count_if(touches_.begin(), touches_.end(), [](const Touch& t) { return t.active; }));
+    return static_cast<int>(
+        std::count_if(touches_.begin(), touches_.end(), [](const Touch& t) { return t.active; }));
 }
 
 double ContactStage::penetration() const noexcept {

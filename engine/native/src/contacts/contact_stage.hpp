@@ -40,7 +40,7 @@ struct ContactOptions {
     SolverKind solver = SolverKind::direct;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
-    double floor = 1e-12;  // of pivots, in the factor only
+    double floor = 1e-12;               // of pivots, in the factor only
     int refinements = 1;
 };
 
@@ -85,11 +85,11 @@ public:
     /// What this step's contacts did.
     struct Touch {
         Contact contact;
-        Vec3 impulse;          // on the first body, impact and resting, N s
-        double normal = 0.0;   // nu of the resting stage, N s
-        double impact = 0.0;   // normal impulse of the impact, N s
+        Vec3 impulse;                    // on the first body, impact and resting, N s
+        double normal = 0.0;             // nu of the resting stage, N s
+        double impact = 0.0;             // normal impulse of the impact, N s
         double tangent[2] = {0.0, 0.0};  // along world tangents, for a warm start
-        bool active = false;   // pushes, or closed
+        bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
 
@@ -119,7 +119,8 @@ private:
     /// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
     void drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity);
     RowBlock row_block(std::size_t k, bool tangents) const;
-    double relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity, bool only_prescribed) const;
+    double relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity,
+                    bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver);
     void part_overlaps(const MixedSystem& system, std::size_t joints);

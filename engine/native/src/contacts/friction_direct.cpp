@@ -5,6 +5,8 @@
 
 #include "contacts/friction_acceleration.hpp"
 #include "contacts/friction_sweeps.hpp"
+#include "linear/elementary.hpp"
+#include "linear/vec.hpp"
 
 namespace spook {
 
@@ -12,9 +14,10 @@ namespace {
 
 constexpr double settled = 1e-10;  // of the largest normal impulse
 constexpr double loosest = 1e-6;
-constexpr double reluctance = 0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
+constexpr double reluctance =
+    0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
 constexpr int pivot_rounds = 60;  // a round of the cone need not be exact while its bounds still move
-constexpr int plain_rounds = 3;  // most systems settle within these
+constexpr int plain_rounds = 3;   // most systems settle within these
 
 void bound_tangents(RowBlock& block, double bound) noexcept {
     for (int i = 1; i <= 2; ++i) {
@@ -26,25 +29,28 @@ void bound_tangents(RowBlock& block, double bound) noexcept {
 /// Turns first tangents along the slip that would be without any constraint force.
 void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPoint>& points) {
     std::vector<Vec6> free_velocity = system.momentum;
-    for (std::size_t b = 0; b < system.mass.size(); ++b) solve_six(factor_six(system.mass[b]), free_velocity[b]);
+    for (std::size_t b = 0; b < system.mass.size(); ++b)
+        solve_six(factor_six(system.mass[b]), free_velocity[b]);
     for (const FrictionPoint& point : points) {
         RowBlock& block = system.rows[point.block];
         const double s1 = row_velocity(block, 1, free_velocity) - block.right[1];
         const double s2 = row_velocity(block, 2, free_velocity) - block.right[2];
-        const double speed = std::hypot(s1, s2);
+        const double speed = length(s1, s2);
         if (speed > 0.0) turn_tangents(block, s1 / speed, s2 / speed);
     }
 }
 
 /// Σ over the two tangent rows of (G M⁻¹ Gᵀ)ᵢᵢ + gamma/h: an upper bound of the block's largest eigenvalue.
-double tangent_scale(const RowBlock& block, const FrictionPoint& point, const std::vector<Mat6>& mass_factor) {
+double tangent_scale(const RowBlock& block, const FrictionPoint& point,
+                     const std::vector<Mat6>& mass_factor) {
     double sum = 0.0;
     for (int i = 1; i <= 2; ++i) {
         sum += point.slip_softness;
         Vec6 x = block.first_jacobian[i];
         if (block.first >= 0) solve_six(mass_factor[block.first], x), sum += dot(block.first_jacobian[i], x);
         x = block.second_jacobian[i];
-        if (block.second >= 0) solve_six(mass_factor[block.second], x), sum += dot(block.second_jacobian[i], x);
+        if (block.second >= 0)
+            solve_six(mass_factor[block.second], x), sum += dot(block.second_jacobian[i], x);
     }
     return sum;
 }
@@ -55,20 +61,20 @@ struct Law {
 };
 
 /// Measures the disc law at one point; if it does not hold, prepares the point's next Newton step.
-Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double bound, double accepted, double reluctant,
-              const std::vector<Vec6>& velocity) {
+Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double bound, double accepted,
+              double reluctant, const std::vector<Vec6>& velocity) {
     const double s1 = slip(block, point, 1, velocity), s2 = slip(block, point, 2, velocity);
     const double b1 = block.multiplier[1], b2 = block.multiplier[2];
-    const double d1 = b1 - s1 / scale, d2 = b2 - s2 / scale, reach = std::hypot(d1, d2);
+    const double d1 = b1 - s1 / scale, d2 = b2 - s2 / scale, reach = length(d1, d2);
     const double shrink = reach > bound ? bound / reach : 1.0;
     Law law;
-    law.residual = std::hypot(b1 - shrink * d1, b2 - shrink * d2);
+    law.residual = length(b1 - shrink * d1, b2 - shrink * d2);
     if (law.residual <= accepted) return law;
     const double old_softness = block.softness[2];
     block.softness[1] = block.softness[2] = point.slip_softness;
     if (reach > bound) {
         turn_tangents(block, -d1 / reach, -d2 / reach);
-        if (bound > 0.0) block.softness[2] += std::max(std::hypot(s1, s2) / bound, reluctant * scale);
+        if (bound > 0.0) block.softness[2] += std::max(length(s1, s2) / bound, reluctant * scale);
         block.state[1] = RowState::at_lower;  // beta_1 = −mu nu: against the slip
         block.state[2] = RowState::free;
         law.moved = true;
@@ -81,15 +87,15 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
 
 /// Few systems have no fixed point the rounds can find (wedged bodies); sweeps may. A poor end of the rounds is
 /// replaced in any case: what sweeps leave obeys every bound, so it cannot throw bodies about.
-void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<FrictionPoint>& points, FrictionModel model,
-                      FrictionReport& report) {
+void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<FrictionPoint>& points,
+                      FrictionModel model, FrictionReport& report) {
     if (start.rows.empty()) return;
     constexpr double poor = 1e-4;
     double speed = 0.0;
     for (std::size_t b = 0; b < start.mass.size(); ++b) {
         Vec6 v = start.momentum[b];
         solve_six(factor_six(start.mass[b]), v);
-        speed = std::max(speed, std::hypot(v[0], v[1], v[2]));
+        speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
     }
     std::vector<FrictionPoint> swept_points = points;
     const FrictionReport sweeps = solve_iterative(start, swept_points, model, 1000, 1e-10 * speed);
@@ -104,11 +110,12 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
 
 }  // namespace
 
-FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                                     PivotSolver& solver, int max_rounds) {
+FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
+                                     FrictionModel model, PivotSolver& solver, int max_rounds) {
     FrictionReport report;
     MixedSystem start;
-    if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(), [](const RowBlock& block) { return block.lower[0] == 0.0; }))
+    if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
+                                       [](const RowBlock& block) { return block.lower[0] == 0.0; }))
         start = system;
     auto solve = [&](bool same_matrix) {
         const PivotReport pivots = solver.solve(system, same_matrix);
@@ -118,7 +125,8 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
         report.finite = pivots.finite;
         return pivots.finite;
     };
-    const bool some_unknown = std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
+    const bool some_unknown =
+        std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
     if (some_unknown) {  // no step before: the normal forces without friction are the first guess
         for (const FrictionPoint& point : points) bound_tangents(system.rows[point.block], 0.0);
         if (!solve(false)) return report;
@@ -163,9 +171,10 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
             FrictionPoint& point = points[k];
             RowBlock& block = system.rows[point.block];
             const double now = std::max(0.0, block.multiplier[0]);
-            if (model != FrictionModel::box) change = std::max(change, point.coefficient * std::abs(now - point.normal));
+            if (model != FrictionModel::box)
+                change = std::max(change, point.coefficient * std::abs(now - point.normal));
             if (model == FrictionModel::cone) {
-                const double reluctant = reluctance * std::pow(0.5, std::max(0, round - 5));
+                const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
                 const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
                                           accepted * point.coefficient * largest, reluctant, system.velocity);
                 residual = std::max(residual, law.residual);

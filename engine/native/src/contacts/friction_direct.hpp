@@ -17,7 +17,7 @@ namespace spook {
 /// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
 /// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// On return FrictionPoint::normal is the normal impulse.
-FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                                     PivotSolver& solver, int max_rounds = 60);
+FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
+                                     FrictionModel model, PivotSolver& solver, int max_rounds = 60);
 
 }  // namespace spook

@@ -21,16 +21,17 @@ struct FrictionPoint {
 };
 
 struct FrictionReport {
-    int rounds = 0;          // solves of the whole system
-    int pivots = 0;          // rows that changed state
+    int rounds = 0;  // solves of the whole system
+    int pivots = 0;  // rows that changed state
     int sweeps = 0;
-    double residual = 0.0;   // of the friction law, relative (direct) or m/s (iterative)
+    double residual = 0.0;  // of the friction law, relative (direct) or m/s (iterative)
     bool converged = true;
     bool finite = true;
 };
 
 /// Slip velocity along tangent i (1 or 2), with what slip compliance gives way: D v + (gamma/h) beta.
-inline double slip(const RowBlock& block, const FrictionPoint& point, int i, const std::vector<Vec6>& velocity) noexcept {
+inline double slip(const RowBlock& block, const FrictionPoint& point, int i,
+                   const std::vector<Vec6>& velocity) noexcept {
     return row_velocity(block, i, velocity) - block.right[i] + point.slip_softness * block.multiplier[i];
 }
 

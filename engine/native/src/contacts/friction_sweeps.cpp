@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/elementary.hpp"
+
 namespace spook {
 
 namespace {
@@ -12,8 +14,8 @@ struct PreparedBlock {
     std::array<Vec6, 6> first, second;  // M⁻¹ Gᵀ, one per row
     Mat6 schur{};
     bool bilateral = true;
-    int point = -1;               // its friction point
-    double step = 0.0;            // 1/lambda_max of the tangents' part
+    int point = -1;                   // its friction point
+    double step = 0.0;                // 1/lambda_max of the tangents' part
     std::array<double, 36> factor{};  // of schur, of a bilateral block
 };
 
@@ -41,10 +43,10 @@ public:
                 if (!friction_only) change = std::max(change, update_row(k, 0));
                 change = std::max(change, update_tangents(k));
             } else if (!friction_only) {
-                if (prepared.bilateral)
-                    change = std::max(change, update_block(k));
+                if (prepared.bilateral) change = std::max(change, update_block(k));
                 else
-                    for (int i = 0; i < system_.rows[k].size; ++i) change = std::max(change, update_row(k, i));
+                    for (int i = 0; i < system_.rows[k].size; ++i)
+                        change = std::max(change, update_row(k, i));
             }
         }
         return change;
@@ -60,7 +62,8 @@ private:
             prepared.second[i] = block.second_jacobian[i];
             if (block.first >= 0) solve_six(mass_factor[block.first], prepared.first[i]);
             if (block.second >= 0) solve_six(mass_factor[block.second], prepared.second[i]);
-            prepared.bilateral = prepared.bilateral && block.lower[i] == -unbounded && block.upper[i] == unbounded;
+            prepared.bilateral =
+                prepared.bilateral && block.lower[i] == -unbounded && block.upper[i] == unbounded;
         }
         for (int i = 0; i < n; ++i)
             for (int j = 0; j < n; ++j) {
@@ -72,7 +75,7 @@ private:
         for (int i = n; i < 6; ++i) prepared.schur[6 * i + i] = 1.0;
         if (prepared.point >= 0) {
             const double a = prepared.schur[7], b = prepared.schur[14], c = prepared.schur[8];
-            prepared.step = 1.0 / (0.5 * (a + b) + std::hypot(0.5 * (a - b), c));
+            prepared.step = 1.0 / (0.5 * (a + b) + length(0.5 * (a - b), c));
         } else if (prepared.bilateral) {
             // A body tied twice to the world makes no singular block; a rigid joint without inertia would.
             Mat6 guarded = prepared.schur;
@@ -94,7 +97,8 @@ private:
         RowBlock& block = system_.rows[k];
         const double own = blocks_[k].schur[7 * i], old = block.multiplier[i];
         if (!(own > 0.0)) return 0.0;
-        block.multiplier[i] = std::clamp(old - row_residual(block, i, system_.velocity) / own, block.lower[i], block.upper[i]);
+        block.multiplier[i] =
+            std::clamp(old - row_residual(block, i, system_.velocity) / own, block.lower[i], block.upper[i]);
         push(k, i, block.multiplier[i] - old);
         return std::abs(block.multiplier[i] - old) * own;
     }
@@ -120,7 +124,9 @@ private:
         const PreparedBlock& prepared = blocks_[k];
         const FrictionPoint& point = points_[prepared.point];
         if (model_ != FrictionModel::cone) {
-            const double bound = point.coefficient * std::max(0.0, model_ == FrictionModel::box ? point.normal : block.multiplier[0]);
+            const double bound =
+                point.coefficient *
+                std::max(0.0, model_ == FrictionModel::box ? point.normal : block.multiplier[0]);
             double change = 0.0;
             for (int i = 1; i <= 2; ++i) {
                 block.lower[i] = -bound;
@@ -132,13 +138,13 @@ private:
         const double b1 = block.multiplier[1], b2 = block.multiplier[2];
         double d1 = b1 - prepared.step * row_residual(block, 1, system_.velocity);
         double d2 = b2 - prepared.step * row_residual(block, 2, system_.velocity);
-        const double bound = point.coefficient * std::max(0.0, block.multiplier[0]), reach = std::hypot(d1, d2);
+        const double bound = point.coefficient * std::max(0.0, block.multiplier[0]), reach = length(d1, d2);
         if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
         block.multiplier[1] = d1;
         block.multiplier[2] = d2;
         push(k, 1, d1 - b1);
         push(k, 2, d2 - b2);
-        return std::hypot(d1 - b1, d2 - b2) / prepared.step;
+        return length(d1 - b1, d2 - b2) / prepared.step;
     }
 
     MixedSystem& system_;

@@ -9,12 +9,14 @@ namespace spook {
 
 namespace {
 
-constexpr int patience = 5;          // rounds without fewer offenders before Murty's rule
-constexpr int max_restarts = 7;      // then Murty's rule
-constexpr double tightest = 1e-11;   // tolerance of a velocity, relative to the system's scale
-constexpr double loosest = 1e-7;     // where contradicting rigid contacts leave no exact answer
+constexpr int patience = 5;         // rounds without fewer offenders before Murty's rule
+constexpr int max_restarts = 7;     // then Murty's rule
+constexpr double tightest = 1e-11;  // tolerance of a velocity, relative to the system's scale
+constexpr double loosest = 1e-7;    // where contradicting rigid contacts leave no exact answer
 
-bool bilateral(const RowBlock& block, int i) noexcept { return block.lower[i] == -unbounded && block.upper[i] == unbounded; }
+bool bilateral(const RowBlock& block, int i) noexcept {
+    return block.lower[i] == -unbounded && block.upper[i] == unbounded;
+}
 bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == RowState::free; }
 
 }  // namespace
@@ -54,8 +56,10 @@ bool PivotSolver::analyse(const MixedSystem& system) {
         const int block = bodies + static_cast<int>(k);
         sizes.push_back(pattern[k].size);
         is_constraint.push_back(1);
-        if (pattern[k].first >= 0) first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
-        if (pattern[k].second >= 0) second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
+        if (pattern[k].first >= 0)
+            first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
+        if (pattern[k].second >= 0)
+            second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
     }
     matrix_.analyse(sizes, edges, is_constraint);
     ++analyses_;
@@ -84,7 +88,8 @@ void PivotSolver::measure(const MixedSystem& system) {
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         for (int i = 0; i < block.size; ++i) {
-            speed_ = std::max(speed_, std::abs(block.right[i]) + std::abs(row_velocity(block, i, free_velocity_)));
+            speed_ =
+                std::max(speed_, std::abs(block.right[i]) + std::abs(row_velocity(block, i, free_velocity_)));
             if (bilateral(block, i)) continue;
             double own = 0.0;
             if (block.first >= 0) {
@@ -127,8 +132,10 @@ bool PivotSolver::factor(const MixedSystem& system) {
         if (free) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] -= relief * own;
     }
     const bool finite = matrix_.factor(floor);
-    for (const auto& [k, i, own] : bounded_)  // the factor keeps its relief; residuals are of the true equations
-        if (is_free(system.rows[k], i)) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] = -system.rows[k].softness[i];
+    for (const auto& [k, i, own] :
+         bounded_)  // the factor keeps its relief; residuals are of the true equations
+        if (is_free(system.rows[k], i))
+            matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] = -system.rows[k].softness[i];
     return finite;
 }
 
@@ -160,7 +167,8 @@ void PivotSolver::solve_free(MixedSystem& system, bool refined) {
             force_ = std::max(force_, std::abs(system.momentum[b][a]));
         }
     for (std::size_t k = 0; k < system.rows.size(); ++k)
-        std::copy_n(system.rows[k].right.data(), system.rows[k].size, right_.data() + matrix_.offset(bodies_ + static_cast<int>(k)));
+        std::copy_n(system.rows[k].right.data(), system.rows[k].size,
+                    right_.data() + matrix_.offset(bodies_ + static_cast<int>(k)));
     relieved_.clear();
     for (const auto& [k, i, own] : bounded_) {
         RowBlock& block = system.rows[k];
@@ -190,7 +198,8 @@ void PivotSolver::solve_free(MixedSystem& system, bool refined) {
     }
     for (const auto& [k, i, own] : bounded_) {
         RowBlock& block = system.rows[k];
-        if (!is_free(block, i)) block.multiplier[i] = block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
+        if (!is_free(block, i))
+            block.multiplier[i] = block.state[i] == RowState::at_lower ? block.lower[i] : block.upper[i];
     }
 }
 
@@ -198,15 +207,16 @@ void PivotSolver::solve_free(MixedSystem& system, bool refined) {
 /// read S z = b and the factor solves with P = S + relief: conjugate gradients with P as preconditioner need one
 /// solve per round and about as many rounds as S has eigenvalues below the relief (a heavy body on a light one).
 bool PivotSolver::conjugate_directions() {
-    const auto only_relieved = [this] {  // the rest is rounding; directions are scaled, so leave it to refine()
-        gradient_.resize(relieved_.size());
-        double largest = 0.0;
-        for (std::size_t k = 0; k < relieved_.size(); ++k) {
-            gradient_[k] = residual_[relieved_[k].at];
-            largest = std::max(largest, std::abs(gradient_[k]));
-        }
-        return largest;
-    };
+    const auto only_relieved =
+        [this] {  // the rest is rounding; directions are scaled, so leave it to refine()
+            gradient_.resize(relieved_.size());
+            double largest = 0.0;
+            for (std::size_t k = 0; k < relieved_.size(); ++k) {
+                gradient_[k] = residual_[relieved_[k].at];
+                largest = std::max(largest, std::abs(gradient_[k]));
+            }
+            return largest;
+        };
     residual();
     double before = only_relieved(), product_before = 0.0;
     const double small = 1e-15 * speed_;
@@ -216,14 +226,16 @@ bool PivotSolver::conjugate_directions() {
         for (std::size_t k = 0; k < relieved_.size(); ++k) solution_[relieved_[k].at] = gradient_[k];
         matrix_.solve(solution_.data());
         double product = 0.0;
-        for (std::size_t k = 0; k < relieved_.size(); ++k) product -= gradient_[k] * solution_[relieved_[k].at];
+        for (std::size_t k = 0; k < relieved_.size(); ++k)
+            product -= gradient_[k] * solution_[relieved_[k].at];
         if (!(product > 0.0)) break;
         if (round == 0) {
             direction_ = solution_;
             image_ = gradient_;
         } else {
             const double turn = product / product_before;
-            for (std::size_t i = 0; i < direction_.size(); ++i) direction_[i] = solution_[i] + turn * direction_[i];
+            for (std::size_t i = 0; i < direction_.size(); ++i)
+                direction_[i] = solution_[i] + turn * direction_[i];
             for (std::size_t k = 0; k < relieved_.size(); ++k) image_[k] = gradient_[k] + turn * image_[k];
         }
         double curvature = 0.0;  // pᵀ S p, with S p = P p − relief p
@@ -245,7 +257,8 @@ bool PivotSolver::conjugate_directions() {
 
 void PivotSolver::guess_by_sweeps(MixedSystem& system, int sweeps) {
     for (RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i) block.multiplier[i] = std::clamp(block.multiplier[i], block.lower[i], block.upper[i]);
+        for (int i = 0; i < block.size; ++i)
+            block.multiplier[i] = std::clamp(block.multiplier[i], block.lower[i], block.upper[i]);
     std::vector<FrictionPoint> none;
     solve_iterative(system, none, FrictionModel::cone, sweeps, 0.0);
     for (RowBlock& block : system.rows)
@@ -268,7 +281,8 @@ int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
         bool offends;
         if (is_free(block, i)) {
             const double slack = slip / (own + block.softness[i]);
-            offends = block.multiplier[i] < block.lower[i] - slack || block.multiplier[i] > block.upper[i] + slack;
+            offends =
+                block.multiplier[i] < block.lower[i] - slack || block.multiplier[i] > block.upper[i] + slack;
         } else {
             const double w = row_residual(block, i, system.velocity);
             offends = block.state[i] == RowState::at_lower ? w < -slip : w > slip;
@@ -310,7 +324,8 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     for (int round = 0; round < last_round; ++round) {
         bool stale = !same_matrix || !factored_;
         for (std::size_t b = 0; b < bounded_.size() && !stale; ++b)
-            stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) != static_cast<bool>(factored_free_[b]);
+            stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) !=
+                    static_cast<bool>(factored_free_[b]);
         if (stale && !factor(system)) {
             report.finite = false;
             factored_ = false;
@@ -344,7 +359,9 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
             RowBlock& block = system.rows[k];
             ++report.flips;
             if (!is_free(block, i)) block.state[i] = RowState::free;
-            else block.state[i] = block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
+            else
+                block.state[i] =
+                    block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
         }
     }
     const BlockLdlt::Counters now = matrix_.counters();

@@ -32,9 +32,9 @@ struct PivotReport {
 /// rounding of gaps, divided by it, stays out of the loads.
 class PivotSolver {
 public:
-    double floor = 1e-12;   // of BlockLdlt::factor
-    double relief = 1e-6;   // of bounded rows, in the factor only
-    int refinements = 1;    // against the true equations, after each solve
+    double floor = 1e-12;  // of BlockLdlt::factor
+    double relief = 1e-6;  // of bounded rows, in the factor only
+    int refinements = 1;   // against the true equations, after each solve
     int max_directions = 30;
     int round_limit = 1 << 30;  // give up after so many rounds; without it the search ends by itself
 
@@ -77,8 +77,8 @@ private:
     std::vector<Bounded> bounded_;
     bool factored_ = false;
     std::vector<std::uint8_t> factored_free_, offends_;  // per bounded row
-    double tolerance_ = 0.0;                     // of this solve
-    double speed_ = 0.0, force_ = 0.0;           // the scales of this system, m/s and N s
+    double tolerance_ = 0.0;                             // of this solve
+    double speed_ = 0.0, force_ = 0.0;                   // the scales of this system, m/s and N s
     std::vector<double> right_, state_, residual_, solution_, direction_, image_, gradient_;
     std::vector<Relieved> relieved_;
     std::vector<Mat6> mass_factor_;

@@ -35,14 +35,15 @@ struct Factor {
     std::int64_t column_count;
     const std::uint8_t* row_size;
     const std::int32_t* row_offset;
-    const std::int64_t* targets;  // per column, for each pair of its rows r ≤ s: where in `work` the update goes
+    const std::int64_t*
+        targets;  // per column, for each pair of its rows r ≤ s: where in `work` the update goes
     const double* matrix;
     const Load* loads;
     const std::int64_t* load_start;  // per column: loads[load_start[k]] … before loads[load_start[k + 1]]
     double* values;
     double* work;
-    double* scale;    // per unknown: sum of magnitudes a pivot came from
-    double shift;     // taken from the diagonal of every constraint, in the factor only
+    double* scale;  // per unknown: sum of magnitudes a pivot came from
+    double shift;   // taken from the diagonal of every constraint, in the factor only
 };
 
 /// What a sweep over the columns needs, for one instruction set.
@@ -54,8 +55,8 @@ struct Kernels {
     void (*backward)(const Factor&, int uniform_size, double* x);
     /// y −= B x₂ and z −= Bᵀ x₁ for a row-major rows × columns block B.
     void (*subtract_product)(int rows, int columns, const double* b, const double* x2, double* y);
-    void (*subtract_coupling)(int rows, int columns, const double* b, const double* x1, const double* x2, double* y,
-                              double* z);
+    void (*subtract_coupling)(int rows, int columns, const double* b, const double* x1, const double* x2,
+                              double* y, double* z);
 };
 
 const Kernels& portable_kernels() noexcept;

@@ -10,8 +10,7 @@ typedef double V4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef double V2 __attribute__((vector_size(16), aligned(8), may_alias));
 
 /// A row of N numbers in registers.
-template <int N>
-struct Row {
+template <int N> struct Row {
     static constexpr int fours = N / 4, twos = (N % 4) / 2, ones = N % 2;
     V4 a;
     V2 b;
@@ -112,8 +111,7 @@ SPOOK_INLINE void divide(const double* u, const double* inverse, double* z, doub
 }
 
 /// T −= Yᵣᵀ Zₛ.
-template <int N, int R, int S>
-SPOOK_INLINE void update(const double* y, const double* z, double* t) {
+template <int N, int R, int S> SPOOK_INLINE void update(const double* y, const double* z, double* t) {
     Row<S> rows[N];
 #pragma GCC unroll 6
     for (int k = 0; k < N; ++k) rows[k].load(z + k * S);
@@ -152,16 +150,14 @@ SPOOK_INLINE void update_diagonal(const double* y, const double* z, double* t, d
 /// U above its diagonal, row by row: entry (i, j) with j > i.
 constexpr int packed(int n, int i, int j) { return i * n - i * (i + 1) / 2 + j - i - 1; }
 
-template <int N>
-SPOOK_INLINE void pack(const double* u, double* p) {
+template <int N> SPOOK_INLINE void pack(const double* u, double* p) {
 #pragma GCC unroll 6
     for (int i = 0; i < N; ++i)
 #pragma GCC unroll 6
         for (int j = i + 1; j < N; ++j) p[packed(N, i, j)] = u[i * N + j];
 }
 
-template <int N>
-SPOOK_INLINE void forward_pivot(const double* p, double* x) {
+template <int N> SPOOK_INLINE void forward_pivot(const double* p, double* x) {
 #pragma GCC unroll 6
     for (int i = 0; i < N; ++i)
 #pragma GCC unroll 6
@@ -169,8 +165,7 @@ SPOOK_INLINE void forward_pivot(const double* p, double* x) {
 }
 
 /// xᵣ −= Zᵀ x.
-template <int N, int R>
-SPOOK_INLINE void forward_row(const double* z, const double* x, double* xr) {
+template <int N, int R> SPOOK_INLINE void forward_row(const double* z, const double* x, double* xr) {
     Row<R> sum, row;
     sum.clear();
 #pragma GCC unroll 6
@@ -184,8 +179,7 @@ SPOOK_INLINE void forward_row(const double* z, const double* x, double* xr) {
 }
 
 /// x −= Z xᵣ.
-template <int N, int R>
-SPOOK_INLINE void backward_row(const double* z, const double* xr, double* x) {
+template <int N, int R> SPOOK_INLINE void backward_row(const double* z, const double* xr, double* x) {
     Row<R> row, right;
     right.load(xr);
 #pragma GCC unroll 6
@@ -195,50 +189,37 @@ SPOOK_INLINE void backward_row(const double* z, const double* xr, double* x) {
     }
 }
 
-template <int N>
-SPOOK_INLINE void backward_pivot(const double* p, double* x) {
+template <int N> SPOOK_INLINE void backward_pivot(const double* p, double* x) {
 #pragma GCC unroll 6
     for (int i = N - 1; i >= 0; --i)
 #pragma GCC unroll 6
         for (int j = i + 1; j < N; ++j) x[i] -= p[packed(N, i, j)] * x[j];
 }
 
-template <int N, int R, int S>
-void update_call(const double* y, const double* z, double* t) {
+template <int N, int R, int S> void update_call(const double* y, const double* z, double* t) {
     update<N, R, S>(y, z, t);
 }
 template <int N, int R>
 void update_diagonal_call(const double* y, const double* z, double* t, double* scale, bool note) {
     update_diagonal<N, R>(y, z, t, scale, note);
 }
-template <int N, int R>
-void divide_call(const double* u, const double* inverse, double* z, double* y) {
+template <int N, int R> void divide_call(const double* u, const double* inverse, double* z, double* y) {
     divide<N, R>(u, inverse, z, y);
 }
-template <int N, int R>
-void forward_row_call(const double* z, const double* x, double* xr) {
+template <int N, int R> void forward_row_call(const double* z, const double* x, double* xr) {
     forward_row<N, R>(z, x, xr);
 }
-template <int N, int R>
-void backward_row_call(const double* z, const double* xr, double* x) {
+template <int N, int R> void backward_row_call(const double* z, const double* xr, double* x) {
     backward_row<N, R>(z, xr, x);
 }
 template <int N>
-int pivot_call(double* u, double* inverse, const double* scale, double sign, double floor, double replacement) {
+int pivot_call(double* u, double* inverse, const double* scale, double sign, double floor,
+               double replacement) {
     return pivot<N>(u, inverse, scale, sign, floor, replacement);
 }
-template <int N>
-void pack_call(const double* u, double* p) {
-    pack<N>(u, p);
-}
-template <int N>
-void forward_pivot_call(const double* u, double* x) {
-    forward_pivot<N>(u, x);
-}
-template <int N>
-void backward_pivot_call(const double* u, double* x) {
-    backward_pivot<N>(u, x);
-}
+template <int N> void pack_call(const double* u, double* p) { pack<N>(u, p); }
+template <int N> void forward_pivot_call(const double* u, double* x) { forward_pivot<N>(u, x); }
+template <int N> void backward_pivot_call(const double* u, double* x) { backward_pivot<N>(u, x); }
 
 #define SPOOK_SIX(f) {f(1), f(2), f(3), f(4), f(5), f(6)}
 #define SPOOK_P(n) pivot_call<n>
@@ -259,15 +240,14 @@ constexpr void (*update_diagonal_table[6][6])(const double*, const double*, doub
 constexpr void (*forward_row_table[6][6])(const double*, const double*, double*) = SPOOK_SIX(SPOOK_FR);
 #define SPOOK_BR(n) SPOOK_BY_TWO(backward_row_call, n)
 constexpr void (*backward_row_table[6][6])(const double*, const double*, double*) = SPOOK_SIX(SPOOK_BR);
-#define SPOOK_U3(n, r) \
+#define SPOOK_U3(n, r)                                                 \
     {update_call<n, r, 1>, update_call<n, r, 2>, update_call<n, r, 3>, \
      update_call<n, r, 4>, update_call<n, r, 5>, update_call<n, r, 6>}
 #define SPOOK_U(n) \
     {SPOOK_U3(n, 1), SPOOK_U3(n, 2), SPOOK_U3(n, 3), SPOOK_U3(n, 4), SPOOK_U3(n, 5), SPOOK_U3(n, 6)}
 constexpr void (*update_table[6][6][6])(const double*, const double*, double*) = SPOOK_SIX(SPOOK_U);
 
-template <int U>
-SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
+template <int U> SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
     const int rows = U ? U : item.rows, columns = U ? U : item.columns;
     const double* from = f.matrix + item.from;
     double* to = f.work + item.to;
@@ -295,8 +275,7 @@ SPOOK_INLINE void load_block(const Factor& f, const Load& item) {
     }
 }
 
-template <int U>
-SPOOK_INLINE void forward_column(const Factor& f, const Column& column, double* x) {
+template <int U> SPOOK_INLINE void forward_column(const Factor& f, const Column& column, double* x) {
     const int n = U ? U : column.size;
     const double* u = f.values + column.at;
     double* xk = x + column.offset;
@@ -312,8 +291,7 @@ SPOOK_INLINE void forward_column(const Factor& f, const Column& column, double* 
 }
 
 /// U is the size of all blocks, known to the compiler, or 0.
-template <int U>
-std::int64_t factor_columns(const Factor& f, double floor, double replacement, double* x) {
+template <int U> std::int64_t factor_columns(const Factor& f, double floor, double replacement, double* x) {
     std::int64_t replaced = 0;
     for (std::int64_t k = 0; k < f.column_count; ++k) {
         for (std::int64_t i = f.load_start[k]; i < f.load_start[k + 1]; ++i) load_block<U>(f, f.loads[i]);
@@ -348,7 +326,8 @@ std::int64_t factor_columns(const Factor& f, double floor, double replacement, d
             const int m = U ? U : sizes[r];
             double* goal = f.work + *target++;
             if constexpr (U) update_diagonal<U, U>(y, zr, goal, f.scale + offsets[r], !column.is_constraint);
-            else update_diagonal_table[n - 1][m - 1](y, zr, goal, f.scale + offsets[r], !column.is_constraint);
+            else
+                update_diagonal_table[n - 1][m - 1](y, zr, goal, f.scale + offsets[r], !column.is_constraint);
             zr += n * m;
             const double* zs = zr;
             for (int s = r + 1; s < column.row_count; ++s) {
@@ -365,13 +344,11 @@ std::int64_t factor_columns(const Factor& f, double floor, double replacement, d
     return replaced;
 }
 
-template <int U>
-void forward_columns(const Factor& f, double* x) {
+template <int U> void forward_columns(const Factor& f, double* x) {
     for (std::int64_t k = 0; k < f.column_count; ++k) forward_column<U>(f, f.columns[k], x);
 }
 
-template <int U>
-void backward_columns(const Factor& f, double* x) {
+template <int U> void backward_columns(const Factor& f, double* x) {
     for (std::int64_t k = f.column_count - 1; k >= 0; --k) {
         const Column& column = f.columns[k];
         const int n = U ? U : column.size;

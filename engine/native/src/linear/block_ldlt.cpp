@@ -61,9 +61,16 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     operations_per_factor_ = 0;
     for (int k = 0; k < count; ++k) {
         const int block = order_[k], n = size_[block];
-        const std::int64_t first = ordering.column_start[k], last = ordering.column_start[k + 1], d = last - first;
-        columns_[k] = {at,  0, first, target_count, offset_[block], static_cast<std::int32_t>(d),
-                       static_cast<std::uint8_t>(n), is_constraint_[block]};
+        const std::int64_t first = ordering.column_start[k], last = ordering.column_start[k + 1],
+                           d = last - first;
+        columns_[k] = {at,
+                       0,
+                       first,
+                       target_count,
+                       offset_[block],
+                       static_cast<std::int32_t>(d),
+                       static_cast<std::uint8_t>(n),
+                       is_constraint_[block]};
         at += n * (n + 1) / 2;
         for (std::int64_t r = first; r < last; ++r) {
             const int row = ordering.column_rows[r];
@@ -81,7 +88,8 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     std::vector<std::int64_t> touched(count + ordering.column_rows.size());
     for (int k = 0; k < count; ++k) {
         touched[k] = k;
-        for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) touched[count + r] = k;
+        for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r)
+            touched[count + r] = k;
     }
     targets_.resize(target_count);
     std::int64_t next = 0;
@@ -142,7 +150,8 @@ void BlockLdlt::place_work(const std::vector<std::int64_t>& touched, std::vector
         }
         const kernel::Column& done = columns_[k];
         std::int64_t room = done.size * done.size;
-        for (std::int64_t r = done.first_row; r < done.first_row + done.row_count; ++r) room += done.size * row_size_[r];
+        for (std::int64_t r = done.first_row; r < done.first_row + done.row_count; ++r)
+            room += done.size * row_size_[r];
         vacant[room].push_back(done.work);
     }
     work_.assign(end, 0.0);
@@ -163,8 +172,8 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
         const int early = later ? j : i, late = later ? i : j;
         const auto first = ordering.column_rows.begin() + ordering.column_start[position[early]];
         const auto last = ordering.column_rows.begin() + ordering.column_start[position[early] + 1];
-        const auto found = std::lower_bound(first, last, late,
-                                            [&](int a, int b) { return position[a] < position[b]; });
+        const auto found =
+            std::lower_bound(first, last, late, [&](int a, int b) { return position[a] < position[b]; });
         std::int64_t& edge = edge_of[found - ordering.column_rows.begin()];
         if (edge >= 0) throw std::invalid_argument("block LDLT: two edges join the same pair of blocks");
         edge = static_cast<std::int64_t>(e);
@@ -181,16 +190,26 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
     for (int block = 0; block < count; ++block) {
         const auto n = static_cast<std::uint8_t>(size_[block]);
         const int k = position[block];
-        loads_[next[touched[k]]++] = {diagonal_at_[block], block_at[k], offset_[block], n, n,
-                                      kernel::Load::diagonal, is_constraint_[block] != 0,
-                                      thin_ && is_constraint_[block], raw[block] != 0};
+        loads_[next[touched[k]]++] = {diagonal_at_[block],
+                                      block_at[k],
+                                      offset_[block],
+                                      n,
+                                      n,
+                                      kernel::Load::diagonal,
+                                      is_constraint_[block] != 0,
+                                      thin_ && is_constraint_[block],
+                                      raw[block] != 0};
     }
     for (int k = 0; k < count; ++k)
         for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r) {
             const int early = order_[k], late = ordering.column_rows[r];
             kernel::Load& item = loads_[next[touched[count + r]]++];
-            item = {0, block_at[count + r], 0, static_cast<std::uint8_t>(size_[early]),
-                    static_cast<std::uint8_t>(size_[late]), kernel::Load::zero};
+            item = {0,
+                    block_at[count + r],
+                    0,
+                    static_cast<std::uint8_t>(size_[early]),
+                    static_cast<std::uint8_t>(size_[late]),
+                    kernel::Load::zero};
             if (edge_of[r] < 0) continue;
             item.from = coupling_at_[edge_of[r]];
             item.kind = early < late ? kernel::Load::direct : kernel::Load::transposed;
@@ -234,7 +253,8 @@ void BlockLdlt::raw_scales() {
             const double* d = diagonal(other);
             for (int a = 0; a < n; ++a)
                 for (int c = 0; c < m; ++c) {
-                    const double entry = i == block ? b[a * m + c] : b[c * n + a], mass = std::abs(d[c * m + c]);
+                    const double entry = i == block ? b[a * m + c] : b[c * n + a],
+                                 mass = std::abs(d[c * m + c]);
                     if (mass > 0.0) scale[a] += entry * entry / mass;
                 }
         }
@@ -284,13 +304,12 @@ void BlockLdlt::residual(const double* rhs, const double* x, double* r) const {
         double* to = r + offset_[i];
         if (thin_ && is_constraint_[i])
             for (int k = 0; k < size_[i]; ++k) to[k] -= d[k] * from[k];
-        else
-            fast.subtract_product(size_[i], size_[i], d, from, to);
+        else fast.subtract_product(size_[i], size_[i], d, from, to);
     }
     for (std::size_t e = 0; e < edges_.size(); ++e) {
         const auto [i, j] = edges_[e];
-        fast.subtract_coupling(size_[i], size_[j], coupling(static_cast<int>(e)), x + offset_[i], x + offset_[j],
-                               r + offset_[i], r + offset_[j]);
+        fast.subtract_coupling(size_[i], size_[j], coupling(static_cast<int>(e)), x + offset_[i],
+                               x + offset_[j], r + offset_[i], r + offset_[j]);
     }
 }
 

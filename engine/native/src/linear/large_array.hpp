@@ -13,14 +13,12 @@
 
 namespace spook {
 
-template <class T>
-struct LargePages {
+template <class T> struct LargePages {
     using value_type = T;
     static constexpr std::size_t page = std::size_t{1} << 21, threshold = 2 * page;
 
     LargePages() = default;
-    template <class U>
-    LargePages(const LargePages<U>&) noexcept {}
+    template <class U> LargePages(const LargePages<U>&) noexcept {}
 
     T* allocate(std::size_t count) {
         const std::size_t bytes = count * sizeof(T);
@@ -36,13 +34,9 @@ struct LargePages {
         if (count * sizeof(T) < threshold) ::operator delete(memory);
         else ::operator delete(static_cast<void*>(memory), std::align_val_t{page});
     }
-    template <class U>
-    bool operator==(const LargePages<U>&) const noexcept {
-        return true;
-    }
+    template <class U> bool operator==(const LargePages<U>&) const noexcept { return true; }
 };
 
-template <class T>
-using LargeArray = std::vector<T, LargePages<T>>;
+template <class T> using LargeArray = std::vector<T, LargePages<T>>;
 
 }  // namespace spook

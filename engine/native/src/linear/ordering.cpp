@@ -17,9 +17,16 @@ class Elimination {
 public:
     Elimination(std::span<const int> sizes, std::span<const BlockEdge> edges,
                 std::span<const std::uint8_t> is_constraint)
-        : sizes_(sizes), is_constraint_(is_constraint), count_(static_cast<int>(sizes.size())),
-          neighbours_(sizes.size()), regions_(sizes.size()), degree_(sizes.size(), 0), stamp_(sizes.size(), 0),
-          parent_(sizes.size()), budget_(sizes.size(), 0), gone_(sizes.size(), 0) {
+        : sizes_(sizes),
+          is_constraint_(is_constraint),
+          count_(static_cast<int>(sizes.size())),
+          neighbours_(sizes.size()),
+          regions_(sizes.size()),
+          degree_(sizes.size(), 0),
+          stamp_(sizes.size(), 0),
+          parent_(sizes.size()),
+          budget_(sizes.size(), 0),
+          gone_(sizes.size(), 0) {
         std::vector<int> counts(sizes.size(), 0);
         for (const BlockEdge& edge : edges) ++counts[edge.first], ++counts[edge.second];
         for (int i = 0; i < count_; ++i) neighbours_[i].reserve(counts[i]), parent_[i] = i;
@@ -65,7 +72,8 @@ private:
     }
 
     void keep_live(std::vector<int>& list) const {
-        list.erase(std::remove_if(list.begin(), list.end(), [&](int j) { return gone_[j] != 0; }), list.end());
+        list.erase(std::remove_if(list.begin(), list.end(), [&](int j) { return gone_[j] != 0; }),
+                   list.end());
     }
 
     /// Degrees of freedom left in the eliminated regions next to a block; compresses its list of regions.
@@ -87,7 +95,8 @@ private:
             if (sizes_[other] > budget || sizes_[other] <= budget - sizes_[block]) continue;
             std::int64_t dragged = 0;
             for (int third : neighbours_[other])
-                if (!gone_[third] && is_constraint_[third] && (dragged += sizes_[third]) > kDraggedRows) break;
+                if (!gone_[third] && is_constraint_[third] && (dragged += sizes_[third]) > kDraggedRows)
+                    break;
             if (dragged <= kDraggedRows) worst = std::max<std::int64_t>(worst, sizes_[other]);
         }
         return worst;
@@ -128,7 +137,8 @@ private:
                 auto& list = neighbours_[other];
                 keep_live(list);
                 merged_.clear();
-                std::set_union(list.begin(), list.end(), around.begin(), around.end(), std::back_inserter(merged_));
+                std::set_union(list.begin(), list.end(), around.begin(), around.end(),
+                               std::back_inserter(merged_));
                 merged_.erase(std::lower_bound(merged_.begin(), merged_.end(), other));
                 list.assign(merged_.begin(), merged_.end());
                 degree_[other] = 0;

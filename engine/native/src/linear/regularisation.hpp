@@ -15,8 +15,8 @@ struct Regularisation {
 /// Compliance eps [m/N], damping τ [s], time step h [s] (Lacoursière 2007, eqs 4.27 to 4.35, linearised).
 constexpr Regularisation regularise(double compliance, double damping, double time_step) noexcept {
     const double theta = damping / time_step, spread = 1.0 + 4.0 * theta;
-    return {4.0 / (time_step * spread), 4.0 * theta / spread, 4.0 * compliance / (time_step * time_step * spread),
-            1.0 / spread, theta};
+    return {4.0 / (time_step * spread), 4.0 * theta / spread,
+            4.0 * compliance / (time_step * time_step * spread), 1.0 / spread, theta};
 }
 static_assert(regularise(0.0, 0.0, 0.5).violation_gain == 8.0);
 static_assert(regularise(0.0, 0.25, 0.25).velocity_gain == 0.8);

@@ -17,8 +17,8 @@ namespace spook {
 
 namespace {
 
-constexpr double DAMPED_ABOVE = 0.3;       // of T h²/(m l)
-constexpr double STRING_DAMPING = 1.0;     // D̃/K̃ there: a damping time of h/4
+constexpr double DAMPED_ABOVE = 0.3;    // of T h²/(m l)
+constexpr double STRING_DAMPING = 1.0;  // D̃/K̃ there: a damping time of h/4
 
 void put(double* out, Vec3 v) noexcept {
     out[0] = v.x;
@@ -105,7 +105,8 @@ void ParticleSystem::stiffen_strings() {
         const Link& link = link_[k];
         const double tension = std::max(0.0, -link.lambda / h_);
         const double stiffness = tension * h_ * h_ / link.length;  // kg
-        const double damping = 0.5 * stiffness * (w_[row.a] + w_[row.b]) > DAMPED_ABOVE ? STRING_DAMPING : 0.0;
+        const double damping =
+            0.5 * stiffness * (w_[row.a] + w_[row.b]) > DAMPED_ABOVE ? STRING_DAMPING : 0.0;
         const double held = 0.25 * stiffness, damped = damping * held;
         const RowBlocks& at = row_blocks_[k];
         Mat3 across = Mat3::identity();
@@ -127,12 +128,13 @@ void ParticleSystem::stiffen_strings() {
 }
 
 void ParticleSystem::substitute_blocks() {
-    for (std::size_t k = 0; k < row_.size(); ++k) saddle_rhs_[ldlt_.offset(row_blocks_[k].row)] = link_[k].rhs;
+    for (std::size_t k = 0; k < row_.size(); ++k)
+        saddle_rhs_[ldlt_.offset(row_blocks_[k].row)] = link_[k].rhs;
     if (redundant_ || share_ > 0.0) solve_redundant();
     else ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
     for (std::size_t k = 0; k < row_.size(); ++k)
-        link_[k].lambda = solvable_ ? -saddle_[ldlt_.offset(row_blocks_[k].row)]
-                                    : std::numeric_limits<double>::quiet_NaN();
+        link_[k].lambda =
+            solvable_ ? -saddle_[ldlt_.offset(row_blocks_[k].row)] : std::numeric_limits<double>::quiet_NaN();
 }
 
 /// With a slight softness of all rows in the factor, refinement from zero tends to the impulses of least norm; fast,

@@ -60,7 +60,8 @@ void ParticleSystem::constrained_step(double h, int depth) {
     const std::span<const double> stages = composition_stages(scene_.method.composition);
     const std::size_t rows = row_.size();
     if (lost_) return;
-    std::vector<Vec3>&x = step_x_[static_cast<std::size_t>(depth)], &v = step_v_[static_cast<std::size_t>(depth)];
+    std::vector<Vec3>&x = step_x_[static_cast<std::size_t>(depth)],
+    &v = step_v_[static_cast<std::size_t>(depth)];
     x = x_;
     v = v_;
     const double pending = pending_;
@@ -112,8 +113,12 @@ bool ParticleSystem::constrained_stage(double tau, double* history) {
     double *one = history, *two = history + rows, *three = history + 2 * rows;
     find_kicks();
     const double a1 = stage_steps_ >= 3 ? 3.0 : stage_steps_ == 2 ? 2.0 : 1.0;
-    const double a2 = stage_steps_ >= 3 ? -3.0 : stage_steps_ == 2 ? -1.0 : 0.0, a3 = stage_steps_ >= 3 ? 1.0 : 0.0;
-    for (std::size_t k = 0; k < rows; ++k) link_[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
+    const double a2 = stage_steps_ >= 3   ? -3.0
+                      : stage_steps_ == 2 ? -1.0
+                                          : 0.0,
+                 a3 = stage_steps_ >= 3 ? 1.0 : 0.0;
+    for (std::size_t k = 0; k < rows; ++k)
+        link_[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
     if (solver_ == ParticleSolver::path) {
         predict_paths(part);
     } else {
@@ -126,7 +131,8 @@ bool ParticleSystem::constrained_stage(double tau, double* history) {
     double before = std::numeric_limits<double>::infinity();
     bool fresh = true;
     for (int iteration = 0;; ++iteration) {
-        const double off = solver_ == ParticleSolver::path ? lengthen_paths(tau, fresh) : lengthen_blocks(tau, fresh);
+        const double off =
+            solver_ == ParticleSolver::path ? lengthen_paths(tau, fresh) : lengthen_blocks(tau, fresh);
         const double ratio = off / before;
         ++newton_iterations_;
         if (off <= SETTLED || (off < 1e-12 && ratio > 0.5)) break;  // settled, or down in the rounding

@@ -27,7 +27,8 @@ void ParticleSystem::correct_curvature() {
             const Row& row = row_[k];
             Link& link = link_[k];
             const double cap = scene_.method.correction_cap * row.rest;
-            const double ahead = std::min(cap, curvature(link.u, link.length, h_ * (trial_[row.b] - trial_[row.a])));
+            const double ahead =
+                std::min(cap, curvature(link.u, link.length, h_ * (trial_[row.b] - trial_[row.a])));
             link.rhs = first_rhs_[k] - row.violation_gain * (0.25 + row.relaxation) * ahead;
         }
         solve_rows_again();

@@ -42,8 +42,7 @@ void ParticleSystem::fly(std::int64_t steps) noexcept {
 
 /// Open paths under steady forces: geometry and elimination in one pass down, impulses and motion in one up.
 /// Each correction of the curvature adds a pass down, with the same factor, and one up.
-template <bool Curved>
-void ParticleSystem::swing_by(std::int64_t steps) noexcept {
+template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcept {
     const double h = h_, fraction = scene_.method.correction_cap;
     const int corrections = Curved ? scene_.method.corrections : 0;
     Vec3* const x = x_.data();

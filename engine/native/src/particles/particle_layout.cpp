@@ -14,8 +14,9 @@ namespace {
 /// what the others say. An open end, a bend or a compliance anywhere keeps the rows independent.
 bool rigid_between_anchors(const ParticleScene& scene, const Path& path) {
     return path.nodes.front() < 0 && path.nodes.back() < 0 &&
-           std::all_of(path.rows.begin(), path.rows.end(),
-                       [&](int row) { return scene.rows[row].compliance == 0.0; });
+           std::all_of(
+               path.rows.begin(), path.rows.end(),
+               [&](int row) { return scene.rows[row].compliance == 0.0; });
 }
 
 }  // namespace
@@ -27,7 +28,8 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
         held_twice_ = std::any_of(paths.begin(), paths.end(),
                                   [&](const Path& path) { return rigid_between_anchors(scene, path); });
         solver_ = paths.empty() || held_twice_ || scene.method.force_block || scene.method.string_stiffness
-                      ? ParticleSolver::block : ParticleSolver::path;
+                      ? ParticleSolver::block
+                      : ParticleSolver::path;
         if (scene.method.iterative) solver_ = ParticleSolver::iterative;
     }
     node_of_body_.assign(scene.bodies.size(), -1);
@@ -75,7 +77,8 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
     seen_lambda_.resize(row_.size());
     first_rhs_.resize(row_.size());
     if (solver_ == ParticleSolver::block) analyse_blocks();
-    block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps), 16, 4096);
+    block_ = std::clamp<std::int64_t>(65536 / static_cast<std::int64_t>(x_.size() * scene.method.substeps),
+                                      16, 4096);
 }
 
 int ParticleSystem::anchor(Vec3 point) {
@@ -121,7 +124,7 @@ void ParticleSystem::lay_out_plain() {
         slot_of_row_[k] = static_cast<int>(k);
         row_.push_back({node[0], node[1], row.rest_length, 0.0, 0.0, r.violation_gain, r.velocity_gain,
                         r.relaxation, r.softness, 1.0 / row.rest_length,
-                            1.0 / (row.rest_length * row.rest_length)});
+                        1.0 / (row.rest_length * row.rest_length)});
     }
 }
 

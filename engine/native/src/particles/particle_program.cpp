@@ -15,8 +15,7 @@ void put(double* out, Vec3 v) noexcept {
 }
 
 /// `read(i, out)` for one index, or for all `count` of them in turn.
-template <class Read>
-Sampler one_or_all(int index, int count, int width, Read read) {
+template <class Read> Sampler one_or_all(int index, int count, int width, Read read) {
     if (index >= 0) return {width, [=](double* out) { read(index, out); }};
     return {width * count, [=](double* out) {
                 for (int i = 0; i < count; ++i) read(i, out + i * width);
@@ -40,7 +39,8 @@ Sampler particle_sampler(const ParticleSystem& system, const QuantityRequest& re
             out[0] = 1.0;
         });
     if (kind == "angular_velocity" || kind == "contact_force")
-        return one_or_all(index, kind == "contact_force" ? 1 : bodies, 3, [](int, double* out) { put(out, {}); });
+        return one_or_all(index, kind == "contact_force" ? 1 : bodies, 3,
+                          [](int, double* out) { put(out, {}); });
     if (kind == "contact_count" || kind == "penetration") return {1, [](double* out) { *out = 0.0; }};
     if (kind == "violation")
         return one_or_all(index, rows, 1, [s](int row, double* out) { *out = s->violation(row); });
@@ -48,7 +48,8 @@ Sampler particle_sampler(const ParticleSystem& system, const QuantityRequest& re
         return one_or_all(index, rows, 1, [s](int row, double* out) { *out = s->tension(row); });
     if (kind == "kinetic_energy") return {1, [s](double* out) { *out = s->kinetic_energy(); }};
     if (kind == "potential_energy") return {1, [s](double* out) { *out = s->potential_energy(); }};
-    if (kind == "energy") return {1, [s](double* out) { *out = s->kinetic_energy() + s->potential_energy(); }};
+    if (kind == "energy")
+        return {1, [s](double* out) { *out = s->kinetic_energy() + s->potential_energy(); }};
     if (kind == "momentum")
         return {3, [s](double* out) {
                     Vec3 sum;
@@ -67,7 +68,8 @@ Sampler particle_sampler(const ParticleSystem& system, const QuantityRequest& re
 
 namespace {
 
-std::vector<Sampler> samplers_of(const ParticleSystem& system, const std::vector<QuantityRequest>& quantities) {
+std::vector<Sampler> samplers_of(const ParticleSystem& system,
+                                 const std::vector<QuantityRequest>& quantities) {
     std::vector<Sampler> samplers;
     for (const QuantityRequest& request : quantities) samplers.push_back(particle_sampler(system, request));
     return samplers;

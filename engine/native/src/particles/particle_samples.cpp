@@ -19,7 +19,8 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
         velocity_ready_ = true;
         for (std::size_t node = 0; node < v_.size(); ++node) seen_v_[node] = 0.5 * (seen_v_[node] + v_[node]);
         if (sample == 0)
-            for (int body = 0; body < bodies(); ++body) seen_v_[node_of_body_[body]] = scene_.bodies[body].velocity;
+            for (int body = 0; body < bodies(); ++body)
+                seen_v_[node_of_body_[body]] = scene_.bodies[body].velocity;
     }
     recorder.sample(sample);
     if (clock_) clock_->mark(Stage::observe);
@@ -33,8 +34,8 @@ Health ParticleSystem::health() const noexcept {
     for (int body = 0; body < bodies(); ++body) {
         const Vec3 x = x_[node_of_body_[body]], v = v_[node_of_body_[body]];
         if (!finite(x) || !finite(v)) return {Status::not_finite, body};
-        const double largest = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z), std::fabs(v.x),
-                                         std::fabs(v.y), std::fabs(v.z)});
+        const double largest = std::max(
+            {std::fabs(x.x), std::fabs(x.y), std::fabs(x.z), std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
         if (largest > RUNAWAY && health.status == Status::completed) health = {Status::diverged, body};
     }
     return health;
@@ -88,7 +89,8 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
     report.counters["back_substitutions"] =
         solver_ == ParticleSolver::path || solver_ == ParticleSolver::block ? inner * passes : 0;
     std::int64_t blocks = 0;
-    if (solver_ == ParticleSolver::path) blocks = 2 * rows - static_cast<std::int64_t>(path_first_.size()) + 1;
+    if (solver_ == ParticleSolver::path)
+        blocks = 2 * rows - static_cast<std::int64_t>(path_first_.size()) + 1;
     report.counters["block_operations"] = inner * blocks;
     if (solver_ == ParticleSolver::block)
         report.counters["block_operations"] =
@@ -134,7 +136,8 @@ double ParticleSystem::violation(int row) const noexcept {
 
 double ParticleSystem::kinetic_energy() const noexcept {
     double energy = 0.0;
-    for (int body = 0; body < bodies(); ++body) energy += 0.5 * mass(body) * dot(velocity(body), velocity(body));
+    for (int body = 0; body < bodies(); ++body)
+        energy += 0.5 * mass(body) * dot(velocity(body), velocity(body));
     return energy;
 }
 

@@ -20,8 +20,7 @@ void ParticleSystem::advance(std::int64_t steps) {
     else advance_by<false>(steps);
 }
 
-template <bool Timed>
-void ParticleSystem::advance_by(std::int64_t steps) {
+template <bool Timed> void ParticleSystem::advance_by(std::int64_t steps) {
     if constexpr (Timed) clock_->start();
     for (; steps > 0; --steps) {
         if (!velocity_ready_) velocity_stage<Timed>();
@@ -31,8 +30,7 @@ void ParticleSystem::advance_by(std::int64_t steps) {
     }
 }
 
-template <bool Timed>
-void ParticleSystem::velocity_stage() {
+template <bool Timed> void ParticleSystem::velocity_stage() {
     if (moving_forces_) {
         kick_ = steady_kick_;
         mark<Timed>(Stage::apply_gravity);
@@ -140,7 +138,8 @@ void ParticleSystem::solve_iterative() noexcept {
         for (std::size_t k = 0; k < row_.size(); ++k) {
             const Row& row = row_[k];
             Link& link = link_[k];
-            const double residual = link.rhs - dot(link.u, trial_[row.b] - trial_[row.a]) - row.softness * link.lambda;
+            const double residual =
+                link.rhs - dot(link.u, trial_[row.b] - trial_[row.a]) - row.softness * link.lambda;
             worst = std::max(worst, std::fabs(residual));
             const double change = residual / row.diagonal;
             link.lambda += change;
@@ -158,7 +157,8 @@ void ParticleSystem::kick_nodes(std::vector<Vec3>& v) const noexcept {
     for (std::size_t node = 0; node < v.size(); ++node) v[node] += kick_[node];
     if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) {
         for (std::size_t node = 0; node < v.size(); ++node)
-            if (block_of_node_[node] >= 0) v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
+            if (block_of_node_[node] >= 0)
+                v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
         return;
     }
     for (std::size_t k = 0; k < row_.size(); ++k) {

@@ -63,8 +63,8 @@ public:
     double potential_energy() const noexcept;
 
 private:
-    struct Row {  // one distance: constants
-        int a, b;  // nodes
+    struct Row {                       // one distance: constants
+        int a, b;                      // nodes
         double rest, stiff, diagonal;  // m; w_a + w_b; the same + softness, 1/kg
         double violation_gain, velocity_gain, relaxation, softness, rest_inverse, rest_inverse_square;
     };
@@ -140,7 +140,7 @@ private:
     ParticleScene scene_;
     double h_;  // s, of a substep
     ParticleSolver solver_ = ParticleSolver::none;
-    bool moving_forces_ = false;  // forces that depend on the state
+    bool moving_forces_ = false;   // forces that depend on the state
     bool velocity_ready_ = false;  // the velocity stage of the coming step is already done
     std::int64_t block_ = 1024;
 
@@ -167,19 +167,19 @@ private:
     bool solvable_ = true;  // false: the factor met a value that is not finite, so nothing it gives is used
     bool held_twice_ = false;
     bool redundant_ = false;  // the last factor has floors: some row says what others say
-    double share_ = 0.0;      // how redundant rows share their load: a softness in the factor; −1: they do not
-    int contradicted_ = -1;   // a body held by rows that cannot hold together
+    double share_ = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
+    int contradicted_ = -1;  // a body held by rows that cannot hold together
     double residual_ = 0.0;
     std::int64_t sweeps_ = 0;
 
     // compositions
     bool composed_ = false, lost_ = false;
-    double pending_ = 0.0;             // s: half a stage still to be kicked (with rows) or drifted (without)
-    std::int64_t stage_steps_ = 0;     // steps the history has seen
+    double pending_ = 0.0;          // s: half a stage still to be kicked (with rows) or drifted (without)
+    std::int64_t stage_steps_ = 0;  // steps the history has seen
     std::int64_t newton_iterations_ = 0, halved_steps_ = 0;
     static constexpr int MOST_HALVINGS = 12;
     std::vector<Vec3> step_x_[MOST_HALVINGS], step_v_[MOST_HALVINGS];  // where each step began
-    std::vector<double> history_;      // stages × three steps × rows, N
+    std::vector<double> history_;                                      // stages × three steps × rows, N
 
     struct Snapshot {
         std::vector<Vec3> x, v;

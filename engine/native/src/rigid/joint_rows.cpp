@@ -1,5 +1,7 @@
 #include "rigid/joint_rows.hpp"
 
+#include "linear/elementary.hpp"
+
 namespace spook {
 namespace {
 
@@ -69,7 +71,8 @@ void assemble_distance(const JointConstants& joint, const BodyState& first, cons
 
 }  // namespace
 
-JointConstants constants_of(const JointSpec& spec, const Vec3* first_start, const Vec3* second_start) noexcept {
+JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
+                            const Vec3* second_start) noexcept {
     JointConstants joint;
     joint.kind = spec.kind;
     joint.rows = row_count(spec.kind);
@@ -81,22 +84,21 @@ JointConstants constants_of(const JointSpec& spec, const Vec3* first_start, cons
     return joint;
 }
 
-void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second, JointRows& rows,
-                    Vec3& first_reach, Vec3& second_reach) noexcept {
+void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                    JointRows& rows, Vec3& first_reach, Vec3& second_reach) noexcept {
     const Ends ends(joint, first, second);
     first_reach = ends.first_arm;
     second_reach = ends.second_arm;
     if (joint.kind == JointKind::distance) return assemble_distance(joint, first, second, ends, rows);
     first_reach += ends.gap;
-    Writer write{rows,
-                 first_reach,
-                 second_reach,
+    Writer write{rows, first_reach, second_reach,
                  second.velocity + cross(second.angular_velocity, second_reach) - first.velocity -
                      cross(first.angular_velocity, first_reach),
                  second.angular_velocity - first.angular_velocity};
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
-    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k) write.linear(axes[k], dot(axes[k], ends.gap));
+    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
+        write.linear(axes[k], dot(axes[k], ends.gap));
     if (joint.kind == JointKind::ball) return;
     const Quat q = relative_turn(first, second);
     const Vec3 e{q.x, q.y, q.z};
@@ -128,14 +130,14 @@ AxialRow axial_row(const JointConstants& joint, const BodyState& first, const Bo
         put(row.second, axis);
         put(row.second + 3, cross(ends.second_arm, axis));
         row.coordinate = dot(axis, ends.gap);
-        row.rate = dot(axis, second.velocity + cross(second.angular_velocity, ends.second_arm) - first.velocity -
-                                 cross(first.angular_velocity, reach));
+        row.rate = dot(axis, second.velocity + cross(second.angular_velocity, ends.second_arm) -
+                                 first.velocity - cross(first.angular_velocity, reach));
         return row;
     }
     const Quat q = relative_turn(first, second);
     put(row.first + 3, -axis);
     put(row.second + 3, axis);
-    row.coordinate = 2.0 * std::atan2(dot(joint.axes[0], Vec3{q.x, q.y, q.z}), q.w);
+    row.coordinate = 2.0 * arc_tangent(dot(joint.axes[0], Vec3{q.x, q.y, q.z}), q.w);
     row.rate = dot(axis, second.angular_velocity - first.angular_velocity);
     return row;
 }

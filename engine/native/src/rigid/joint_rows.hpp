@@ -9,10 +9,10 @@ namespace spook {
 /// Where a joint's rows are written: Jacobians row-major with six columns (linear, angular), world axes. Entries
 /// that are always zero are not written: the caller clears the memory once.
 struct JointRows {
-    double* first;    // rows × 6
-    double* second;   // rows × 6
+    double* first;   // rows × 6
+    double* second;  // rows × 6
     double violation[6];
-    double rate[6];   // G v
+    double rate[6];  // G v
 };
 
 /// Constant geometry of a joint: arms at the start, from each body's centre, world axes.
@@ -25,7 +25,8 @@ struct JointConstants {
     double rest_length = 0.0;
 };
 
-JointConstants constants_of(const JointSpec& spec, const Vec3* first_start, const Vec3* second_start) noexcept;
+JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
+                            const Vec3* second_start) noexcept;
 
 /// Violations are measured in the frame fixed to the first body:
 /// - translation: the second end's point minus the first's, along the joint's axes;
@@ -36,8 +37,8 @@ JointConstants constants_of(const JointSpec& spec, const Vec3* first_start, cons
 /// - distance: |d| − rest length, free of cancellation.
 /// The reaction acts at the second body's point on both bodies, so momenta are conserved for any violation.
 /// Returns that point minus each body's centre in first_reach, second_reach.
-void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second, JointRows& rows,
-                    Vec3& first_reach, Vec3& second_reach) noexcept;
+void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                    JointRows& rows, Vec3& first_reach, Vec3& second_reach) noexcept;
 
 /// The free coordinate of a hinge (angle within ±π) or prismatic joint [rad or m], its rate and one Jacobian row.
 struct AxialRow {

@@ -74,8 +74,8 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
     right.upper.fill(kUnbounded);
     if (block.axial) return assemble_axial(joint, state, bodies, first, second, right);
     JointRows rows{first, second, {}, {}};
-    assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows, state.first_reach,
-                   state.second_reach);
+    assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows,
+                   state.first_reach, state.second_reach);
     for (int k = 0; k < block.size; ++k) {
         right.right[k] = joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
     }
@@ -87,8 +87,8 @@ double JointSet::unwrapped(const Joint& joint, double angle, double near) const 
     return angle + turn * std::round((near - angle) / turn);
 }
 
-void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
-                              double* second, BlockRight& right) noexcept {
+void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies,
+                              double* first, double* second, BlockRight& right) noexcept {
     const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
     if (joint.tracked) state.angle = unwrapped(joint, row.coordinate, state.angle);
     const Axial& axial = axials_[joint.axial];
@@ -120,7 +120,8 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         }
     }
     if (axial.has_spring)
-        next(axial.spring.upsilon * row.rate - axial.spring.violation_gain * (state.angle - axial.spring_rest));
+        next(axial.spring.upsilon * row.rate -
+             axial.spring.violation_gain * (state.angle - axial.spring_rest));
 }
 
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {

@@ -15,11 +15,11 @@ namespace spook {
 /// One block of up to six rows between two bodies: a joint's own rows, or those of its free coordinate.
 struct JointBlock {
     int joint = 0;
-    bool axial = false;      // motor, limit, spring, in this order, as far as the joint has them
+    bool axial = false;           // motor, limit, spring, in this order, as far as the joint has them
     int first = -1, second = -1;  // bodies of the scene, −1 the world
     int size = 1;
     std::array<double, 6> softness{};
-    bool bounded = false;    // some row has a finite bound
+    bool bounded = false;  // some row has a finite bound
 };
 
 /// The numbers of a block in one step, besides its Jacobians. A row reads
@@ -34,8 +34,9 @@ public:
     struct State {
         std::array<double, 6> multiplier{};
         std::array<double, 3> axial_multiplier{};
-        Vec3 first_reach, second_reach;  // from the centres to the point where forces are read, at the last step
-        double angle = 0.0;              // unwrapped coordinate of a hinge that needs it
+        Vec3 first_reach,
+            second_reach;    // from the centres to the point where forces are read, at the last step
+        double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
     };
 
     JointSet(const RigidScene& scene, double time_step);
@@ -43,7 +44,9 @@ public:
     std::span<const JointBlock> blocks() const noexcept { return blocks_; }
     int count() const noexcept { return static_cast<int>(joints_.size()); }
     int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
-    bool is_distance(int joint) const noexcept { return joints_[joint].constants.kind == JointKind::distance; }
+    bool is_distance(int joint) const noexcept {
+        return joints_[joint].constants.kind == JointKind::distance;
+    }
 
     /// Writes the Jacobians of a block (rows × 6 each; the memory holds zeros or an earlier call's values) and
     /// its right side without the share of bodies that move by themselves.

@@ -10,8 +10,7 @@ namespace {
 void put(double* out, Vec3 v) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
 /// `read(i, out)` for one index, or for all `count` of them in turn.
-template <class Read>
-Sampler one_or_all(int index, int count, int width, Read read) {
+template <class Read> Sampler one_or_all(int index, int count, int width, Read read) {
     if (index >= 0) return {width, [=](double* out) { read(index, out); }};
     return {width * count, [=](double* out) {
                 for (int i = 0; i < count; ++i) read(i, out + i * width);
@@ -64,7 +63,8 @@ Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
     if (kind == "velocity")
         return one_or_all(index, count, 3, [s](int i, double* out) { put(out, s->state(i).velocity); });
     if (kind == "angular_velocity")
-        return one_or_all(index, count, 3, [s](int i, double* out) { put(out, s->state(i).angular_velocity); });
+        return one_or_all(index, count, 3,
+                          [s](int i, double* out) { put(out, s->state(i).angular_velocity); });
     if (kind == "orientation")
         return one_or_all(index, count, 4, [s](int i, double* out) {
             const Quat q = s->orientation_of(i);
@@ -72,7 +72,8 @@ Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
         });
     if (kind == "kinetic_energy") return {1, [s](double* out) { *out = s->kinetic_energy(); }};
     if (kind == "potential_energy") return {1, [s](double* out) { *out = s->potential_energy(); }};
-    if (kind == "energy") return {1, [s](double* out) { *out = s->kinetic_energy() + s->potential_energy(); }};
+    if (kind == "energy")
+        return {1, [s](double* out) { *out = s->kinetic_energy() + s->potential_energy(); }};
     if (kind == "momentum" || kind == "angular_momentum")
         return momentum_sampler(s, kind == "angular_momentum", request.point);
     if (kind == "violation" || kind == "constraint_force") return joint_sampler(s, request);

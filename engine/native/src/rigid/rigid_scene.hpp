@@ -28,11 +28,11 @@ struct RigidBodySpec {
 /// Rows of a joint in the order of engine/joints.py, then those of its free coordinate: motor, limit, spring.
 struct JointSpec {
     JointKind kind = JointKind::lock;
-    int first = -1, second = -1;           // body, −1 the world
-    Vec3 first_point, second_point;        // where the joint holds each end at the start, world
-    std::array<Vec3, 3> axes;              // unit, right-handed, at the start; the first is the joint's axis.
-                                           // universal: axis, cross axis, their product
-    double rest_length = 0.0;              // distance
+    int first = -1, second = -1;     // body, −1 the world
+    Vec3 first_point, second_point;  // where the joint holds each end at the start, world
+    std::array<Vec3, 3> axes;        // unit, right-handed, at the start; the first is the joint's axis.
+                                     // universal: axis, cross axis, their product
+    double rest_length = 0.0;        // distance
     std::array<double, 6> compliance{}, damping{};
 
     bool has_motor = false, has_limit = false, has_spring = false;
@@ -52,8 +52,8 @@ constexpr int row_count(JointKind kind) noexcept {
 }
 
 struct RigidSpring {
-    int first = -1, second = -1;      // body, −1 the point
-    Vec3 first_point, second_point;   // world, of ends that are no body
+    int first = -1, second = -1;     // body, −1 the point
+    Vec3 first_point, second_point;  // world, of ends that are no body
     double stiffness = 0.0, rest_length = 0.0, viscosity = 0.0;
 };
 
@@ -71,7 +71,7 @@ struct RigidMethod {
     FrictionModel friction = FrictionModel::cone;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
-    bool force_collision = false;       // look for contacts even where none are possible, to measure what it costs
+    bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs
 };
 
 struct RigidScene {

@@ -63,8 +63,9 @@ void RigidSystem::solve_block() {
             if (body < 0 || constants_[body].motion != Motion::kinematic) return;
             const BodyState& s = live_.bodies[body];
             for (int i = 0; i < block.size; ++i)
-                numbers.right[i] -= dot({rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]}, s.velocity) +
-                                    dot({rows[6 * i + 3], rows[6 * i + 4], rows[6 * i + 5]}, s.angular_velocity);
+                numbers.right[i] -=
+                    dot({rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]}, s.velocity) +
+                    dot({rows[6 * i + 3], rows[6 * i + 4], rows[6 * i + 5]}, s.angular_velocity);
         };
         if (place.first_edge < 0) given(block.first, first);
         if (place.second_edge < 0) given(block.second, second);
@@ -118,7 +119,8 @@ void RigidSystem::solve_block() {
 
 bool RigidSystem::solve_once() {
     const std::uint64_t floored = matrix_.counters().floored_pivots;
-    if (!matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), method_.refinements)) return false;
+    if (!matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), method_.refinements))
+        return false;
     if (matrix_.counters().floored_pivots == floored) return true;
     if (live_.share == 0.0) {
         // Redundant rows, seen for the first time: let all of them share the load, if that can be had.
@@ -133,7 +135,8 @@ bool RigidSystem::solve_shared() {
     // With a slight softness of all rows in the factor, refinement from zero tends to the multipliers of least norm;
     // quickly, unless the rows are nearly dependent as well (long rings). Then the factor with floors is better.
     matrix_.shift_constraints(live_.share);
-    bool solved = matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), std::max(2, method_.refinements));
+    bool solved = matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(),
+                                           std::max(2, method_.refinements));
     left_.resize(right_.size());
     for (int round = 0; solved; ++round) {
         double speed = 0.0;
@@ -257,8 +260,8 @@ void RigidSystem::solve_mixed(bool touching) {
         residual_ = std::max(residual_, contacts_->residual());
     } else if (solver_ == RigidSolver::iterative) {
         std::vector<FrictionPoint> none;
-        const FrictionReport report = solve_iterative(mixed_, none, method_.friction, method_.iterations,
-                                                      method_.residual_tolerance);
+        const FrictionReport report =
+            solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
         finite = report.finite;
         residual_ = std::max(residual_, report.residual);
         sweeps_ += static_cast<std::uint64_t>(report.sweeps);

@@ -1,5 +1,7 @@
 #include "rigid/rigid_state.hpp"
 
+#include "linear/elementary.hpp"
+
 namespace spook {
 namespace {
 
@@ -11,8 +13,9 @@ Vec3 transposed_times(const Mat3& a, Vec3 v) noexcept {
 /// The turn of a constant angular velocity over h.
 Quat turn_of(double h, Vec3 angular_velocity) noexcept {
     const double angle = 0.5 * h * norm(angular_velocity);
-    const Vec3 e = (angle != 0.0 ? 0.5 * h * std::sin(angle) / angle : 0.0) * angular_velocity;
-    return {std::cos(angle), e.x, e.y, e.z};
+    const SineCosine half = sine_cosine(angle);
+    const Vec3 e = (angle != 0.0 ? 0.5 * h * half.sine / angle : 0.0) * angular_velocity;
+    return {half.cosine, e.x, e.y, e.z};
 }
 
 bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia.y == inertia.z; }
@@ -26,8 +29,15 @@ Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept {
 }
 
 BodyConstants constants_of(const RigidBodySpec& spec) noexcept {
-    return {spec.motion,      spec.particle,    spec.mass,  spec.inertia, spec.position,
-            spec.orientation, rotation(spec.orientation), spec.force, spec.torque};
+    return {spec.motion,
+            spec.particle,
+            spec.mass,
+            spec.inertia,
+            spec.position,
+            spec.orientation,
+            rotation(spec.orientation),
+            spec.force,
+            spec.torque};
 }
 
 BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept {
@@ -82,7 +92,8 @@ bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
     return true;
 }
 
-void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity, BodyState& state) noexcept {
+void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity,
+              BodyState& state) noexcept {
     state.displacement += h * velocity;
     if (body.particle) return;
     state.turn = unit(turn_of(h, angular_velocity) * state.turn);

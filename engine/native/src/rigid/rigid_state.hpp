@@ -14,23 +14,23 @@ struct BodyConstants {
     Motion motion = Motion::dynamic;
     bool particle = false;
     double mass = 0.0;
-    Vec3 inertia;          // principal
-    Vec3 start;            // position at the start
-    Quat start_turn;       // orientation at the start
+    Vec3 inertia;     // principal
+    Vec3 start;       // position at the start
+    Quat start_turn;  // orientation at the start
     Mat3 start_rotation;
-    Vec3 force, torque;    // constant loads
+    Vec3 force, torque;  // constant loads
 
     bool moves() const noexcept { return motion == Motion::dynamic; }
 };
 
 struct BodyState {
-    Vec3 displacement;       // from the start
-    Quat turn;               // from the start: orientation = turn · start_turn
+    Vec3 displacement;  // from the start
+    Quat turn;          // from the start: orientation = turn · start_turn
     Vec3 velocity, angular_velocity;
-    Vec3 angular_momentum;   // world axes, about the centre of mass; what a free body keeps exactly
+    Vec3 angular_momentum;  // world axes, about the centre of mass; what a free body keeps exactly
     // Derived from the above:
-    Mat3 turn_less_one;      // rotation matrix of `turn`, minus the identity
-    Mat3 inertia;            // world axes
+    Mat3 turn_less_one;  // rotation matrix of `turn`, minus the identity
+    Mat3 inertia;        // world axes
 };
 
 inline Vec3 position(const BodyConstants& body, const BodyState& state) noexcept {
@@ -53,7 +53,8 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept;
 bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept;
 
 /// Moves a body by h times velocities that leave no trace in its momenta.
-void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity, BodyState& state) noexcept;
+void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity,
+              BodyState& state) noexcept;
 
 /// I⁻¹ L in world axes at the state's orientation.
 Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept;

@@ -6,8 +6,12 @@
 namespace spook {
 
 RigidSystem::RigidSystem(const RigidScene& scene)
-    : springs_(scene.springs), fields_(scene.fields), gravity_(scene.gravity), method_(scene.method),
-      h_(scene.method.time_step / scene.method.substeps), joints_(scene, h_) {
+    : springs_(scene.springs),
+      fields_(scene.fields),
+      gravity_(scene.gravity),
+      method_(scene.method),
+      h_(scene.method.time_step / scene.method.substeps),
+      joints_(scene, h_) {
     for (const RigidBodySpec& spec : scene.bodies) {
         constants_.push_back(constants_of(spec));
         start_.push_back(start_of(spec, constants_.back()));
@@ -45,14 +49,17 @@ RigidSystem::RigidSystem(const RigidScene& scene)
     if (touching) {
         std::vector<SurfaceMaterial> materials;
         for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
-        fresh_contacts_.emplace(std::move(detection), materials, slot_,
-                                ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
-                                               method_.residual_tolerance, method_.floor, method_.refinements});
+        fresh_contacts_.emplace(
+            std::move(detection), materials, slot_,
+            ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
+                           method_.residual_tolerance, method_.floor, method_.refinements});
     }
     if (method_.solver == SolverKind::iterative)
         solver_ = joints_.blocks().empty() ? RigidSolver::none : RigidSolver::iterative;
     else
-        solver_ = joints_.blocks().empty() ? RigidSolver::none : bounded ? RigidSolver::pivot : RigidSolver::block;
+        solver_ = joints_.blocks().empty() ? RigidSolver::none
+                  : bounded                ? RigidSolver::pivot
+                                           : RigidSolver::block;
     if (solver_ == RigidSolver::block) analyse_block();
     reset(nullptr);
 }
@@ -99,7 +106,8 @@ void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
 
 Health RigidSystem::health() const {
     if (live_.too_fast >= 0)
-        return {Status::diverged, live_.too_fast, "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+        return {Status::diverged, live_.too_fast,
+                "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
     if (live_.contradicted >= 0)
         return {Status::diverged, live_.contradicted,
                 "is held by rows that contradict each other; give one of them a compliance"};
@@ -113,7 +121,9 @@ Health RigidSystem::health() const {
                 return {Status::diverged, body};
     }
     if (live_.not_solved >= 0)
-        return {Status::not_finite, live_.not_solved, "belongs to a system of rows that cannot be solved; give its joints a compliance or the method a floor"};
+        return {
+            Status::not_finite, live_.not_solved,
+            "belongs to a system of rows that cannot be solved; give its joints a compliance or the method a floor"};
     return {};
 }
 
@@ -186,8 +196,8 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     std::int64_t moving = 0;
     for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;
-    report.counters["force_evaluations"] =
-        substeps * (static_cast<std::int64_t>(springs_.size()) + static_cast<std::int64_t>(fields_.size()) * moving);
+    report.counters["force_evaluations"] = substeps * (static_cast<std::int64_t>(springs_.size()) +
+                                                       static_cast<std::int64_t>(fields_.size()) * moving);
     report.residual = residual_;
     if (!contacts_) return;
     const ContactCounters contact = contacts_->counters();

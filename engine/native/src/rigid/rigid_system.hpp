@@ -31,7 +31,9 @@ public:
     void advance(std::int64_t steps);
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const;
-    void save() { saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_, saved_contacts_ = contacts_; }
+    void save() {
+        saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_, saved_contacts_ = contacts_;
+    }
     void restore() {
         live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_, contacts_ = saved_contacts_;
     }
@@ -71,9 +73,9 @@ public:
 private:
     struct Live {
         LargeArray<BodyState> bodies;
-        int too_fast = -1;   // the first body that turned too fast
+        int too_fast = -1;    // the first body that turned too fast
         int not_solved = -1;  // a body of a system that could not be factored
-        double share = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
+        double share = 0.0;  // how redundant rows share their load: a softness in the factor; −1: they do not
         int contradicted = -1;  // a body held by rows that cannot hold together
     };
 
@@ -120,11 +122,11 @@ private:
     LargeArray<JointSet::State> saved_joints_;
 
     // One step's work.
-    std::vector<Vec3> force_;           // of springs and centres, per body
-    std::vector<int> tied_;             // dynamic bodies that have rows
-    std::vector<int> free_, driven_;    // dynamic bodies that never have rows; kinematic ones
+    std::vector<Vec3> force_;         // of springs and centres, per body
+    std::vector<int> tied_;           // dynamic bodies that have rows
+    std::vector<int> free_, driven_;  // dynamic bodies that never have rows; kinematic ones
     bool tied_are_moved_ = false;
-    std::vector<int> slot_;             // per body: its place among the tied bodies, −1
+    std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     LargeArray<double> right_, solution_, left_;
     struct BlockPlace {
@@ -132,15 +134,15 @@ private:
         bool first_particle = false, second_particle = false;
     };
     std::vector<BlockPlace> places_;
-    LargeArray<double> spare_;         // Jacobians with nowhere else to go, per block 2 × rows × 6
+    LargeArray<double> spare_;  // Jacobians with nowhere else to go, per block 2 × rows × 6
     std::vector<std::size_t> spare_at_;
-    bool mixed_values_ = false;         // whether the last step's rows are in mixed_ or in matrix_
+    bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_, saved_mixed_;
     PivotSolver pivot_;
     std::optional<ContactStage> contacts_, fresh_contacts_, saved_contacts_;
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
-    double residual_ = 0.0;             // largest an iterative solve stopped at, m/s
+    double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
     std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;
     StageClock* clock_ = nullptr;
 };

@@ -22,7 +22,7 @@ struct Observation {
     int quantity = 0;  // index of the sampler
     Reduction reduction = Reduction::final;
     std::int64_t first = 0;
-    std::int64_t last = -1;  // −1: the last step
+    std::int64_t last = -1;   // −1: the last step
     bool from_start = false;  // subtract the value at sample 0 from every sample
     std::int64_t every = 1;   // traces only
 };

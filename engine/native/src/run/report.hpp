@@ -31,7 +31,7 @@ struct Recording {
 
 struct RunReport {
     Status status = Status::completed;
-    std::int64_t steps = 0;        // steps done; of a failed run, those before the failing step
+    std::int64_t steps = 0;         // steps done; of a failed run, those before the failing step
     std::int64_t failed_step = -1;  // counted from 1
     int failed_body = -1;           // index in the scene
     std::string reason;             // what is wrong with that body, when the status does not say it

@@ -8,15 +8,48 @@
 namespace spook {
 
 enum class Stage {
-    collision, apply_gravity, apply_central_gravity, apply_springs, apply_loads, impact, string_stiffness,
-    assemble_rows, tangents, solve_path, solve_block, solve_iterative, pivot, friction, correct_curvature,
-    half_step, integrate_positions, integrate_rotations, observe, count
+    collision,
+    apply_gravity,
+    apply_central_gravity,
+    apply_springs,
+    apply_loads,
+    impact,
+    string_stiffness,
+    assemble_rows,
+    tangents,
+    solve_path,
+    solve_block,
+    solve_iterative,
+    pivot,
+    friction,
+    correct_curvature,
+    half_step,
+    integrate_positions,
+    integrate_rotations,
+    observe,
+    count
 };
 
 inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::count)> STAGE_NAMES = {
-    "collision", "apply_gravity", "apply_central_gravity", "apply_springs", "apply_loads", "impact",
-    "string_stiffness", "assemble_rows", "tangents", "solve_path", "solve_block", "solve_iterative", "pivot",
-    "friction", "correct_curvature", "half_step", "integrate_positions", "integrate_rotations", "observe"};
+    "collision",
+    "apply_gravity",
+    "apply_central_gravity",
+    "apply_springs",
+    "apply_loads",
+    "impact",
+    "string_stiffness",
+    "assemble_rows",
+    "tangents",
+    "solve_path",
+    "solve_block",
+    "solve_iterative",
+    "pivot",
+    "friction",
+    "correct_curvature",
+    "half_step",
+    "integrate_positions",
+    "integrate_rotations",
+    "observe"};
 
 class StageClock {
 public:

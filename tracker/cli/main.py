@@ -1,0 +1,275 @@
+"""The command line: parse, call, print. Everything but click is imported inside the commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli.options import (
+    RED,
+    OneLineErrors,
+    database_option,
+    example,
+    source_options,
+    workers_option,
+)
+from spook_tracker.tracker.cli.storage import db, export, import_files, schema
+
+FIRST_STEPS = """\
+Tracks whether a physics engine became less accurate, less stable or slower.
+
+\b
+Three usual ways in:
+  tracker nightly --out public     one line for a cron job: run, record, analyse, publish
+  tracker compare previous latest  at a desk: what changed between two versions
+  tracker serve public             look at the trend website
+
+\b
+A first run:
+  tracker run                      measure every scalar test of this engine and record it
+  tracker list                     the questions that are asked
+"""
+
+
+@click.group(cls=OneLineErrors, help=FIRST_STEPS, invoke_without_command=True)
+@click.option("--version", is_flag=True, help="Show the versions of tracker and engine, and exit.")
+@click.pass_context
+def main(context: click.Context, version: bool) -> None:
+    if version:
+        _print_versions()
+    elif context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+def _print_versions() -> None:
+    from spook_tracker.tracker.measure.run import Source, present_version, tracker_version
+
+    engine = present_version(Source())
+    click.echo(
+        f"tracker {tracker_version()}, {engine.name} {engine.version} ({engine.git_hash[:10] or 'no commit'})"
+    )
+
+
+@main.command("run", epilog=example("tracker run pendulum door --sweep --json run.json"))
+@click.argument("tests", nargs=-1, metavar="[TEST]...")
+@click.option("--sweep", is_flag=True, help="Also measure error against run time.")
+@click.option("--stability", is_flag=True, help="Also find break points and stability maps.")
+@click.option("--figures", is_flag=True, help="Also draw the figures' data.")
+@click.option("--no-record", is_flag=True, help="Measure and print only.")
+@click.option("--all", "everything", is_flag=True, help="Show values without a limit, too.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
+)
+@click.option(
+    "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
+)
+@workers_option
+@source_options
+@database_option
+def run_command(
+    tests: tuple[str, ...],
+    sweep: bool,
+    stability: bool,
+    figures: bool,
+    no_record: bool,
+    everything: bool,
+    json_file: Path | None,
+    junit_file: Path | None,
+    workers: int,
+    engine: str,
+    catalogue: str,
+    database: str,
+) -> None:
+    """Run scalar tests (all, or those named), print the pass table and record one run."""
+    from spook_tracker.tracker.measure.run import Request
+
+    request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
+    document = _measure(request, engine, catalogue, None if no_record else database)
+    _print_run(document, everything)
+    if json_file:
+        _write(json_file, _json(document))
+    if junit_file:
+        from spook_tracker.tracker.cli.report_junit import junit_of_run
+
+        _write(junit_file, junit_of_run(document))
+    _exit_red_if(document)
+
+
+@main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
+@click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
+@click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
+@workers_option
+@click.option(
+    "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
+)
+@click.option(
+    "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
+)
+@source_options
+@database_option
+def nightly(
+    out: Path,
+    quick: bool,
+    workers: int,
+    json_file: Path | None,
+    junit_file: Path | None,
+    engine: str,
+    catalogue: str,
+    database: str,
+) -> None:
+    """Run everything, record it, judge it against the history and publish the website."""
+    from spook_tracker.tracker.measure.run import Request
+
+    request = Request(figures=True, sweep=not quick, stability=not quick, workers=workers, trigger="nightly")
+    document = _measure(request, engine, catalogue, database)
+    _print_run(document, everything=False)
+    if json_file:
+        _write(json_file, _json(document))
+    if junit_file:
+        from spook_tracker.tracker.cli.report_junit import junit_of_run
+
+        _write(junit_file, junit_of_run(document))
+    regressed = _judge_and_publish(database, document.id, out)
+    if regressed:
+        click.get_current_context().exit(RED)
+    _exit_red_if(document)
+
+
+@main.command(epilog=example("tracker publish --out public"))
+@click.option(
+    "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
+)
+@database_option
+def publish(out: Path, database: str) -> None:
+    """Build the website from what is recorded."""
+    from spook_tracker.tracker.cli.history import history_of
+
+    with history_of(database) as history:
+        _publish(history, out)
+
+
+@main.command(epilog=example("tracker serve public --port 8000"))
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option(
+    "--port", default=8000, show_default=True, type=click.IntRange(0, 65535), help="0: any free one."
+)
+def serve(folder: Path, port: int) -> None:
+    """Look at a published website on this machine."""
+    from functools import partial
+    from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+    from spook_tracker.tracker.document.errors import TrackerError
+
+    if not (folder / "index.html").is_file():
+        raise TrackerError(f"{folder} holds no website; make one with: tracker publish --out {folder}")
+    try:
+        server = ThreadingHTTPServer(
+            ("127.0.0.1", port), partial(SimpleHTTPRequestHandler, directory=str(folder))
+        )
+    except OSError as error:
+        raise TrackerError(
+            f"port {port} cannot be used ({error.strerror}); choose another with --port"
+        ) from None
+    click.echo(f"http://127.0.0.1:{server.server_address[1]}/ shows {folder}; stop with Ctrl-C")
+    with server:
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            click.echo()
+
+
+for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+    main.add_command(command)
+
+
+def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
+    """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
+    from spook_tracker.tracker.cli.console import watching
+    from spook_tracker.tracker.measure.run import Source, run
+
+    source = Source(catalogue=catalogue, engine=engine)
+    if database is None:
+        with watching("measuring") as step:
+            return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+    from sqlalchemy.orm import Session
+
+    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.record import record
+
+    opened = open_database(database)
+    try:
+        with watching("measuring") as step:
+            document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        with Session(opened) as session:
+            record(session, document)
+    finally:
+        opened.dispose()
+    return document
+
+
+def _print_run(document: Any, everything: bool) -> None:
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.report_table import pass_table
+
+    say(pass_table(document, everything))
+
+
+def _exit_red_if(document: Any) -> None:
+    from spook_tracker.tracker.cli.report_table import red
+
+    if red(document):
+        click.get_current_context().exit(RED)
+
+
+def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
+    """Whether tonight is worse than the history, having said so and published the site."""
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.history import accepted_levels, history_of
+    from spook_tracker.tracker.cli.report_compare import finding_lines
+    from spook_tracker.tracker.judge.tonight import tonight
+
+    with history_of(database) as history:
+        findings = tonight(history, history.run(run_id), accepted_levels())
+        say("\n".join(finding_lines(findings, f"{out}/")))
+    _retain(database)
+    with history_of(database) as history:
+        _publish(history, out)
+    return any(finding.red for finding in findings)
+
+
+def _retain(database: str) -> None:
+    """Drop figures and maps that the retention rule no longer keeps, once they have been compared."""
+    from sqlalchemy.orm import Session
+
+    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.history import History
+    from spook_tracker.tracker.store.retention import drop_old_figures
+
+    opened = open_database(database)
+    try:
+        with Session(opened) as session:
+            drop_old_figures(session, History(session))
+    finally:
+        opened.dispose()
+
+
+def _publish(history: Any, out: Path) -> None:
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.website.publish import publish as build
+
+    report = build(history, out, accepted_levels())
+    say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
+
+
+def _json(document: Any) -> str:
+    import msgspec
+
+    return msgspec.json.format(msgspec.json.encode(document), indent=1).decode() + "\n"
+
+
+def _write(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8")

@@ -1,0 +1,115 @@
+"""What all commands share: options, and errors as one line that names what to do next.
+
+Exit codes everywhere: 0 same, better or green; 1 a regression or a red test; 2 usage error, no such version,
+no data, unreadable database; 3 not comparable. Only click is imported here, so that `--help` answers at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn, TypeVar
+
+import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
+
+
+def database_option(command: Command) -> Command:
+    """--db URL, or TRACKER_DB."""
+    return click.option(
+        "--db",
+        "database",
+        metavar="URL",
+        envvar="TRACKER_DB",
+        default="sqlite:///tracker.db",
+        show_default=True,
+        help="History: sqlite:///FILE or postgresql://…; also TRACKER_DB.",
+    )(command)
+
+
+def source_options(command: Command) -> Command:
+    """Which questions are put to which engine."""
+    for option in (
+        click.option(
+            "--engine",
+            metavar="MODULE",
+            envvar="TRACKER_ENGINE",
+            default="engine",
+            help="Another engine behind the same simulate(); also TRACKER_ENGINE.",
+        ),
+        click.option(
+            "--catalogue",
+            metavar="MODULE:NAME",
+            envvar="TRACKER_CATALOGUE",
+            default="spook_tracker.scalar_tests.catalogue:CATALOGUE",
+            help="Another table of scalar tests; also TRACKER_CATALOGUE.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def workers_option(command: Command) -> Command:
+    """How many processes measure values; run times are always taken alone."""
+    return click.option(
+        "--workers",
+        default=2,
+        show_default=True,
+        type=click.IntRange(1, 256),
+        help="Processes that measure values.",
+    )(command)
+
+
+def example(*lines: str) -> str:
+    """The example at the end of a command's help."""
+    return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)
+
+
+class OneLineErrors(click.Group):
+    """A group whose errors are one line on standard error; a traceback only with TRACKER_DEBUG=1."""
+
+    def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> NoReturn:
+        options["standalone_mode"] = False
+        try:
+            code = super().main(args, *rest, **options)
+        except click.ClickException as error:
+            command = (
+                error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "tracker"
+            )
+            complain(f"{error.format_message()} (see: {command} --help)")
+            code = UNUSABLE
+        except (click.Abort, KeyboardInterrupt):
+            complain("interrupted; nothing of this command was recorded")
+            code = UNUSABLE
+        except BrokenPipeError:
+            sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - nobody reads any more
+            code = GREEN
+        except Exception as error:
+            code = _unusable(error)
+        sys.exit(code if isinstance(code, int) else GREEN)
+
+
+def _unusable(error: Exception) -> int:
+    """Say what went wrong and return the exit code."""
+    if os.environ.get("TRACKER_DEBUG"):
+        raise error
+    from spook_tracker.tracker.document.errors import TrackerError
+
+    if isinstance(error, TrackerError):
+        complain(str(error))
+        return error.exit_code
+    if isinstance(error, OSError):
+        where = f"{error.filename}: " if error.filename else ""
+        complain(f"{where}{error.strerror or error}; check the path and its permissions")
+        return UNUSABLE
+    complain(f"{type(error).__name__}: {error}; this is a defect: TRACKER_DEBUG=1 shows where")
+    return UNUSABLE
+
+
+def complain(sentence: str) -> None:
+    """One line on standard error."""
+    click.echo("tracker: " + " ".join(sentence.split()), err=True)

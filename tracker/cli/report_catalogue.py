@@ -1,0 +1,111 @@
+"""The questions themselves: the list, one test in full, and the stages its scene needs."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import click
+
+from spook_tracker.scalar_tests.case import Measurement, Metric, ScalarTest
+from spook_tracker.tracker.cli.console import Column, table, width
+from spook_tracker.tracker.cli.report_sweep import seconds
+from spook_tracker.tracker.cli.report_table import number
+from spook_tracker.tracker.measure.cards import explained
+
+
+def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
+    """Every test with its question and its first gate."""
+    rows = []
+    for name, test in tests.items():
+        gates = [metric for _, metric in test.metrics() if metric.role == "gate"]
+        more = f" +{len(gates) - 1}" if len(gates) > 1 else ""
+        rows.append((name, (limit_of(gates[0]) + more) if gates else "-", test.question))
+    columns = (Column("test"), Column("limit"), Column("question", flexible=True))
+    seven = sum(test.seven for test in tests.values())
+    footer = (
+        f"{len(rows)} tests, {seven} of them the continuous tests of the thesis; more with: tracker show TEST"
+    )
+    return "\n".join([*table(columns, rows), "", footer])
+
+
+def limit_of(metric: Metric) -> str:
+    """The limit in signs, with its unit."""
+    unit = "" if metric.unit in ("", "1") else f" {metric.unit}"
+    if metric.limit is None:
+        return "no limit"
+    if isinstance(metric.limit, tuple):
+        return f"{number(metric.limit[0], 7)} … {number(metric.limit[1], 7)}{unit}"
+    return f"{'≥' if metric.better == 'larger' else '≤'} {number(metric.limit)}{unit}"
+
+
+def card(name: str, test: ScalarTest) -> str:
+    """One test as its page says it."""
+    room = min(width(), 100)
+
+    def paragraph(title: str, *texts: str) -> Iterator[str]:
+        if any(texts):
+            yield click.style(title, bold=True)
+            for text in texts:
+                yield from textwrap.wrap(text, room, initial_indent="  ", subsequent_indent="  ")
+            yield ""
+
+    lines = [click.style(f"{test.title} ({name})", bold=True), *textwrap.wrap(test.question, room), ""]
+    lines += paragraph("Why", test.why)
+    lines += paragraph("Model", test.model, *(f"{label}: {value}" for label, value in test.parameters))
+    lines += paragraph("Theory", *test.theory)
+    lines += paragraph("Reference", test.reference)
+    lines += [click.style("Measured", bold=True)]
+    for measurement, metric in test.metrics():
+        lines += [f"  {line}" for line in _metric(measurement, metric, room - 2)]
+    lines += ["", *paragraph("Conclusion", test.conclusion), *paragraph("Source", test.source)]
+    lines += paragraph("Misprints", *test.misprints)
+    return "\n".join(lines).rstrip()
+
+
+def _metric(measurement: Measurement, metric: Metric, room: int) -> Iterator[str]:
+    yield f"{metric.role} {metric.name} [{measurement.configuration}, h = {measurement.time_step:.6g} s]"
+    limit = f"{limit_of(metric)} ({metric.limit_source})" if metric.limit_source else limit_of(metric)
+    yield from textwrap.wrap(
+        f"{metric.description}; {limit}", room, initial_indent="  ", subsequent_indent="  "
+    )
+    if metric.set_point is not None:
+        low, high = metric.set_point
+        source = f" ({metric.set_point_source})" if metric.set_point_source else ""
+        words = f"set point {number(low, 10)} … {number(high, 10)} {metric.unit}{source}"
+        yield from textwrap.wrap(words, room, initial_indent="  ", subsequent_indent="  ")
+
+
+def _per_step(cost: float | None, verb: str) -> str:
+    return "" if cost is None else f"{verb} {seconds(cost)}" if cost > 0.0 else f"{verb} nothing"
+
+
+def stage_table(
+    name: str,
+    test: ScalarTest,
+    engine: Any,
+    costs: Mapping[str, float] | None = None,
+    saved: Mapping[str, float] | None = None,
+) -> str:
+    """The stages of a step of this test's scene: first those kept, in order, then why.
+
+    `costs` are seconds per step of stages kept, `saved` those that leaving a stage out saves, if measured.
+    """
+    choices = list(explained(test, engine))
+    kept = [choice.stage for choice in choices if choice.kept]
+    rows: list[tuple[str, ...]] = [("✓ kept" if c.kept else "· left out", c.stage, c.reason) for c in choices]
+    columns: tuple[Column, ...] = (Column("stage"), Column("name"), Column("why", flexible=True))
+    if costs is not None and saved is not None:
+        told = [
+            _per_step(costs.get(c.stage), "takes") if c.kept else _per_step(saved.get(c.stage), "saves")
+            for c in choices
+        ]
+        columns = (*columns[:2], Column("a step", "right"), columns[2])
+        rows = [(*row[:2], cost, row[2]) for row, cost in zip(rows, told, strict=True)]
+
+    def paint(row: int, text: str) -> str:
+        return click.style(text, fg="green" if choices[row].kept else None)
+
+    lines = [f"{name}: {' → '.join(kept)}", ""]
+    return "\n".join(lines + table(columns, rows, colour={0: paint}))

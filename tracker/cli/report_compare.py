@@ -1,0 +1,248 @@
+"""A comparison for a terminal, for a pull request, and the lines about what is red."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from spook_tracker.tracker.cli.console import Column, clean, table, width
+from spook_tracker.tracker.document.run_document import Number, from_number
+from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
+from spook_tracker.tracker.judge.series_history import Finding
+
+MARK = {
+    "regressed": "✗",
+    "missing": "✗",
+    "non_deterministic": "✗",
+    "not_comparable": "?",
+    "accepted": "!",
+    "fixed": "✓",
+    "improved": "✓",
+    "identical": "=",
+    "same": "=",
+}
+COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
+QUIET = {"identical", "same", "not_measured"}
+MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
+
+
+def value(number: Number | None, unit: str = "") -> str:
+    """A value for a table; enough digits to see a change."""
+    if number is None:
+        return "-"
+    return f"{from_number(number):.9g} {unit if unit != '1' else ''}".rstrip()
+
+
+def both(change: Change) -> tuple[str, str]:
+    """Values before and after with as many digits as it takes to tell them apart, the later with its unit."""
+    if change.before is None or change.after is None:
+        return value(change.before), value(change.after, change.unit)
+    old, new = from_number(change.before), from_number(change.after)
+    digits = 6
+    while digits < 17 and old != new and f"{old:.{digits}g}" == f"{new:.{digits}g}":
+        digits += 1
+    unit = "" if change.unit in ("", "1") else f" {change.unit}"
+    return f"{old:.{digits}g}", f"{new:.{digits}g}{unit}"
+
+
+def name_of(side: Side) -> str:
+    """Version and commit of a side."""
+    commit = f" ({side.git_hash[:10]})" if side.git_hash else ""
+    return clean(f"{side.engine} {side.version}{commit}" + (" with local changes" if side.dirty else ""))
+
+
+def _limit(limit: float | tuple[float, float] | None) -> str:
+    if limit is None:
+        return "no limit"
+    return f"limit {limit[0]:g} … {limit[1]:g}" if isinstance(limit, tuple) else f"limit {limit:g}"
+
+
+def red_lines(changes: Sequence[Change]) -> list[str]:
+    """A line for each red series; of a ladder its worst rung speaks for the others."""
+    lines: list[str] = []
+    rungs: dict[tuple[str, str, str], list[Change]] = {}
+    for change in changes:
+        if change.red and change.kind == "ladder":
+            rungs.setdefault((change.test, change.metric, change.configuration), []).append(change)
+        elif change.red:
+            lines.append(red_line(change))
+    for group in rungs.values():
+        worst = max(group, key=lambda change: change.decades or 0.0)
+        more = f"; and {len(group) - 1} more of its time steps" if len(group) > 1 else ""
+        lines.append(red_line(worst) + more)
+    return lines
+
+
+def red_line(change: Change) -> str:
+    """All a reader needs to act: test, metric, both values, limit, first bad commit, page to open."""
+    place = ", ".join([change.configuration, *change.series.split("/")[3:]])
+    parts = [
+        f"✗ {change.test} {change.metric} [{place}]: {change.name or change.word}",
+        " → ".join(both(change)),
+        _limit(change.limit),
+        change.sentence,
+    ]
+    if change.first_bad:
+        parts.append(f"first bad commit {change.first_bad}, last good {change.last_good or 'unknown'}")
+    if change.page:
+        parts.append(f"see {change.page}")
+    return clean("; ".join(part for part in parts if part))
+
+
+def compare_table(document: CompareDocument, everything: bool = False, room: int | None = None) -> str:
+    """The comparison for a terminal: what is red in full, the rest in a table, the verdict last."""
+    shown = [change for change in document.changes if everything or change.word not in QUIET]
+    lines = [click.style(f"{name_of(document.before)} → {name_of(document.after)}", bold=True), ""]
+    if shown:
+        rows = [
+            (
+                _what(change),
+                change.series,
+                *both(change),
+                _how(change),
+            )
+            for change in shown
+        ]
+        columns = (
+            Column("what"),
+            Column("series", flexible=True, least=30),
+            Column("before", "right"),
+            Column("after", "right"),
+            Column("how", flexible=True, least=12),
+        )
+        lines += [*table(columns, rows, room or width(), {0: _paint}), ""]
+    reds = [click.style(line, fg="red") for line in red_lines(document.changes)]
+    lines += [*reds, ""] if reds else []
+    lines += _frontier_lines(_moved(document), room or width())
+    lines += [f"note: {clean(note)}" for note in document.notes]
+    lines.append(_verdict(document))
+    return "\n".join(lines)
+
+
+def _how(change: Change) -> str:
+    """The size of the change in few letters: decades, or per cent; else the sentence."""
+    if change.kind == "run_time" or not change.decades:
+        return change.sentence
+    if abs(change.decades) >= 0.05:
+        return f"{change.decades:+.1f} decades"
+    return f"{100.0 * (10.0**change.decades - 1.0):+.2g} %"
+
+
+def _what(change: Change) -> str:
+    """Mark and word; of a regression its name."""
+    word = change.name if change.red and change.name else change.word.replace("_", " ")
+    return f"{MARK.get(change.word, '·')} {word}"
+
+
+def _paint(_row: int, text: str) -> str:
+    return click.style(text, fg=COLOUR.get(text[:1]))
+
+
+def _moved(document: CompareDocument) -> list[Frontier]:
+    """Ladders on which an error or the run time changed; what is inside the noise is not told."""
+    moved = {
+        (change.test, change.metric.split(":")[1], change.configuration)
+        for change in document.changes
+        if change.metric.startswith("ladder:")
+        and change.kind in ("ladder", "run_time")
+        and change.word not in QUIET
+    }
+    return [f for f in document.frontiers if (f.test, f.ladder, f.configuration) in moved]
+
+
+def _frontier_lines(told: Sequence[Frontier], room: int) -> list[str]:
+    if not told:
+        return []
+    rows = [
+        (f"{f.test} {f.ladder}", f.configuration, *(f"{r:.3g}" if r else "-" for r in _ratios(f)))
+        for f in told
+    ]
+    columns = (
+        Column("error against run time", flexible=True),
+        Column("configuration"),
+        Column("time at equal error", "right"),
+        Column("error at equal time", "right"),
+        Column("steps at equal error", "right"),
+    )
+    return [*table(columns, rows, room), "(later / earlier; above 1 is worse)", ""]
+
+
+def _ratios(frontier: Frontier) -> tuple[float | None, float | None, float | None]:
+    return frontier.time_at_equal_error, frontier.error_at_equal_time, frontier.work_at_equal_error
+
+
+def counted(document: CompareDocument) -> str:
+    """Counts by word, the worst first."""
+    return ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in document.counts.items())
+
+
+def _verdict(document: CompareDocument) -> str:
+    mark = {"regressed": "✗", "not_comparable": "?"}.get(document.verdict, "✓")
+    words = f"{mark} {document.verdict.replace('_', ' ')}: {counted(document) or 'nothing measured'}"
+    return click.style(words, fg=COLOUR.get(mark), bold=True)
+
+
+def compare_markdown(document: CompareDocument) -> str:
+    """The comparison as Markdown; names and sentences from outside are data, never markup."""
+    lines = [
+        f"### {_escape(name_of(document.before))} → {_escape(name_of(document.after))}",
+        "",
+        f"**{document.verdict.replace('_', ' ')}**: {counted(document)}",
+        "",
+    ]
+    shown = [change for change in document.changes if change.word not in QUIET]
+    if shown:
+        lines += ["| | series | before | after | limit | how |", "|---|---|---:|---:|---|---|"]
+    for change in shown[:MOST_ROWS]:
+        cells = (
+            _what(change),
+            change.series,
+            *both(change),
+            _limit(change.limit),
+            change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
+        )
+        lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
+    if len(shown) > MOST_ROWS:
+        lines.append(f"\nand {len(shown) - MOST_ROWS} more")
+    moved = _moved(document)
+    if moved:
+        lines += ["", "| later / earlier, above 1 is worse | time at equal error | error at equal time |"]
+        lines += ["|---|---:|---:|"]
+    for f in moved[:MOST_ROWS]:
+        ratios = [f"{ratio:.3g}" if ratio else "-" for ratio in _ratios(f)[:2]]
+        lines.append(f"| {_escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
+    lines += ["", *(f"- {_escape(note)}" for note in document.notes)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _escape(text: str) -> str:
+    """Markdown and HTML signs made harmless."""
+    text = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return "".join("\\" + c if c in "\\`*_{}[]#|~!" else c for c in text).replace(
+        "@", "@\N{ZERO WIDTH SPACE}"
+    )
+
+
+def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
+    """What tonight came to against the history: a line for each red series, and one over all."""
+    lines = [click.style(_finding_line(finding, site), fg="red") for finding in findings if finding.red]
+    if lines:
+        return [*lines, click.style(f"✗ {len(lines)} worse than the history", fg="red", bold=True)]
+    return [click.style(f"✓ {len(findings)} series hold their level", fg="green")]
+
+
+def _finding_line(finding: Finding, site: str) -> str:
+    from spook_tracker.tracker.judge.compare import page_of
+
+    judged, definition = finding.judged, finding.definition
+    parts = [f"✗ {finding.series}: {finding.verdict.name or finding.verdict.word}"]
+    if judged is not None and definition is not None:
+        before = judged.against.sample.value if judged.against else None
+        parts.append(f"{value(before)} → {value(judged.night.sample.value, definition.unit)}")
+        parts.append(_limit(definition.limit))
+    parts.append(finding.verdict.sentence)
+    if finding.first_bad:
+        parts.append(f"first bad commit {finding.first_bad}, last good {finding.last_good or 'unknown'}")
+    parts.append(f"see {site}{page_of(finding.test)}")
+    return clean("; ".join(parts))

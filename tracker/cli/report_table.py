@@ -1,0 +1,238 @@
+"""The pass table of one run: every limit, what was measured against it, and whether it held."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import click
+
+from spook_tracker.tracker.cli.console import Column, Style, clean, table, width
+from spook_tracker.tracker.cli.report_sweep import sweep_table
+from spook_tracker.tracker.document.run_document import (
+    MapData,
+    RunDocument,
+    Sample,
+    SeriesDefinition,
+    from_number,
+)
+from spook_tracker.tracker.judge.verdict import cell_rank
+
+NARROW = 100  # columns; below, time step and set point have no column of their own
+ROLES = {"gate": 0, "companion": 1, "reported": 2}
+Pair = tuple[SeriesDefinition, Sample]
+
+
+def number(value: float, digits: int = 6) -> str:
+    """A value as a reader wants it: six digits, no padding."""
+    return f"{value:.{digits}g}"
+
+
+def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> str:
+    """The value with its unit, or the class of its failure."""
+    value = from_number(sample.value)
+    if sample.outcome not in ("value", "out_of_limit") and not math.isinf(value):
+        return sample.outcome.replace("_", " ")
+    return f"{number(value, digits)} {_unit(definition)}".rstrip()
+
+
+def limit(definition: SeriesDefinition) -> str:
+    """The limit in signs: "≤ 0.004 %", "≥ 100", "0.4999 … 0.5001"."""
+    if definition.limit is None:
+        return "-"
+    if isinstance(definition.limit, tuple):
+        low, high = definition.limit
+        return f"{number(low)} … {number(high)}"
+    sign = "≥" if definition.better == "larger" else "≤"
+    return f"{sign} {number(definition.limit)} {_unit(definition)}".rstrip()
+
+
+def _unit(definition: SeriesDefinition) -> str:
+    return "" if definition.unit in ("", "1") else definition.unit
+
+
+def margin(definition: SeriesDefinition, sample: Sample) -> str:
+    """How far inside the limit: per cent, or decades where per cent says nothing; negative is outside."""
+    value, bound = from_number(sample.value), definition.limit
+    if bound is None or not math.isfinite(value):
+        return "-"
+    if isinstance(bound, tuple):
+        centre, half = 0.5 * (bound[0] + bound[1]), 0.5 * (bound[1] - bound[0])
+        used, allowed = abs(value - centre), half
+    elif definition.better in ("larger", "smaller"):
+        if bound == 0.0:
+            return "-"
+        share = (value - bound) / abs(bound) * (1.0 if definition.better == "larger" else -1.0)
+        return _percent(share)
+    else:
+        used, allowed = abs(value), bound
+    if used == 0.0:
+        return "exact"
+    if allowed <= 0.0:
+        return "-"
+    decades = math.log10(allowed / used)
+    return f"{decades:+.1f} decades" if abs(decades) >= 1.0 else _percent(1.0 - used / allowed)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:+.3g} %" if abs(share) >= 1e-4 or share == 0.0 else f"{'+-'[share < 0.0]}<0.01 %"
+
+
+def set_point(definition: SeriesDefinition, sample: Sample) -> str:
+    """Whether the value stands where theory puts it."""
+    if definition.set_point is None:
+        return "-"
+    return "held" if sample.set_point_held else "LEFT"
+
+
+def is_red(definition: SeriesDefinition, sample: Sample) -> bool:
+    """A gate or companion outside its limit or off its set point. Reported values are never red alone."""
+    return definition.role != "reported" and not (
+        sample.passed and (sample.set_point_held or definition.set_point is None)
+    )
+
+
+def word(definition: SeriesDefinition, sample: Sample) -> str:
+    """The last column: what a reader looks for first."""
+    if definition.role == "reported":
+        return "· seen" if sample.passed else "· " + sample.outcome.replace("_", " ")
+    return "✓ PASS" if sample.passed else "✗ FAIL"
+
+
+def pairs(run: RunDocument) -> list[Pair]:
+    """Definitions with their samples, tests in order, gates first."""
+    samples = {sample.series: sample for sample in run.samples}
+    places = {card.name: i for i, card in enumerate(run.tests)}
+    found = [(definition, samples[definition.key]) for definition in run.series if definition.key in samples]
+    return sorted(found, key=lambda pair: (places.get(pair[0].test, len(places)), ROLES[pair[0].role]))
+
+
+def red(run: RunDocument) -> list[Pair]:
+    """What is red tonight."""
+    return [pair for pair in pairs(run) if is_red(*pair)]
+
+
+def pass_table(run: RunDocument, everything: bool = False, room: int | None = None) -> str:
+    """The table with its heading and its verdict, ready to print."""
+    shown = [pair for pair in pairs(run) if pair[0].kind == "scalar"]
+    if not everything:
+        shown = [pair for pair in shown if pair[0].role != "reported"]
+    lines = [title(run), ""]
+    lines += _scalars(shown, room or width())
+    ladders = [pair for pair in pairs(run) if pair[0].kind in ("ladder", "order", "time")]
+    if ladders:
+        lines += ["", *sweep_table(ladders, room or width())]
+    points = [pair for pair in pairs(run) if pair[0].kind == "break_point"]
+    if points or run.maps:
+        lines += ["", click.style("Stability", bold=True)]
+        lines += _scalars(points, room or width()) if points else []
+        lines += [_map_line(found) for found in run.maps]
+    lines += ["", *failures(run), verdict(run)]
+    return "\n".join(lines)
+
+
+def _map_line(found: MapData) -> str:
+    """How many cells of a map are what."""
+    count = Counter(cell for row in found.cells for cell in row)
+    words = ", ".join(f"{count[cell]} {cell.replace('_', ' ')}" for cell in sorted(count, key=cell_rank))
+    return clean(f"map {found.test} {found.name} [{found.configuration}]: {words}")
+
+
+def title(run: RunDocument) -> str:
+    """Which engine, which commit, which machine."""
+    engine = run.engine
+    commit = engine.git_hash[:10] + (" with local changes" if engine.dirty else "")
+    words = f"{engine.name} {engine.version} · {commit} · {run.machine.processor} · {run.started[:16]}Z"
+    return click.style(clean(words), bold=True)
+
+
+def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
+    """A heading row for each test, its values beneath; set point and time step where there is room."""
+    narrow = room < NARROW
+    rows: list[tuple[str, ...]] = []
+    previous = ""
+    for definition, sample in shown:
+        columns = NARROW_COLUMNS if narrow else WIDE_COLUMNS
+        if definition.test != previous:
+            rows.append((definition.test, *[""] * (len(columns) - 1)))
+        previous = definition.test
+        rows.append(_row(definition, sample, narrow))
+    return table(NARROW_COLUMNS if narrow else WIDE_COLUMNS, rows, room, _styles(narrow))
+
+
+def _row(definition: SeriesDefinition, sample: Sample, narrow: bool) -> tuple[str, ...]:
+    held, judged = set_point(definition, sample), word(definition, sample)
+    facts = [definition.configuration]
+    facts += [f"{name}={number(value, 4)}" for name, value in sorted(definition.parameters.items())]
+    mark = "●" if definition.role == "gate" else " "
+    name, room_left = f"{mark} {definition.metric} [{', '.join(facts)}]", margin(definition, sample)
+    if narrow:
+        judged = "✗ LEFT" if held == "LEFT" and sample.passed else judged
+        bound = limit(definition).removesuffix(f" {_unit(definition)}")
+        return name, measured(definition, sample, 4), bound, room_left.replace("decades", "dec"), judged
+    step = "" if definition.time_step is None else number(definition.time_step, 4)
+    return name, step, measured(definition, sample), limit(definition), room_left, held, judged
+
+
+MEASURED = (Column("measured", "right"), Column("limit", "right"), Column("margin", "right"))
+NARROW_COLUMNS = (Column("metric [configuration]", flexible=True), *MEASURED, Column("verdict"))
+WIDE_COLUMNS = (
+    Column("metric [configuration]", flexible=True),
+    Column("h [s]"),
+    *MEASURED,
+    Column("set point"),
+    Column("verdict"),
+)
+
+
+def _styles(narrow: bool) -> dict[int, Style]:
+    def paint(_row: int, text: str) -> str:
+        return click.style(
+            text, fg={"✓": "green", "✗": "red"}.get(text[:1]), dim=text.startswith("·") or None
+        )
+
+    def warn(_row: int, text: str) -> str:
+        return click.style(text, fg="red") if text.startswith("LEFT") else text
+
+    last = len(NARROW_COLUMNS if narrow else WIDE_COLUMNS) - 1
+    return {last: paint} if narrow else {last: paint, last - 1: warn}
+
+
+def failures(run: RunDocument) -> list[str]:
+    """One sentence for each value that is not there."""
+    return [
+        f"{definition.key}: {sample.outcome.replace('_', ' ')}: {clean(sample.failure)}"
+        for definition, sample in pairs(run)
+        if sample.failure and definition.role != "reported"
+    ]
+
+
+def verdict(run: RunDocument) -> str:
+    """The last line: how many limits held."""
+    judged = [pair for pair in pairs(run) if pair[0].role != "reported"]
+    bad = [pair for pair in judged if is_red(*pair)]
+    left = sum(sample.passed for _, sample in bad)
+    if not judged:
+        return "nothing was measured against a limit"
+    if not bad:
+        gates = sum(definition.role == "gate" for definition, _ in judged)
+        words = f"✓ green: all {len(judged)} limits and set points hold; gates (●) among them: {gates}"
+        return click.style(words, fg="green", bold=True)
+    words = f"✗ red: {len(bad) - left} of {len(judged)} limits broken"
+    return click.style(words + (f", {left} set points left" if left else ""), fg="red", bold=True)
+
+
+def counts(run: RunDocument) -> Mapping[str, int]:
+    """How many series passed, failed or are only reported."""
+    found = {"passed": 0, "failed": 0, "reported": 0}
+    for definition, sample in pairs(run):
+        kind = (
+            "reported"
+            if definition.role == "reported"
+            else "failed"
+            if is_red(definition, sample)
+            else "passed"
+        )
+        found[kind] += 1
+    return found

@@ -1,0 +1,129 @@
+"""Commands that store: runs out, runs in, the schema of both, and the database itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from spook_tracker.tracker.cli.options import database_option, example
+
+
+@click.command(epilog=example("tracker export latest --out runs/"))
+@click.argument("versions", nargs=-1, metavar="[V]...")
+@click.option(
+    "--out", metavar="DIR", type=click.Path(path_type=Path), help="One file per run; default: print."
+)
+@database_option
+def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
+    """Write runs (all, or those named) as JSON documents."""
+    from spook_tracker.tracker.cli.history import history_of
+    from spook_tracker.tracker.store.transfer import encoded, export_runs
+
+    with history_of(database) as history:
+        if out is not None:
+            click.echo(f"{len(export_runs(history, out, versions))} runs in {out}")
+            return
+        for run in [history.resolve(name) for name in versions] or history.runs():
+            click.echo(encoded(history.document(run.id)), nl=False)
+
+
+@click.command("import", epilog=example("tracker import runs/*.json"))
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
+@database_option
+def import_files(files: tuple[Path, ...], database: str) -> None:
+    """Record runs from JSON documents; what is there already is left as it is."""
+    from sqlalchemy.orm import Session
+
+    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.transfer import import_files as read_in
+
+    opened = open_database(database)
+    try:
+        with Session(opened) as session:
+            done = read_in(session, files)
+    finally:
+        opened.dispose()
+    click.echo(f"{len(done.stored)} runs recorded, {len(done.present)} were there already")
+
+
+@click.command(epilog=example("tracker schema > run.schema.json"))
+@click.argument("document", type=click.Choice(["run", "compare"]), default="run")
+def schema(document: str) -> None:
+    """Print the JSON Schema of a run document, or of a comparison."""
+    import json
+
+    from spook_tracker.tracker.document.schema import document_schema
+    from spook_tracker.tracker.judge.comparison_document import compare_schema
+
+    found = document_schema() if document == "run" else compare_schema()
+    click.echo(json.dumps(found, indent=1, ensure_ascii=False))
+
+
+@click.group(epilog=example("tracker db check"))
+def db() -> None:
+    """Look after the database."""
+
+
+@db.command(epilog=example("tracker db upgrade --db sqlite:///tracker.db"))
+@database_option
+def upgrade(database: str) -> None:
+    """Bring the schema to the newest revision; of an older SQLite file a copy is kept."""
+    from spook_tracker.tracker.store.database import head, open_database
+
+    open_database(database).dispose()
+    click.echo(f"the schema is at revision {head()}, the newest")
+
+
+@db.command(epilog=example("tracker db check"))
+@database_option
+def check(database: str) -> None:
+    """Read everything and say what is wrong; exit code 1 if anything is."""
+    from spook_tracker.tracker.cli.options import RED
+    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.database_check import check as faults_of
+
+    opened = open_database(database, readonly=True)
+    try:
+        faults = faults_of(opened)
+    finally:
+        opened.dispose()
+    for fault in faults:
+        click.echo(f"✗ {fault}")
+    click.echo(f"{len(faults)} faults" if faults else "✓ nothing is wrong")
+    if faults:
+        click.get_current_context().exit(RED)
+
+
+@db.command(epilog=example("tracker db copy sqlite:///tracker.db postgresql://host/tracker"))
+@click.argument("source", metavar="FROM")
+@click.argument("target", metavar="TO")
+def copy(source: str, target: str) -> None:
+    """Copy a whole history into an empty database, of the other kind as well, without loss."""
+    from spook_tracker.tracker.store.database_copy import copy_database
+
+    digests = copy_database(source, target)
+    click.echo(
+        f"copied {sum(digest.rows for digest in digests.values())} rows in {len(digests)} tables, all equal"
+    )
+
+
+@db.command(epilog=example("tracker db stats"))
+@database_option
+def stats(database: str) -> None:
+    """Say how much is stored."""
+    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.storage_counts import statistics
+
+    opened = open_database(database, readonly=True)
+    try:
+        found = statistics(opened)
+    finally:
+        opened.dispose()
+    click.echo(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
+    for engine, runs in found.engines.items():
+        click.echo(f"  {runs} runs of {engine}")
+    if found.first and found.last:
+        click.echo(f"  from {found.first:%Y-%m-%d %H:%M} to {found.last:%Y-%m-%d %H:%M} UTC")
+    for table, rows in found.rows.items():
+        click.echo(f"  {rows:>9} {table}")

@@ -1,0 +1,1 @@
+"""One run as a document: the only shape results travel in."""

@@ -1,0 +1,26 @@
+"""The published JSON Schema of a run document: what `export` writes and `import` accepts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from spook_tracker.tracker.document.run_document import SCHEMA_VERSION, RunDocument
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def document_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of RunDocument. Beyond it, import asks for sense: see tracker/store/border.py."""
+    schema = msgspec.json.schema(RunDocument)
+    about = {
+        "$schema": DIALECT,
+        "$id": f"urn:spook-tracker:run-document:{SCHEMA_VERSION}",
+        "title": "Run document",
+        "description": (
+            "One run of the scalar tests of a physics engine. Non-finite numbers are the strings nan, inf "
+            "and -inf; times are ISO 8601 with their zone."
+        ),
+    }
+    return about | schema

@@ -1,0 +1,104 @@
+"""Levels that people have accepted: text in git, not a click.
+
+accepted.toml holds tables like
+
+    [[accepted]]
+    series = "pendulum/plain/max_length_deviation/*"   # a key, * matches anything
+    range = [0.0, 0.0042]                              # values that are accepted
+    who = "a name"
+    why = "one sentence"
+    until = 2027-01-31                                 # optional: after this day it is red again
+
+A value inside the range is not red until that day. What is not finite is never accepted.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.errors import TrackerError
+
+KNOWN = {"series", "range", "who", "why", "until"}
+
+
+class AcceptedError(TrackerError):
+    """accepted.toml cannot be used; the message names the entry."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Accepted:
+    """One accepted level."""
+
+    series: str
+    low: float
+    high: float
+    who: str
+    why: str
+    until: date | None = None
+
+    def takes(self, key: str, value: float, night: date) -> bool:
+        """Whether that value of that series is accepted on that night."""
+        in_time = self.until is None or night <= self.until
+        return (
+            in_time
+            and fnmatchcase(key, self.series)
+            and math.isfinite(value)
+            and self.low <= value <= self.high
+        )
+
+    def __str__(self) -> str:
+        until = f", until {self.until}" if self.until else ""
+        return f"accepted by {self.who}: {self.why}{until}"
+
+
+def read_accepted(file: Path) -> tuple[Accepted, ...]:
+    """The entries of a file, none if there is no such file; AcceptedError names what is wrong in it."""
+    if not file.exists():
+        return ()
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise AcceptedError(f"{file} is not valid TOML: {error}") from None
+    entries = content.get("accepted", [])
+    if not isinstance(entries, list) or set(content) - {"accepted"}:
+        raise AcceptedError(f"{file} may hold [[accepted]] tables only")
+    return tuple(_entry(f"{file}, entry {number}", entry) for number, entry in enumerate(entries, 1))
+
+
+def _entry(place: str, entry: Any) -> Accepted:
+    if not isinstance(entry, dict):
+        raise AcceptedError(f"{place}: write it as a [[accepted]] table")
+    for name in sorted(set(entry) - KNOWN):
+        raise AcceptedError(f"{place}: {name!r} is not known; the names are {', '.join(sorted(KNOWN))}")
+    for name in ("series", "who", "why"):
+        if not isinstance(entry.get(name), str) or not entry[name].strip():
+            raise AcceptedError(f"{place}: {name} must be a text; say {name}")
+    band = entry.get("range")
+    if (
+        not isinstance(band, list)
+        or len(band) != 2
+        or not all(isinstance(end, int | float) and not isinstance(end, bool) for end in band)
+        or not band[0] <= band[1]
+    ):
+        raise AcceptedError(f"{place}: range must be [low, high]")
+    until = entry.get("until")
+    if isinstance(until, datetime):
+        until = until.date()
+    if until is not None and not isinstance(until, date):
+        raise AcceptedError(f"{place}: until must be a date like 2027-01-31, without quotes")
+    low, high = float(band[0]), float(band[1])
+    return Accepted(
+        series=entry["series"], low=low, high=high, who=entry["who"], why=entry["why"], until=until
+    )
+
+
+def acceptance(levels: Sequence[Accepted], key: str, value: float, night: date) -> Accepted | None:
+    """The entry that takes this value, if one does."""
+    return next((level for level in levels if level.takes(key, value, night)), None)

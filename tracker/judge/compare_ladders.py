@@ -1,0 +1,135 @@
+"""Two versions on one ladder: which is slower, and which is better at equal error and at equal time."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from statistics import median
+
+from spook_tracker.tracker.document.order import error_in_time, time_at_error
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing, from_number
+from spook_tracker.tracker.document.wording import slug
+from spook_tracker.tracker.judge.comparison_document import Change, Frontier
+from spook_tracker.tracker.judge.timing_statistics import compare_times
+from spook_tracker.tracker.judge.verdict import Word
+
+Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
+Rung = tuple[SeriesDefinition, Sample, Sample]
+PROBES = 9  # errors, and times, at which two ladders are compared
+
+
+def run_times(before: Samples, after: Samples) -> list[Change]:
+    """One change per ladder configuration: run times over its rungs, by statistics that do not cry wolf."""
+    changes = []
+    for rungs in [*_ladders(before, after).values(), *_single(before, after)]:
+        definition = rungs[0][0]
+        timed = [(old.timing, new.timing) for _, old, new in rungs]
+        both: list[tuple[Timing, Timing]] = [(old, new) for old, new in timed if old and new]
+        found = compare_times([old for old, _ in both], [new for _, new in both])
+        if found is None:
+            continue
+        word: Word = "regressed" if found.slower else "improved" if found.faster else "same"
+        percent = 100.0 * (found.ratio - 1.0)
+        sentence = f"{percent:+.0f} % run time over {found.rungs} rungs"
+        if word == "same":
+            sentence += f", inside the noise of these sessions (±{100.0 * found.floor:.0f} %)"
+        total_old = sum(min(old.seconds) for old, _ in both)
+        total_new = sum(min(new.seconds) for _, new in both)
+        changes.append(
+            Change(
+                series=f"{definition.test}/{definition.configuration}/{definition.metric}:run-time",
+                test=definition.test,
+                metric=f"{definition.metric}:run-time",
+                configuration=definition.configuration,
+                role="reported",
+                kind="run_time",
+                unit="s",
+                word=word,
+                red=word == "regressed",
+                name="slower at equal error" if word == "regressed" else "",
+                sentence=sentence,
+                before=total_old,
+                after=total_new,
+                before_outcome="value",
+                after_outcome="value",
+                limit=None,
+                decades=math.log10(found.ratio),
+                page=f"tests/{slug(definition.test)}.html",
+            )
+        )
+    return changes
+
+
+def _ladders(before: Samples, after: Samples) -> dict[tuple[str, str, str], list[Rung]]:
+    """Rungs that both sides measured under one definition, by test, ladder and configuration."""
+    groups: dict[tuple[str, str, str], list[Rung]] = defaultdict(list)
+    for key, (definition, new) in after.items():
+        if definition.kind != "ladder" or key not in before:
+            continue
+        earlier, old = before[key]
+        if earlier.test_version == definition.test_version:
+            groups[(definition.test, definition.metric, definition.configuration)].append(
+                (definition, old, new)
+            )
+    for rungs in groups.values():
+        rungs.sort(key=lambda rung: -(rung[0].time_step or 0.0))
+    return groups
+
+
+def _single(before: Samples, after: Samples) -> Iterator[list[Rung]]:
+    """Series outside ladders that carry repeats of their own."""
+    for key, (definition, new) in after.items():
+        if definition.kind == "ladder" or new.timing is None or key not in before:
+            continue
+        earlier, old = before[key]
+        if earlier.test_version == definition.test_version:
+            yield [(definition, old, new)]
+
+
+def frontiers(before: Samples, after: Samples, same_machine: bool) -> Iterator[Frontier]:
+    """Both versions on each ladder, as ratios later to earlier; None where they share no error or time."""
+    for (test, ladder, configuration), rungs in sorted(_ladders(before, after).items()):
+        old = [(_seconds(s), _steps(s), abs(from_number(s.value))) for _, s, _ in rungs]
+        new = [(_seconds(s), _steps(s), abs(from_number(s.value))) for _, _, s in rungs]
+        seconds = [[point[0] for point in side] for side in (old, new)]
+        steps = [[point[1] for point in side] for side in (old, new)]
+        errors = [[point[2] for point in side] for side in (old, new)]
+        timed = same_machine and any(math.isfinite(s) for s in seconds[0])
+        yield Frontier(
+            test=test,
+            ladder=ladder.removeprefix("ladder:"),
+            configuration=configuration,
+            time_at_equal_error=_ratio(time_at_error, seconds, errors, errors) if timed else None,
+            error_at_equal_time=_ratio(error_in_time, seconds, errors, seconds) if timed else None,
+            work_at_equal_error=_ratio(time_at_error, steps, errors, errors),
+        )
+
+
+def _seconds(sample: Sample) -> float:
+    return min(sample.timing.seconds) if sample.timing else math.nan
+
+
+def _steps(sample: Sample) -> float:
+    return float(sample.counters.get("steps", 0)) or math.nan
+
+
+def _ratio(
+    question: object, cost: list[list[float]], errors: list[list[float]], axis: list[list[float]]
+) -> float | None:
+    """Median over common values of `axis` of what the later side needs relative to the earlier."""
+    ask = question
+    assert callable(ask)
+    finite = [[value for value in side if math.isfinite(value) and value > 0.0] for side in axis]
+    if not all(finite):
+        return None
+    low, high = max(min(side) for side in finite), min(max(side) for side in finite)
+    if not 0.0 < low <= high:
+        return None
+    ratios = []
+    for i in range(PROBES):
+        target = low * (high / low) ** (i / (PROBES - 1)) * (1.0 + 1e-12)
+        first, second = (ask(c, e, target) for c, e in zip(cost, errors, strict=True))
+        if 0.0 < first < math.inf and 0.0 < second < math.inf:
+            ratios.append(second / first)
+    return median(ratios) if ratios else None

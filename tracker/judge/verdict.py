@@ -1,0 +1,299 @@
+"""Two values of one series: what became of it? Pure functions on values, one rule after the other.
+
+1. Not comparable: another definition of the test, another float environment, run times of another machine.
+2. The same bits are identical. Two values of one commit are non-deterministic, if the series has no noise.
+3. A worse outcome class is a regression, a better one is fixed. Crossing the limit is a change of class.
+4. Leaving the set point is a regression even inside the limit.
+5. Errors are compared by magnitude, the rest by what is better. A growth within the tolerance is only
+   "changed", and so is one that ends at least three decades inside the limit: it is named in decades, and the
+   comparison with the last release catches it if it creeps on.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+
+from spook_tracker.tracker.document.run_document import (
+    MapData,
+    OutcomeClass,
+    Sample,
+    SeriesDefinition,
+    from_number,
+)
+
+Word = Literal[
+    "identical",
+    "same",
+    "changed",
+    "improved",
+    "fixed",
+    "new",
+    "regressed",
+    "missing",
+    "non_deterministic",
+    "not_comparable",
+]
+RED: frozenset[Word] = frozenset({"regressed", "missing", "non_deterministic"})
+RANK: dict[OutcomeClass, int] = {
+    "value": 0,
+    "out_of_limit": 1,
+    "not_finite": 2,
+    "diverged": 3,
+    "crashed": 3,
+    "timed_out": 3,
+    "missing": 4,
+}
+DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
+EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
+ROUNDING = {"ladder": 1e-10}  # of the reference or of 1: what is rounding where no limit gives a scale
+ROUNDING_ELSE = 1e-12
+CELL_RANK = {"settled": 0, "bounded": 1, "growing": 2, "diverged": 3, "not_finite": 4}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What became of a value, in a word and a sentence; `name` is what to call a regression."""
+
+    word: Word
+    sentence: str
+    name: str = ""
+    decades: float | None = None  # of error magnitude; positive is larger
+    ulps: int | None = None  # doubles between the two values
+
+    @property
+    def red(self) -> bool:
+        """Whether somebody has to look."""
+        return self.word in RED
+
+
+def judge(
+    definition: SeriesDefinition,
+    before: Sample,
+    after: Sample,
+    *,
+    same_definition: bool = True,
+    same_environment: bool = True,
+    same_commit: bool = False,
+) -> Verdict:
+    """Compare two samples of a series without noise. `definition` is the later one's."""
+    if not same_definition:
+        return _incomparable("the definition of the test changed")
+    if not same_environment:
+        return _incomparable("measured in another float environment")
+    before, after = _honest(before), _honest(after)
+    old, new = from_number(before.value), from_number(after.value)
+    decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
+    if same_bits(old, new) and before.outcome == after.outcome:
+        if before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash):
+            return Verdict(word="identical", sentence="the same bits", ulps=0)
+        if same_commit:
+            return _unrepeatable(decades, 0)
+        return Verdict(word="changed", sentence="the same value from another final state", ulps=0)
+    if same_commit:
+        return _unrepeatable(decades, ulps)
+    by_class = _by_class(definition, before, after)
+    if by_class is not None:
+        return by_class
+    if not (math.isfinite(old) and math.isfinite(new)):
+        return Verdict(word="same", sentence=f"still {_words(after.outcome)}")
+    if before.set_point_held and not after.set_point_held and definition.set_point is not None:
+        low, high = definition.set_point
+        words = f"left its set point {low:g} … {high:g}"
+        return Verdict(word="regressed", sentence=words, name="set point left", decades=decades, ulps=ulps)
+    if after.set_point_held and not before.set_point_held and definition.set_point is not None:
+        return Verdict(word="fixed", sentence="back at its set point", decades=decades, ulps=ulps)
+    return _by_size(definition, old, new, decades, ulps)
+
+
+def _honest(sample: Sample) -> Sample:
+    """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
+    if RANK[sample.outcome] >= RANK["not_finite"] or math.isfinite(from_number(sample.value)):
+        return sample
+    return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
+
+
+def _incomparable(why: str) -> Verdict:
+    return Verdict(word="not_comparable", sentence=why)
+
+
+def _unrepeatable(decades: float | None, ulps: int | None) -> Verdict:
+    return Verdict(
+        word="non_deterministic",
+        sentence="the same commit gave two answers",
+        name="non-deterministic",
+        decades=decades,
+        ulps=ulps,
+    )
+
+
+def _words(outcome: OutcomeClass) -> str:
+    return outcome.replace("_", " ")
+
+
+def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Verdict | None:
+    old, new = RANK[before.outcome], RANK[after.outcome]
+    if new > old:
+        crossed = after.outcome == "out_of_limit"
+        what = "crossed its limit" if crossed else f"{_words(before.outcome)} became {_words(after.outcome)}"
+        return Verdict(
+            word="regressed",
+            sentence=what + (f": {after.failure}" if after.failure else ""),
+            name=_crossed(definition) if crossed else _words(after.outcome),
+        )
+    if new < old:
+        word: Word = "fixed" if new == 0 else "improved"
+        return Verdict(word=word, sentence=f"{_words(before.outcome)} became {_words(after.outcome)}")
+    if before.outcome != after.outcome:
+        return Verdict(word="changed", sentence=f"{_words(before.outcome)} became {_words(after.outcome)}")
+    return None
+
+
+def _crossed(definition: SeriesDefinition) -> str:
+    return "wrong order" if definition.kind == "order" else "limit crossed"
+
+
+def _by_size(
+    definition: SeriesDefinition, old: float, new: float, decades: float | None, ulps: int | None
+) -> Verdict:
+    badness_before, badness_after = badness(definition, old), badness(definition, new)
+    if badness_before is None or badness_after is None:
+        return Verdict(
+            word="changed", sentence=_distance(decades, ulps, "changed"), decades=decades, ulps=ulps
+        )
+    growth = badness_after - badness_before
+    if growth == 0.0:
+        return Verdict(word="same", sentence="the same magnitude", decades=decades, ulps=ulps)
+    allowed = max(
+        definition.tolerance, definition.relative_tolerance * abs(badness_before), _rounding(definition)
+    )
+    if abs(growth) <= allowed:
+        words = _distance(decades, ulps, "changed inside the tolerance")
+        return Verdict(word="changed", sentence=words, decades=decades, ulps=ulps)
+    worse = "worse" if growth > 0.0 else "better"
+    words = _distance(decades, ulps, worse)
+    if max(badness_before, badness_after) <= _deep_inside(definition, min(badness_before, badness_after)):
+        return Verdict(word="changed", sentence=words + ", far inside the limit", decades=decades, ulps=ulps)
+    if growth > 0.0:
+        return Verdict(word="regressed", sentence=words, name=_called(definition), decades=decades, ulps=ulps)
+    return Verdict(word="improved", sentence=words, decades=decades, ulps=ulps)
+
+
+def _called(definition: SeriesDefinition) -> str:
+    return {
+        "break_point": "less stable",
+        "order": "wrong order",
+        "ladder": "less accurate",
+        "time": "slower",
+    }.get(definition.kind, "worse")
+
+
+def badness(definition: SeriesDefinition, value: float) -> float | None:
+    """A number that grows as the value gets worse; None where one value is as good as another."""
+    if definition.better == "larger":
+        return -value
+    if definition.better == "smaller":
+        return value
+    if definition.better == "smaller_magnitude":
+        return abs(value)
+    return None if definition.reference is None else abs(value - definition.reference)
+
+
+def _half_width(definition: SeriesDefinition) -> float | None:
+    """The limit as a magnitude of error, for those judged by magnitude."""
+    if definition.better in ("larger", "smaller") or definition.limit is None:
+        return None
+    if isinstance(definition.limit, tuple):
+        return 0.5 * abs(definition.limit[1] - definition.limit[0])
+    return abs(definition.limit)
+
+
+def _deep_inside(definition: SeriesDefinition, smaller: float) -> float:
+    """Below this magnitude growth is no regression; -inf where there is no limit to be inside of."""
+    half = _half_width(definition)
+    if half is None:
+        return -math.inf
+    return half * (EXACT_ZERO if smaller == 0.0 else DEEP_INSIDE) * (1.0 + 1e-9)
+
+
+def _rounding(definition: SeriesDefinition) -> float:
+    """What may be rounding, where no limit says how large an error matters."""
+    if definition.limit is not None or definition.better in ("larger", "smaller"):
+        return 0.0
+    return ROUNDING.get(definition.kind, ROUNDING_ELSE) * max(1.0, abs(definition.reference or 0.0))
+
+
+def same_bits(a: float, b: float) -> bool:
+    """Equal as stored: the sign of zero counts, every NaN equals every other."""
+    return struct.pack("<d", a) == struct.pack("<d", b) or (math.isnan(a) and math.isnan(b))
+
+
+def ulp_distance(a: float, b: float) -> int | None:
+    """How many doubles lie from one to the other; None where one is not finite."""
+    if not (math.isfinite(a) and math.isfinite(b)):
+        return None
+    return abs(_place(a) - _place(b))
+
+
+def _place(value: float) -> int:
+    """Rank of a double among all doubles; both zeros have rank 0."""
+    (bits,) = struct.unpack("<q", struct.pack("<d", value))
+    return int(bits) if bits >= 0 else -(int(bits) & 0x7FFF_FFFF_FFFF_FFFF)
+
+
+def _decades(definition: SeriesDefinition, old: float, new: float) -> float | None:
+    if definition.better == "inside" and definition.reference is not None:
+        old, new = old - definition.reference, new - definition.reference
+    if not (math.isfinite(old) and math.isfinite(new)) or old == 0.0 or new == 0.0:
+        return None
+    return math.log10(abs(new)) - math.log10(abs(old))
+
+
+def _distance(decades: float | None, ulps: int | None, what: str) -> str:
+    parts = [what]
+    if decades is not None and abs(decades) >= 0.05:
+        parts.append(f"by {abs(decades):.1f} decades")
+    elif decades is not None and decades != 0.0:
+        parts.append(f"by {100.0 * abs(10.0**decades - 1.0):.2g} %")
+    if ulps is not None and ulps < 1_000_000:
+        parts.append(f"({ulps} ULP)")
+    return " ".join(parts)
+
+
+def judge_map(before: MapData, after: MapData) -> Verdict:
+    """Compare two stability maps cell by cell; a cell that moved for the worse is a regression."""
+    if (before.x, before.y, before.definition) != (after.x, after.y, after.definition):
+        return _incomparable("the map's grid or its definition of stable changed")
+    worse, better = _moved(before, after)
+    if worse:
+        first = f"x = {worse[0][0]:g}, y = {worse[0][1]:g}: {worse[0][2]} became {worse[0][3]}"
+        words = f"{len(worse)} cells worse, {len(better)} better; {first}"
+        return Verdict(word="regressed", sentence=words, name="less stable")
+    if better:
+        return Verdict(word="improved", sentence=f"{len(better)} cells better")
+    return Verdict(word="identical", sentence="the same cells")
+
+
+def cell_rank(cell: str) -> int:
+    """How bad a cell is; a word nobody knows is the worst."""
+    return CELL_RANK.get(cell, len(CELL_RANK))
+
+
+Cell = tuple[float, float, str, str]
+
+
+def _moved(before: MapData, after: MapData) -> tuple[Sequence[Cell], Sequence[Cell]]:
+    worse, better = [], []
+    for y, old_row, new_row in zip(after.y, before.cells, after.cells, strict=True):
+        for x, old, new in zip(after.x, old_row, new_row, strict=True):
+            step = cell_rank(new) - cell_rank(old)
+            if step > 0:
+                worse.append((x, y, old, new))
+            elif step < 0:
+                better.append((x, y, old, new))
+    return worse, better

@@ -1,0 +1,1 @@
+"""Put the questions, and write down whatever happens."""

@@ -1,0 +1,68 @@
+"""What a run says about its tests and its engine: the words of each test and the stages its scene needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.document.run_document import EngineVersion, StageChoice, TestCard
+from spook_tracker.tracker.measure.question import ask, sentence
+from spook_tracker.tracker.measure.scene_drawing import drawing
+
+
+def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> TestCard:
+    """The test as it is worded now; `saved` are seconds per step by stage left out."""
+    return TestCard(
+        name=name,
+        title=test.title,
+        question=test.question,
+        why=test.why,
+        model=test.model,
+        parameters=test.parameters,
+        theory=test.theory,
+        reference=test.reference,
+        conclusion=test.conclusion,
+        source=test.source,
+        misprints=test.misprints,
+        seven=test.seven,
+        stages=stages(test, engine, saved),
+        scene=ask(lambda: drawing(test.example().scene)).value,
+    )
+
+
+def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[StageChoice, ...]:
+    """Stages kept and left out of the test's example scene; empty where the engine cannot say."""
+    answer = ask(lambda: explained(test, engine))
+    return tuple(
+        StageChoice(
+            stage=choice.stage,
+            kept=choice.kept,
+            reason=sentence(choice.reason),
+            saved_seconds_per_step=None if choice.kept else saved.get(choice.stage),
+        )
+        for choice in answer.value or ()
+    )
+
+
+def explained(test: ScalarTest, engine: Any) -> Any:
+    """The engine's choices for the test's example scene, stage by stage."""
+    example = test.example()
+    return engine.explain(
+        example.scene, time_step=example.time_step, method=example.method, observe=example.observe
+    )
+
+
+def engine_version(engine: Any) -> EngineVersion:
+    """The engine's own account of what it was built from."""
+    info = engine.build_info
+    return EngineVersion(
+        name=info.name,
+        version=info.version,
+        git_hash=info.git_hash,
+        dirty=bool(info.dirty),
+        commit_time=info.commit_time,
+        parents=tuple(info.parents),
+        compiler=info.compiler,
+        flags=info.flags,
+    )

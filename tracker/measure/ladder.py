@@ -1,0 +1,302 @@
+"""Error against run time: a ladder of time steps in each configuration, measured under one protocol.
+
+Errors come from runs that record, in any process; run times from separate runs with nothing recorded, alone
+and interleaved. A point that fails stays a point with its outcome class. From each configuration's points
+come the scalars that make a trend: observed order, time at a given error, error in a given time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from spook_tracker.engine.method import STAGES_THAT_CAN_BE_FORCED
+from spook_tracker.scalar_tests.case import Configuration, Example, Ladder, ScalarTest, Simulate
+from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
+from spook_tracker.tracker.document.run_document import (
+    OutcomeClass,
+    Sample,
+    SeriesDefinition,
+    Timing,
+    to_number,
+)
+from spook_tracker.tracker.measure.definition import definition_hash
+from spook_tracker.tracker.measure.question import Witness, ask, series_key
+from spook_tracker.tracker.measure.timing import Timed, interleaved, once, stage_seconds
+
+LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
+ORDER_BAND = 0.1
+SAVED_RUNS = 3
+
+
+@dataclass(frozen=True)
+class ErrorPoint:
+    """One rung in one configuration."""
+
+    time_step: float  # s
+    error: float
+    outcome: OutcomeClass
+    failure: str
+    counters: dict[str, int]
+    state_hash: str
+
+
+@dataclass(frozen=True)
+class ErrorPoints:
+    """All rungs of one configuration, coarse to fine."""
+
+    points: tuple[ErrorPoint, ...]
+
+
+Pair = tuple[SeriesDefinition, Sample]
+
+
+def error_points(ladder: Ladder, configuration: Configuration, simulate: Simulate) -> ErrorPoints:
+    """The errors of one configuration; failures are kept with their class."""
+    return ErrorPoints(tuple(_error_point(ladder, configuration, h, simulate) for h in ladder.time_steps))
+
+
+def _error_point(ladder: Ladder, configuration: Configuration, h: float, simulate: Simulate) -> ErrorPoint:
+    witness = Witness(simulate, time_limit=LADDER_TIME_LIMIT)
+    answer = ask(lambda: float(ladder.error(witness, h, configuration.method)))
+    error = math.nan if answer.value is None else answer.value
+    outcome, failure = answer.outcome, answer.failure
+    if outcome == "value" and not math.isfinite(error):
+        outcome, failure = "not_finite", f"the error is {error}"
+    counters = dict(sorted(witness.counters.items()))
+    return ErrorPoint(h, error, outcome, failure, counters, witness.state_hash)
+
+
+def timed_series(
+    tests: Mapping[str, ScalarTest],
+    errors: Mapping[tuple[str, int, int], ErrorPoints],
+    simulate: Simulate,
+    repeats: int,
+) -> list[Pair]:
+    """Every ladder's series with timings, and the scalars read off them; run alone on the machine."""
+    pairs: list[Pair] = []
+    for name, test in tests.items():
+        for i, ladder in enumerate(test.ladders):
+            measured = [errors[(name, i, j)] for j in range(len(ladder.configurations))]
+            timings = _timings(ladder, measured, simulate, repeats)
+            for configuration, points, timed in zip(ladder.configurations, measured, timings, strict=True):
+                pairs += _ladder_pairs(name, test, ladder, configuration, points, timed)
+    return pairs
+
+
+def _timings(
+    ladder: Ladder, measured: list[ErrorPoints], simulate: Simulate, repeats: int
+) -> list[list[Timing | None]]:
+    """Timings by configuration and rung; rungs without a value are not timed."""
+    places = [
+        (j, k)
+        for j, points in enumerate(measured)
+        for k, point in enumerate(points.points)
+        if point.outcome == "value"
+    ]
+
+    def timed(j: int, k: int, run_simulate: Simulate) -> object:
+        return ladder.run(run_simulate, ladder.time_steps[k], ladder.configurations[j].method)
+
+    runs = [lambda s, j=j, k=k: timed(j, k, s) for j, k in places]
+    table: list[list[Timing | None]] = [[None] * len(ladder.time_steps) for _ in measured]
+    for (j, k), timing in zip(places, interleaved(runs, simulate, repeats), strict=True):
+        table[j][k] = timing
+    return table
+
+
+def _ladder_pairs(
+    name: str,
+    test: ScalarTest,
+    ladder: Ladder,
+    configuration: Configuration,
+    points: ErrorPoints,
+    timed: list[Timing | None],
+) -> Iterator[Pair]:
+    version = _version(ladder, configuration)
+    common = _series(name, test, ladder, configuration, version)
+    for point, timing in zip(points.points, timed, strict=True):
+        series = replace_series(
+            common,
+            metric=f"ladder:{ladder.name}",
+            description=ladder.description,
+            kind="ladder",
+            time_step=point.time_step,
+        )
+        yield (
+            series,
+            Sample(
+                series=series.key,
+                value=to_number(point.error),
+                outcome=point.outcome,
+                passed=point.outcome == "value",
+                set_point_held=point.outcome == "value",
+                failure=point.failure,
+                counters=point.counters,
+                state_hash=point.state_hash,
+                timing=timing,
+            ),
+        )
+    yield from _scalars(ladder, configuration, common, points, timed)
+
+
+def _version(ladder: Ladder, configuration: Configuration, *more: object) -> str:
+    """Version of what a series of the ladder measures; `more` is what its rungs do not depend on."""
+    facts = (ladder.name, ladder.unit, configuration.name, configuration.method, *more)
+    return definition_hash(ladder.error, facts)
+
+
+def _series(
+    name: str, test: ScalarTest, ladder: Ladder, configuration: Configuration, version: str
+) -> SeriesDefinition:
+    return SeriesDefinition(
+        key=name,
+        test=name,
+        title=test.title,
+        configuration=configuration.name,
+        metric=f"ladder:{ladder.name}",
+        description=ladder.description,
+        unit=ladder.unit,
+        role="reported",
+        better="smaller_magnitude",
+        kind="ladder",
+        time_step=None,
+        parameters={},
+        limit=None,
+        limit_source="",
+        set_point=None,
+        set_point_source="",
+        reference=None,
+        tolerance=0.0,
+        relative_tolerance=1e-9,
+        test_version=version,
+    )
+
+
+def replace_series(series: SeriesDefinition, **changes: object) -> SeriesDefinition:
+    """A series with other facts and the key that goes with them."""
+    import msgspec
+
+    changed: SeriesDefinition = msgspec.structs.replace(series, **changes)
+    key = series_key(changed.test, changed.configuration, changed.metric, changed.time_step, {})
+    return msgspec.structs.replace(changed, key=key)
+
+
+def _scalars(
+    ladder: Ladder,
+    configuration: Configuration,
+    common: SeriesDefinition,
+    points: ErrorPoints,
+    timed: list[Timing | None],
+) -> Iterator[Pair]:
+    metric = f"ladder:{ladder.name}"
+    expected = configuration.expected_order
+    if expected is not None:
+        band = (expected - ORDER_BAND, expected + ORDER_BAND)
+        series = replace_series(
+            common,
+            metric=f"{metric}:order",
+            description=f"observed order of {ladder.description}",
+            unit="1",
+            role="companion",
+            better="inside",
+            kind="order",
+            limit=band,
+            limit_source=f"the method's order, {expected:g}, within {ORDER_BAND:g}",
+            reference=expected,
+            test_version=_version(ladder, configuration, ladder.time_steps, configuration.order_range),
+        )
+        used = [p for p in points.points if in_range(p.time_step, configuration.order_range)]
+        order = observed_order([p.time_step for p in used], [p.error for p in used])
+        yield series, _scalar(series, order, "fewer than three usable points in the asymptotic range", band)
+    reached = [
+        (min(timing.seconds), point.error)
+        for point, timing in zip(points.points, timed, strict=True)
+        if timing is not None and point.outcome == "value"
+    ]
+    seconds, errors = [s for s, _ in reached], [e for _, e in reached]
+    if ladder.target_error is not None:
+        series = replace_series(
+            common,
+            metric=f"{metric}:time-to-error",
+            description=f"time to reach {ladder.target_error:g} {ladder.unit}: {ladder.description}",
+            unit="s",
+            better="smaller",
+            kind="time",
+            parameters={"target_error": ladder.target_error},
+            test_version=_version(ladder, configuration, ladder.time_steps, ladder.target_error),
+        )
+        value = time_at_error(seconds, errors, ladder.target_error)
+        yield series, _scalar(series, value, f"no step reaches {ladder.target_error:g} {ladder.unit}")
+    if ladder.target_seconds is not None:
+        series = replace_series(
+            common,
+            metric=f"{metric}:error-in-time",
+            description=f"error reached in {ladder.target_seconds:g} s: {ladder.description}",
+            kind="time",
+            parameters={"target_seconds": ladder.target_seconds},
+            test_version=_version(ladder, configuration, ladder.time_steps, ladder.target_seconds),
+        )
+        value = error_in_time(seconds, errors, ladder.target_seconds)
+        yield series, _scalar(series, value, f"every step takes longer than {ladder.target_seconds:g} s")
+
+
+def _scalar(
+    series: SeriesDefinition, value: float | None, why_not: str, band: tuple[float, float] | None = None
+) -> Sample:
+    outcome: OutcomeClass = "value"
+    if value is None:
+        outcome = "missing"
+    elif not math.isfinite(value):
+        outcome = "not_finite"
+    elif band is not None and not band[0] <= value <= band[1]:
+        outcome = "out_of_limit"
+    return Sample(
+        series=series.key,
+        value="nan" if value is None else to_number(value),
+        outcome=outcome,
+        passed=outcome == "value",
+        set_point_held=outcome in ("value", "out_of_limit"),
+        failure=why_not if outcome in ("missing", "not_finite") else "",
+    )
+
+
+def saved_by_leaving_out(tests: Mapping[str, ScalarTest], simulate: Simulate) -> dict[str, dict[str, float]]:
+    """Seconds per step each stage left out would cost, by forcing it into the test's example scene."""
+    saved: dict[str, dict[str, float]] = {}
+    for name, test in tests.items():
+        answer = ask(test.example)
+        if answer.value is None:
+            continue
+        example = answer.value
+        steps = max(1, min(2000, round(1.0 / example.time_step)))
+
+        for stage in STAGES_THAT_CAN_BE_FORCED:
+            plain, with_stage = _example_run(example, steps, ()), _example_run(example, steps, (stage,))
+            without, forced = [], []
+            for _ in range(SAVED_RUNS):
+                without.append(once(plain, simulate, LADDER_TIME_LIMIT))
+                forced.append(once(with_stage, simulate, LADDER_TIME_LIMIT))
+            if all(s is not None for s in (*without, *forced)):
+                cost = min(s for s in forced if s is not None) - min(s for s in without if s is not None)
+                saved.setdefault(name, {})[stage] = max(0.0, cost) / steps
+    return saved
+
+
+def stage_costs(test: ScalarTest, simulate: Simulate) -> dict[str, float]:
+    """Seconds per step of each stage kept, of the test's example scene with nothing observed; the best of a few."""
+    example = test.example()
+    steps = max(1, min(2000, round(1.0 / example.time_step)))
+    run = _example_run(example, steps, ())
+    costs: dict[str, float] = {}
+    for _ in range(SAVED_RUNS):
+        for stage, seconds in stage_seconds(run, simulate).items():
+            costs[stage] = min(costs.get(stage, math.inf), seconds / steps)
+    return costs
+
+
+def _example_run(example: Example, steps: int, stages: tuple[str, ...]) -> Timed:
+    """The test's example scene with nothing observed and some stages forced in."""
+    method = replace(example.method, force_stages=stages)
+    return lambda simulate: simulate(example.scene, time_step=example.time_step, steps=steps, method=method)

@@ -1,0 +1,126 @@
+"""What a reader has to see of a scene: solids, links, forces, as plain numbers a page can draw.
+
+Taken from the scene's definition, not from a simulation, so that it changes only when the scene does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.forces import CentralGravity, Spring
+from spook_tracker.engine.joints import Distance, Joint
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.tracker.document.quaternions import UPRIGHT, Quaternion, Vector, multiplied, turned
+from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
+
+MOST_SOLIDS = 300
+
+
+def drawing(scene: Scene) -> SceneDrawing:
+    """The scene at its start; a very large one is drawn in part."""
+    solids: list[DrawnSolid] = []
+    for body in scene.bodies[:MOST_SOLIDS]:
+        if isinstance(body, Particle):
+            solids.append(DrawnSolid(kind="particle", position=body.position, velocity=body.velocity))
+        elif isinstance(body, RigidBody) and body.shape is not None:
+            solids += _solids(body.shape, body.position, body.orientation, body)
+        elif isinstance(body, RigidBody):
+            solids.append(_of_inertia(body))
+    places = {body.name: body.position for body in scene.bodies}
+    turns = {body.name: getattr(body, "orientation", UPRIGHT) for body in scene.bodies}
+    links: list[DrawnLink] = []
+    for tie in (*scene.constraints, *scene.forces):
+        if isinstance(tie, Distance | Spring):
+            anchors = getattr(tie, "anchors", ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+            ends = [
+                _end(end, anchor, places, turns) for end, anchor in zip(tie.between, anchors, strict=True)
+            ]
+            kind = "spring" if isinstance(tie, Spring) else "distance"
+            links.append(DrawnLink(kind=kind, ends=(ends[0], ends[1])))  # type: ignore[arg-type]
+        elif isinstance(tie, Joint):
+            links += _joint(tie, places)
+    return SceneDrawing(
+        solids=tuple(solids),
+        links=tuple(links[: 2 * MOST_SOLIDS]),
+        attractors=tuple(force.centre for force in scene.forces if isinstance(force, CentralGravity)),
+        gravity=scene.gravity,
+    )
+
+
+def _solids(shape: Shape, position: Vector, orientation: Quaternion, body: RigidBody) -> list[DrawnSolid]:
+    if isinstance(shape, Compound):
+        return [
+            solid
+            for part in shape.parts
+            for solid in _solids(
+                part.shape,
+                _moved(position, orientation, part.position),
+                multiplied(orientation, part.orientation),
+                body,
+            )
+        ]
+    kind, size = _kind(shape)
+    if kind is None:
+        return []
+    return [
+        DrawnSolid(
+            kind=kind,  # type: ignore[arg-type]
+            position=position,
+            orientation=orientation,
+            size=size,
+            fixed=body.motion != "dynamic",
+            velocity=body.velocity,
+        )
+    ]
+
+
+def _of_inertia(body: RigidBody) -> DrawnSolid:
+    """A body without a surface: the box of uniform density that turns as it does."""
+    if body.mass is None or body.inertia is None:
+        return DrawnSolid(kind="particle", position=body.position, velocity=body.velocity)
+    x, y, z = body.inertia
+    edges = (y + z - x, z + x - y, x + y - z)
+    return DrawnSolid(
+        kind="box",
+        position=body.position,
+        orientation=body.orientation,
+        size=tuple(math.sqrt(max(0.0, 6.0 * edge / body.mass)) for edge in edges),
+        velocity=body.velocity,
+    )
+
+
+def _kind(shape: Shape) -> tuple[str | None, tuple[float, ...]]:
+    if isinstance(shape, Sphere):
+        return "sphere", (shape.radius,)
+    if isinstance(shape, Box):
+        return "box", tuple(shape.size)
+    if isinstance(shape, Capsule):
+        return "capsule", (shape.radius, shape.length)
+    if isinstance(shape, Plane):
+        return "plane", tuple(shape.normal)
+    return None, ()
+
+
+def _end(end: object, anchor: Vector, places: dict[str, Vector], turns: dict[str, Quaternion]) -> Vector:
+    """Where one end of a distance or a spring is: on a body, or at a point of the world."""
+    if isinstance(end, str):
+        return anchor if end == WORLD else _moved(places[end], turns[end], anchor)
+    assert isinstance(end, Sequence)
+    return (float(end[0]), float(end[1]), float(end[2]))
+
+
+def _joint(joint: Joint, places: dict[str, Vector]) -> list[DrawnLink]:
+    """A joint stands where it was put, else between its bodies."""
+    if joint.at is not None:
+        return [DrawnLink(kind="joint", ends=(joint.at, joint.at))]
+    ends = [places[name] for name in joint.between if name in places]
+    return [DrawnLink(kind="joint", ends=pair) for pair in pairwise(ends)]
+
+
+def _moved(position: Vector, orientation: Quaternion, by: Vector) -> Vector:
+    dx, dy, dz = turned(orientation, by)
+    return (position[0] + dx, position[1] + dy, position[2] + dz)

@@ -1,0 +1,133 @@
+"""Take run times so that they can be compared: nothing recorded, alone, interleaved, short runs repeated.
+
+Every repeat visits all runs once before the next repeat begins, so that a slow minute of the machine falls on
+all of them alike. The minimum is the estimate; every repeat is kept, because the spread says what a
+difference means.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from spook_tracker.engine.result import Result
+from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.tracker.document.run_document import Timing
+from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
+from spook_tracker.tracker.measure.question import ask
+
+RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
+MOST_RUNS = 200  # in one repeat
+POINT_BUDGET = 0.6  # s for all repeats of one run
+FEWEST_REPEATS = 2
+STAGES_UP_TO = 0.2  # s: longer runs are not run again only to see their stages
+
+Timed = Callable[[Simulate], Any]
+
+
+@dataclass
+class Stopwatch:
+    """Stands between a run and the engine and adds up the time of the native loops."""
+
+    simulate: Simulate
+    options: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+    results: list[Result] = field(default_factory=list)
+    counter: InstructionCounter | None = None
+
+    def __call__(self, scene: Any, **options: Any) -> Result:
+        if self.counter is None:
+            result = self.simulate(scene, **{**options, **self.options})
+        else:
+            with self.counter.counting():
+                result = self.simulate(scene, **{**options, **self.options})
+        self.seconds += result.seconds
+        self.results[:] = [result]
+        return result
+
+
+@dataclass
+class _Lane:
+    """One run on its way through the repeats."""
+
+    run: Timed
+    runs: int
+    repeats: int
+    seconds: list[float] = field(default_factory=list)
+
+
+def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> float | None:
+    """Seconds of one run, None if it failed."""
+    watch = Stopwatch(simulate, {} if time_limit is None else {"time_limit": time_limit})
+    before = time.perf_counter()
+    answer = ask(partial(run, watch))
+    if answer.outcome != "value" or any(not result.completed for result in watch.results):
+        return None
+    return watch.seconds if watch.results else time.perf_counter() - before
+
+
+def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list[Timing | None]:
+    """A timing of each run, None for those that fail; instructions and stages where they can be had."""
+    lanes: list[_Lane | None] = []
+    for run in runs:
+        first = once(run, simulate)  # also warms caches
+        if first is None:
+            lanes.append(None)
+            continue
+        grain = max(first, 1e-9)
+        affordable = int(POINT_BUDGET / max(grain, RESOLVED))
+        lanes.append(
+            _Lane(
+                run=run,
+                runs=min(MOST_RUNS, max(1, math.ceil(RESOLVED / grain))),
+                repeats=max(FEWEST_REPEATS, min(repeats, affordable)),
+            )
+        )
+    for turn in range(repeats):
+        for lane in lanes:
+            if lane is None or turn >= lane.repeats:
+                continue
+            taken = [once(lane.run, simulate) for _ in range(lane.runs)]
+            whole = [s for s in taken if s is not None]
+            lane.seconds += [_undisturbed(whole)] if whole else []
+    return [_timing(lane, simulate) if lane and lane.seconds else None for lane in lanes]
+
+
+def _undisturbed(seconds: Sequence[float]) -> float:
+    """Mean of the faster half of the runs of one repeat: interference only ever makes a run slower."""
+    faster = sorted(seconds)[: (len(seconds) + 1) // 2]
+    return sum(faster) / len(faster)
+
+
+def _timing(lane: _Lane, simulate: Simulate) -> Timing:
+    short = min(lane.seconds) <= STAGES_UP_TO
+    return Timing(
+        seconds=tuple(lane.seconds),
+        runs_per_repeat=lane.runs,
+        instructions=_instructions(lane.run, simulate) if short and can_count() else None,
+        stage_seconds=stage_seconds(lane.run, simulate) if short else {},
+    )
+
+
+def _instructions(run: Timed, simulate: Simulate) -> int | None:
+    """The fewest of two runs: what is not the engine's own work varies a little."""
+    counts = []
+    for _ in range(2):
+        counter = InstructionCounter()
+        ask(partial(run, Stopwatch(simulate, counter=counter)))
+        counter.close()
+        counts.append(counter.count)
+    return min((count for count in counts if count), default=None)
+
+
+def stage_seconds(run: Timed, simulate: Simulate) -> dict[str, float]:
+    """Time by stage; empty for an engine that has no such clock."""
+    watch = Stopwatch(simulate, {"time_stages": True})
+    answer = ask(partial(run, watch))
+    if answer.outcome != "value" or not watch.results:
+        return {}
+    return {stage: float(seconds) for stage, seconds in watch.results[0].stage_seconds.items()}

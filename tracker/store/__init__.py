@@ -1,0 +1,1 @@
+"""Tables, history, versions and copies of them."""

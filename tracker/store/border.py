@@ -1,0 +1,136 @@
+"""What comes from outside is checked here, before anything is written: sizes, depth, types, text, sense.
+
+Databases refuse some text (NUL in PostgreSQL, lone surrogates everywhere); it is made storable here, once.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from typing import Any
+
+import msgspec
+
+from spook_tracker.tracker.document import run_document as document
+from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.store.rows import moment
+
+MAX_BYTES = 32 * 1024 * 1024  # of one document
+MAX_SAMPLES = 100_000  # of one document, and as many series
+MAX_TEXT = 65_536  # characters of one text
+MAX_INTEGER = 2**63 - 1  # what a column holds
+REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+ESCAPE = re.compile(rb"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)  # one escape of a JSON text
+
+
+def clean_text(text: str) -> str:
+    """Text every database takes: NUL and lone surrogates become U+FFFD, all else stays as it is."""
+    if text.isascii():
+        return text.replace("\0", REPLACEMENT)
+    text = text.replace("\0", REPLACEMENT)
+    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+
+
+def _cleaned(part: Any, place: str) -> Any:
+    if isinstance(part, str):
+        if len(part) > MAX_TEXT:
+            raise DocumentError(f"{place}: a text of {len(part)} characters; at most {MAX_TEXT} are stored")
+        return clean_text(part)
+    if isinstance(part, float):
+        return part if math.isfinite(part) else document.to_number(part)
+    if isinstance(part, int):
+        if abs(part) > MAX_INTEGER:
+            raise DocumentError(f"{place}: the number {part:.3e} is larger than 64 bits hold")
+        return part
+    if isinstance(part, dict):
+        return {clean_text(name): _cleaned(inner, f"{place}.{name}") for name, inner in part.items()}
+    if isinstance(part, (list, tuple)):
+        return tuple(_cleaned(inner, place) for inner in part)
+    return part
+
+
+def _plain(number: Any) -> Any:
+    """NumPy scalars, which msgspec does not know, as Python numbers."""
+    if hasattr(number, "item"):
+        return number.item()
+    raise DocumentError(f"a {type(number).__name__} cannot be part of a run document")
+
+
+def checked(run: RunDocument) -> RunDocument:
+    """The document as it can be stored. DocumentError, naming the place, if it is not valid."""
+    try:
+        parts = msgspec.to_builtins(run, enc_hook=_plain)
+    except UnicodeError as error:  # msgspec checks no text here, but a hook might
+        raise DocumentError(f"the run document holds text that is not Unicode: {error}") from None
+    return _sensible(_typed(_cleaned(parts, "$")))
+
+
+def decoded(data: bytes, origin: str = "the document") -> RunDocument:
+    """A run document from JSON bytes. DocumentError if it is too large, malformed or makes no sense.
+
+    Read straight into the types, which are not nested deeply: a hostile file costs no more than its size.
+    """
+    if len(data) > MAX_BYTES:
+        raise DocumentError(f"{origin}: {len(data)} bytes; a run document has at most {MAX_BYTES}")
+    try:
+        return checked(msgspec.json.decode(_without_surrogates(data), type=RunDocument))
+    except (msgspec.ValidationError, DocumentError) as error:
+        raise DocumentError(f"{origin} is not a valid run document: {error}") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise DocumentError(f"{origin} is not JSON: {error}") from None
+
+
+def _without_surrogates(data: bytes) -> bytes:
+    """JSON with every escaped surrogate that has no partner replaced: other tools write them, none can be read."""
+    if not re.search(rb"\\u[dD][89a-fA-F]", data):
+        return data
+    pieces, end, waiting = [], 0, None  # waiting: a high surrogate just seen, with its place
+    for escape in ESCAPE.finditer(data):
+        code = int(escape[1], 16) if escape[1] else 0
+        adjacent = waiting is not None and waiting.end() == escape.start()
+        if 0xDC00 <= code <= 0xDFFF and adjacent:
+            waiting = None
+            continue
+        lone = [waiting] if waiting is not None else []
+        waiting = escape if 0xD800 <= code <= 0xDBFF else None
+        if 0xDC00 <= code <= 0xDFFF:
+            lone.append(escape)
+        for found in lone:
+            pieces += [data[end : found.start()], rb"\ufffd"]
+            end = found.end()
+    if waiting is not None:
+        pieces += [data[end : waiting.start()], rb"\ufffd"]
+        end = waiting.end()
+    return b"".join([*pieces, data[end:]])
+
+
+def _typed(parts: Any) -> RunDocument:
+    try:
+        return msgspec.convert(parts, RunDocument)
+    except msgspec.ValidationError as error:
+        raise DocumentError(str(error)) from None
+
+
+def _sensible(run: RunDocument) -> RunDocument:
+    """What types cannot say: times are times, every sample has one definition, nothing is there twice."""
+    moment(run.started)
+    moment(run.finished)
+    if len(run.samples) > MAX_SAMPLES or len(run.series) > MAX_SAMPLES:
+        raise DocumentError(f"more than {MAX_SAMPLES} samples or series in one run")
+    defined = Counter(definition.key for definition in run.series)
+    for key, count in defined.items():
+        if count > 1:
+            raise DocumentError(f"the series {key!r} is defined {count} times")
+    for key, count in Counter(sample.series for sample in run.samples).items():
+        if key not in defined:
+            raise DocumentError(f"a sample belongs to the series {key!r}, which the document does not define")
+        if count > 1:
+            raise DocumentError(f"the series {key!r} has {count} samples; one run has one")
+    for sample in run.samples:
+        if (sample.outcome == "value" or sample.passed) and not math.isfinite(
+            document.from_number(sample.value)
+        ):
+            raise DocumentError(f"the series {sample.series!r} is {sample.value} and yet called good")
+    return run

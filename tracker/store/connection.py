@@ -1,0 +1,160 @@
+"""A connection to SQLite or PostgreSQL as the history needs it, and what goes wrong on it in words.
+
+SQLite loses what it is not told to keep, so every connection is told: write-ahead log, foreign keys, write
+transactions that lock at once (a lock taken late fails at once, whatever the timeout).
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from sqlalchemy import URL, Engine, create_engine, event, exc, make_url
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import NullPool
+
+from spook_tracker.tracker.document.errors import DatabaseError
+
+DEFAULT = "sqlite:///tracker.db"
+LOCK_TIMEOUT = 30.0  # s to wait for another writer
+NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "9p", "ceph", "lustre", "fuse.sshfs"})
+
+
+def database_url(given: str | None = None) -> URL:
+    """The URL meant: `given`, else TRACKER_DB, else tracker.db here. A plain path means a SQLite file."""
+    chosen = given or os.environ.get("TRACKER_DB") or DEFAULT
+    if "://" not in chosen:
+        return URL.create("sqlite", database=chosen)
+    try:
+        url = make_url(chosen)
+    except (exc.ArgumentError, ValueError):
+        raise DatabaseError(
+            "the database URL cannot be read; write sqlite:///FILE or postgresql://..."
+        ) from None
+    if url.get_backend_name() not in ("sqlite", "postgresql"):
+        raise DatabaseError(f"{url.get_backend_name()} is not supported; use sqlite or postgresql")
+    return url
+
+
+def shown(url: URL) -> str:
+    """The database as it may be printed: no password."""
+    if url.get_backend_name() == "sqlite":
+        return url.database or "memory"
+    return url.difference_update_query(["password", "sslpassword"]).render_as_string()
+
+
+def connected(url: URL, readonly: bool) -> Engine:
+    """An engine whose connections are prepared and whose errors are sentences. Nothing is opened yet."""
+    engine = _sqlite(url, readonly) if url.get_backend_name() == "sqlite" else _postgresql(url, readonly)
+    event.listen(engine, "handle_error", _said, retval=True)
+    return engine
+
+
+def _sqlite(url: URL, readonly: bool) -> Engine:
+    if not is_file(url):
+        engine = create_engine(url)
+    else:
+        address = _address(url, readonly)
+
+        def connect() -> sqlite3.Connection:
+            return sqlite3.connect(address, uri=True, timeout=LOCK_TIMEOUT, check_same_thread=False)
+
+        # NullPool: a connection closed is a file closed, so that the write-ahead log is folded in at the end
+        engine = create_engine(url, poolclass=NullPool, creator=connect)
+    # processes on several machines cannot share the memory that the write-ahead log needs
+    journal = "DELETE" if is_file(url) and file_system(Path(str(url.database))) in NETWORK else "WAL"
+    begin = "BEGIN" if readonly else "BEGIN IMMEDIATE"
+
+    @event.listens_for(engine, "connect")
+    def prepare(connection: Any, _record: Any) -> None:
+        connection.isolation_level = None  # the driver begins nothing itself: schema changes roll back, too
+        pragmas = ["foreign_keys = ON", "trusted_schema = OFF", "cell_size_check = ON"]
+        pragmas += ["query_only = ON"] if readonly else [f"journal_mode = {journal}", "synchronous = FULL"]
+        for words in pragmas:
+            connection.execute(f"PRAGMA {words}")
+
+    @event.listens_for(engine, "begin")
+    def take_lock(connection: Any) -> None:
+        connection.exec_driver_sql(begin)
+
+    return engine
+
+
+def _postgresql(url: URL, readonly: bool) -> Engine:
+    try:
+        engine = create_engine(url, connect_args={"connect_timeout": 10})
+    except ModuleNotFoundError:
+        raise DatabaseError("PostgreSQL needs a driver; install spook-tracker[postgresql]") from None
+    return engine.execution_options(postgresql_readonly=True) if readonly else engine
+
+
+def file_system(path: Path) -> str:
+    """The type of the file system `path` lies on; empty where the system does not say."""
+    device = (path if path.exists() else path.absolute().parent).stat().st_dev
+    number = f"{os.major(device)}:{os.minor(device)}"
+    try:
+        mounts = Path("/proc/self/mountinfo").read_text(errors="replace").splitlines()
+    except OSError:
+        return ""
+    types = [line.partition(" - ")[2].split(" ")[0] for line in mounts if line.split(" ")[2] == number]
+    return types[-1] if types else ""
+
+
+def is_file(url: URL) -> bool:
+    """Whether the database is one file, not a server or memory."""
+    return url.get_backend_name() == "sqlite" and url.database not in (None, "", ":memory:")
+
+
+def _address(url: URL, readonly: bool) -> str:
+    """The file as SQLite's own URI, which alone can say that nothing may be written."""
+    path = Path(str(url.database)).resolve()
+    mode = "rwc"
+    if readonly:
+        # where writing is possible, the last reader must be able to tidy the log away
+        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
+    log = path.with_name(path.name + "-wal")
+    if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
+        mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
+    return f"file:{quote(str(path))}?mode={mode}"
+
+
+def _said(context: Any) -> DatabaseError | None:
+    """Whatever the driver raises, anywhere, as one sentence; what concurrent writers cause is for `record`."""
+    if isinstance(context.sqlalchemy_exception, exc.IntegrityError):
+        return None
+    return DatabaseError(_sentence(shown(context.engine.url), context.original_exception))
+
+
+@contextmanager
+def in_words(where: Engine | Session) -> Iterator[None]:
+    """Whatever goes wrong in the database, as one sentence (DatabaseError)."""
+    try:
+        yield
+    except (exc.SQLAlchemyError, sqlite3.Error, OSError) as error:
+        engine = where if isinstance(where, Engine) else where.get_bind().engine
+        name = shown(engine.url)
+        raise DatabaseError(_sentence(name, error)) from error
+
+
+def _sentence(name: str, error: Exception) -> str:
+    reason = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
+    lower = reason.lower()
+    for sign, sentence in (
+        ("locked", "is in use by another writer; try again"),
+        ("readonly", "cannot be written; it, or its folder, is read-only"),
+        ("read-only", "cannot be written; it, or its folder, is read-only"),
+        ("is full", "cannot be written: no space left; nothing of this run was stored"),
+        ("no space left", "cannot be written: no space left; nothing of this run was stored"),
+        ("disk i/o", "cannot be written or read: the disk reports an error, or is full"),
+        ("malformed", "is damaged; restore it from a copy (tracker db check says more)"),
+        ("not a database", "is damaged or not a SQLite database; restore it from a copy"),
+        ("unable to open", "cannot be opened; check the path and its permissions"),
+    ):
+        if sign in lower:
+            return f"the database {name} {sentence}"
+    return f"the database {name} failed: {reason[:300]}"

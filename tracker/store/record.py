@@ -1,0 +1,168 @@
+"""Store one run: one document, one transaction. Killed at any moment, the run is whole or absent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from sqlalchemy import Table, insert, or_, select
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.store import models, rows
+from spook_tracker.tracker.store.border import checked
+from spook_tracker.tracker.store.database import in_words, one_writer
+from spook_tracker.tracker.store.models import identity
+
+ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
+CHUNK = 500  # ids in one IN (...), well below every database's limit
+
+
+def record(session: Session, run: RunDocument) -> bool:
+    """Store `run` and commit. False if a run with the same idempotency key was there: nothing changes then.
+
+    DocumentError if the document is not valid, DatabaseError if it cannot be written; either way nothing is.
+    """
+    run = checked(run)
+    with in_words(session):
+        for attempt in range(ATTEMPTS):
+            try:
+                stored = _store(session, run)
+                session.commit()
+                return stored
+            except IntegrityError:  # another process stored the same engine, series, ... meanwhile
+                session.rollback()
+                if attempt == ATTEMPTS - 1:
+                    raise
+            except BaseException:
+                session.rollback()
+                raise
+    raise AssertionError("unreachable")
+
+
+def _known(session: Session, run: RunDocument) -> bool:
+    """Whether the run is stored, asked once: between two questions another process could store it."""
+    same = or_(models.Run.idempotency_key == run.idempotency_key, models.Run.id == run.id)
+    keys = set(session.scalars(select(models.Run.idempotency_key).where(same)))
+    if keys and run.idempotency_key not in keys:
+        raise DatabaseError(f"another run with the id {run.id!r} is already stored; give this one a new id")
+    return bool(keys)
+
+
+def _store(session: Session, run: RunDocument) -> bool:
+    one_writer(session)  # two that insert the same rows in another order would wait for each other
+    if _known(session, run):
+        return False
+    engine, machine = rows.engine_row(run.engine), rows.machine_row(run.machine)
+    cards = rows.cards_row(run.tests)
+    definitions = [rows.definition_row(definition) for definition in run.series]
+    _ensure(session, models.EngineVersion, [engine])
+    _ensure(session, models.Machine, [machine])
+    _ensure(session, models.TestCards, [cards])
+    keys = {definition.key for definition in run.series}
+    _ensure(session, models.Series, [{"id": identity("series", key), "key": key} for key in sorted(keys)])
+    _ensure_aliases(session, run)
+    _ensure(session, models.Definition, definitions)
+    list_id = _ensure_list(session, [definition["id"] for definition in definitions])
+
+    gates = {definition.key for definition in run.series if definition.role == "gate"}
+    gate_samples = [sample for sample in run.samples if sample.series in gates]
+    started_at, run_key = rows.moment(run.started), identity("run", run.id)
+    session.execute(
+        insert(models.Run),
+        {
+            "key": run_key,
+            "id": run.id,
+            "idempotency_key": run.idempotency_key,
+            "started_at": started_at,
+            "started": run.started,
+            "finished": run.finished,
+            "trigger": run.trigger,
+            "tracker_version": run.tracker_version,
+            "ci_address": run.ci_address,
+            "schema_version": run.schema_version,
+            "engine_version_id": engine["id"],
+            "machine_id": machine["id"],
+            "test_cards_id": cards["id"],
+            "series_list_id": list_id,
+            "gates": len(gate_samples),
+            "gates_passed": sum(sample.passed for sample in gate_samples),
+        },
+    )
+    place = {"started_at": started_at, "run_key": run_key}
+    definition_ids = dict(zip((d.key for d in run.series), (row["id"] for row in definitions), strict=True))
+    samples, evidence, timings = [], [], []
+    for position, sample in enumerate(run.samples):
+        here = place | {"series_id": identity("series", sample.series)}
+        where = {"definition_id": definition_ids[sample.series], "position": position}
+        samples.append(here | where | rows.sample_row(sample))
+        if (proof := rows.evidence_row(sample)) is not None:
+            evidence.append(here | proof)
+        if sample.timing is not None:
+            timings.append(here | rows.timing_row(sample.timing))
+    _append(session, models.Sample, samples)
+    _append(session, models.Evidence, evidence)
+    _append(session, models.Timing, timings)
+    _append(session, models.Figure, _bodies(place, run.figures))
+    _append(session, models.StabilityMap, _bodies(place, run.maps))
+    return True
+
+
+def _bodies(place: dict[str, Any], parts: Sequence[Any]) -> list[rows.Row]:
+    return [
+        place | {"position": position, "test": part.test, "name": part.name, "body": rows.packed(part)}
+        for position, part in enumerate(parts)
+    ]
+
+
+def _append(session: Session, model: type[models.Base], new: list[rows.Row]) -> None:
+    if new:
+        session.execute(insert(model.__table__), new)  # type: ignore[arg-type]
+
+
+def _ensure(session: Session, model: type[models.Base], wanted: list[rows.Row]) -> None:
+    """Insert the rows whose id is not there yet. Equal ids mean equal content, which is verified."""
+    table = model.__table__
+    assert isinstance(table, Table)
+    by_id = {row["id"]: row for row in wanted}
+    for ids in _chunks(sorted(by_id)):
+        for there in session.execute(select(table).where(table.c.id.in_(ids))).mappings():
+            if dict(there) != by_id.pop(there["id"]):
+                raise DatabaseError(f"two different rows of {table.name} have the id {there['id']}")
+    _append(session, model, list(by_id.values()))
+
+
+def _ensure_aliases(session: Session, run: RunDocument) -> None:
+    wanted = {
+        (alias, identity("series", definition.key))
+        for definition in run.series
+        for alias in definition.aliases
+        if alias != definition.key
+    }
+    if wanted:
+        table = models.Alias
+        there = session.execute(
+            select(table.alias, table.series_id).where(
+                table.alias.in_(sorted({alias for alias, _ in wanted}))
+            )
+        )
+        wanted -= {(row.alias, row.series_id) for row in there}
+    _append(session, models.Alias, [{"alias": alias, "series_id": id_} for alias, id_ in sorted(wanted)])
+
+
+def _ensure_list(session: Session, definition_ids: list[int]) -> int:
+    list_id = identity("series list", rows.json_of(definition_ids))
+    if session.get(models.SeriesList, list_id) is None:
+        session.execute(insert(models.SeriesList), {"id": list_id, "length": len(definition_ids)})
+        items = [
+            {"list_id": list_id, "position": position, "definition_id": definition_id}
+            for position, definition_id in enumerate(definition_ids)
+        ]
+        _append(session, models.SeriesListItem, items)
+    return list_id
+
+
+def _chunks(ids: Sequence[int]) -> Iterable[Sequence[int]]:
+    return (ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK))

@@ -1,0 +1,61 @@
+"""Figures and stability maps are bulky and redrawn every night: old ones are dropped, values never.
+
+Kept are, for each engine, each figure and map as the newest run drew it (clean and dirty builds apart), and
+as the newest run of each released version drew it. Released is a version without a development part
+("1.2.0"), or one whose commit has a tag.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from spook_tracker.tracker.store import git, models
+from spook_tracker.tracker.store.database import in_words
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.versions import RunInfo
+
+RELEASE = re.compile(r"v?\d+(\.\d+)*((a|b|rc|\.post)\d+)?")
+
+
+def released(run: RunInfo, tagged: Collection[str]) -> bool:
+    """Whether the run measured a released version: its figures stay."""
+    engine = run.engine
+    return not engine.dirty and (RELEASE.fullmatch(engine.version) is not None or engine.git_hash in tagged)
+
+
+def drop_old_figures(session: Session, history: History) -> int:
+    """Apply the rule and commit. Returns the number of figures and maps dropped."""
+    tagged = set(git.tags(history.repository).values())
+    dropped = 0
+    with in_words(session):
+        for model in (models.Figure, models.StabilityMap):
+            columns = (model.run_key, model.started_at, model.position, model.test, model.name)
+            kept: set[tuple[str, str, str, str]] = set()
+            by_run: dict[int, list[tuple[int, str, str]]] = {}
+            for run_key, _, position, test, name in session.execute(select(*columns)):
+                by_run.setdefault(run_key, []).append((position, test, name))
+            superfluous: list[tuple[RunInfo, int]] = []
+            for run in reversed(history.runs()):
+                versions = ["newest" if run.ordered else "newest, dirty"]
+                if released(run, tagged):
+                    versions.append(f"released {run.engine.version}")
+                for position, test, name in by_run.get(run.key, ()):
+                    places = {(run.engine.name, version, test, name) for version in versions}
+                    if places <= kept:
+                        superfluous.append((run, position))
+                    kept |= places
+            for run, position in superfluous:
+                session.execute(
+                    delete(model).where(
+                        model.started_at == run.started_at,
+                        model.run_key == run.key,
+                        model.position == position,
+                    )
+                )
+            dropped += len(superfluous)
+        session.commit()
+    return dropped

@@ -1,0 +1,40 @@
+"""Revisions of the tables: Alembic without an .ini file, handed the connection it works on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import Connection
+
+from spook_tracker.tracker.resources import resource
+from spook_tracker.tracker.store.models import Base
+
+
+def configuration(connection: Connection | None = None) -> Config:
+    """What Alembic needs to know: where the revisions are, the models, the connection."""
+    config = Config()
+    config.set_main_option("script_location", str(resource("migrations")).replace("%", "%%"))
+    config.set_main_option("path_separator", "os")
+    config.attributes["connection"] = connection
+    config.attributes["target_metadata"] = Base.metadata
+    return config
+
+
+def migrate(connection: Connection, target: str) -> None:
+    """Upgrade to `target` inside the transaction of `connection`."""
+    command.upgrade(configuration(connection), target)
+
+
+def revert(connection: Connection, target: str) -> None:
+    """Downgrade to `target` ("base" or a revision) inside the transaction of `connection`."""
+    command.downgrade(configuration(connection), target)
+
+
+def differences(connection: Connection) -> list[Any]:
+    """Where the tables differ from the models; empty if they are the same."""
+    context = MigrationContext.configure(connection, opts={"compare_type": True})
+    return list(compare_metadata(context, Base.metadata))

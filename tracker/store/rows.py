@@ -1,0 +1,177 @@
+"""Each part of a run document as a row, and back. The two directions stand side by side."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any, TypeVar
+
+import msgspec
+
+from spook_tracker.tracker.document import run_document as document
+from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
+from spook_tracker.tracker.document.run_document import Number
+from spook_tracker.tracker.store.models import identity
+
+Row = dict[str, Any]
+Part = TypeVar("Part")
+
+
+def json_of(part: Any) -> str:
+    """Compact JSON; floats in the shortest form that reads back to the same bits."""
+    return msgspec.json.encode(part).decode()
+
+
+def from_json(text: str, kind: type[Part]) -> Part:
+    return msgspec.json.decode(text, type=kind)
+
+
+def packed(part: Any) -> bytes:
+    """Compressed JSON, for the bulky parts nobody queries."""
+    return zlib.compress(msgspec.json.encode(part), 6)
+
+
+def unpacked(body: bytes, kind: type[Part]) -> Part:
+    try:
+        return msgspec.json.decode(zlib.decompress(body), type=kind)
+    except (zlib.error, msgspec.DecodeError) as error:
+        raise DatabaseError(
+            f"a stored figure or map is damaged ({error}); restore the database from a copy"
+        ) from None
+
+
+def moment(text: str) -> datetime:
+    """The moment an ISO 8601 text names; without a zone it is UTC."""
+    try:
+        found = datetime.fromisoformat(text)
+        return found.replace(tzinfo=UTC) if found.tzinfo is None else found.astimezone(UTC)
+    except (ValueError, OverflowError):
+        raise DocumentError(f"{text[:60]!r} is not a time; write it as 2026-11-21T03:17:00+00:00") from None
+
+
+def split(number: Number) -> tuple[float | None, str | None]:
+    """A float64 as (value, special): every bit survives in databases that lose NaN or the sign of zero."""
+    if isinstance(number, str):
+        return None, number
+    value = float(number)
+    if not math.isfinite(value):
+        return None, str(document.to_number(value))
+    if value == 0.0 and math.copysign(1.0, value) < 0:
+        return 0.0, "-0.0"
+    return value, None
+
+
+def joined(value: float | None, special: str | None) -> Number:
+    if special == "-0.0":
+        return -0.0
+    if special is not None:
+        return document.to_number(float(special))
+    assert value is not None  # the table's own check
+    return value
+
+
+def engine_row(engine: document.EngineVersion) -> Row:
+    columns = msgspec.structs.asdict(engine) | {"parents": json_of(engine.parents)}
+    return {"id": identity("engine", json_of(engine)), **columns}
+
+
+def engine_of(row: Mapping[str, Any]) -> document.EngineVersion:
+    columns = {name: row[name] for name in document.EngineVersion.__struct_fields__}
+    return document.EngineVersion(**columns | {"parents": from_json(row["parents"], tuple[str, ...])})
+
+
+def machine_row(machine: document.Machine) -> Row:
+    return {"id": identity("machine", json_of(machine)), **msgspec.structs.asdict(machine)}
+
+
+def machine_of(row: Mapping[str, Any]) -> document.Machine:
+    return document.Machine(**{name: row[name] for name in document.Machine.__struct_fields__})
+
+
+def cards_row(cards: tuple[document.TestCard, ...]) -> Row:
+    body = json_of(cards)
+    return {"id": identity("cards", body), "body": body}
+
+
+def cards_of(body: str) -> tuple[document.TestCard, ...]:
+    return from_json(body, tuple[document.TestCard, ...])
+
+
+def limits(definition: document.SeriesDefinition) -> tuple[float | None, float | None]:
+    """The limit as the interval of values that keep it; None: open on that side."""
+    limit = definition.limit
+    if limit is None:
+        return None, None
+    if isinstance(limit, tuple):
+        return limit[0] + 0.0, limit[1] + 0.0  # + 0.0: no negative zero in a plain column
+    if definition.better == "larger":
+        return limit + 0.0, None
+    if definition.better == "smaller":
+        return None, limit + 0.0
+    return -abs(limit) + 0.0, abs(limit)
+
+
+def definition_row(definition: document.SeriesDefinition) -> Row:
+    body = json_of(definition)
+    low, high = limits(definition)
+    same = ("test", "configuration", "metric", "unit", "role", "better", "kind", "test_version")
+    return {
+        "id": identity("definition", body),
+        "series_id": identity("series", definition.key),
+        **{name: getattr(definition, name) for name in same},
+        "time_step": None if definition.time_step is None else definition.time_step + 0.0,
+        "limit_low": low,
+        "limit_high": high,
+        "body": body,
+    }
+
+
+def definition_of(body: str) -> document.SeriesDefinition:
+    return from_json(body, document.SeriesDefinition)
+
+
+def sample_row(sample: document.Sample) -> Row:
+    value, special = split(sample.value)
+    return {
+        "value": value,
+        "special": special,
+        "outcome": sample.outcome,
+        "passed": sample.passed,
+        "set_point_held": sample.set_point_held,
+    }
+
+
+def evidence_row(sample: document.Sample) -> Row | None:
+    if not (sample.failure or sample.state_hash or sample.counters):
+        return None
+    counters = json_of(sample.counters)
+    return {"failure": sample.failure, "state_hash": sample.state_hash, "counters": counters}
+
+
+def timing_row(timing: document.Timing) -> Row:
+    return {
+        "seconds": json_of(timing.seconds),
+        "runs_per_repeat": timing.runs_per_repeat,
+        "instructions": timing.instructions,
+        "stage_seconds": json_of(timing.stage_seconds),
+    }
+
+
+_SECONDS = msgspec.json.Decoder(tuple[float, ...])
+_BY_STAGE = msgspec.json.Decoder(dict[str, float])
+_COUNTERS = msgspec.json.Decoder(dict[str, int])
+
+
+def timing_of(seconds: str, runs_per_repeat: int, instructions: int | None, stages: str) -> document.Timing:
+    return document.Timing(
+        seconds=_SECONDS.decode(seconds),
+        runs_per_repeat=runs_per_repeat,
+        instructions=instructions,
+        stage_seconds=_BY_STAGE.decode(stages),
+    )
+
+
+def counters_of(text: str) -> dict[str, int]:
+    return _COUNTERS.decode(text)

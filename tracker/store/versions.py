@@ -1,0 +1,140 @@
+"""Which run a name stands for. A name on the command line is one of
+
+latest, previous, last-green    the newest run, the one before it, the newest with every gate passed
+an engine version               1.2.0 or 1.2.1.dev3+g1a2b3c4: its newest run
+a commit                        its hash or the start of it (4 characters or more), a tag, a branch
+a run                           its id or the start of it (4 characters or more)
+
+of the engine "spook" wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another engine.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from spook_tracker.tracker.document import run_document as document
+from spook_tracker.tracker.document.errors import UnknownName
+
+ENGINE = "spook"  # meant where no engine is named
+SHORTEST = 4  # characters of a hash or an id
+WORDS = ("latest", "previous", "last-green")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInfo:
+    """A run without its samples. Times are ISO 8601 as in its document."""
+
+    id: str
+    started: str
+    finished: str
+    trigger: str
+    engine: document.EngineVersion
+    machine: document.Machine
+    tracker_version: str
+    ci_address: str
+    key: int  # what the large tables carry
+    started_at: datetime
+    gates: int  # gate samples in this run
+    gates_passed: int
+
+    @property
+    def green(self) -> bool:
+        """Every gate was measured inside its limit; a run without gates is not green."""
+        return 0 < self.gates == self.gates_passed
+
+    @property
+    def ordered(self) -> bool:
+        """Built from a commit as it stands: only such runs have a place in the commit order."""
+        return bool(self.engine.git_hash) and not self.engine.dirty
+
+
+def resolve(runs: Sequence[RunInfo], name: str, commit_of: Callable[[str], str | None]) -> RunInfo:
+    """The run among `runs` (in commit order) that `name` stands for; `commit_of` asks git for a commit.
+
+    UnknownName, one sentence with names that may be meant, if there is none or if it could be several.
+    """
+    if not runs:
+        raise UnknownName("no runs are stored yet; record one with: tracker run")
+    engine, at, rest = name.rpartition("@")
+    engines = {run.engine.name for run in runs}
+    if at and engine in engines:
+        found = _among([run for run in runs if run.engine.name == engine], rest, commit_of)
+    else:
+        first = [run for run in runs if run.engine.name == ENGINE]
+        others = [run for run in runs if run.engine.name != ENGINE]
+        found = _among(first, name, commit_of) or _among(others, name, commit_of)
+    if found is None:
+        raise _unknown(runs, name)
+    return found
+
+
+def _among(runs: list[RunInfo], name: str, commit_of: Callable[[str], str | None]) -> RunInfo | None:
+    if not runs:
+        return None
+    if name in WORDS:
+        return _by_word(runs, name)
+    for sought in (
+        [run for run in runs if run.id == name],
+        [run for run in runs if run.engine.version == name],
+        [run for run in runs if run.engine.git_hash == name],
+    ):
+        if sought:
+            return _newest(sought)
+    started = _by_start(runs, name)
+    if started is not None:
+        return started
+    commit = commit_of(name)
+    of_commit = [run for run in runs if commit and run.engine.git_hash == commit]
+    return _newest(of_commit) if of_commit else None
+
+
+def _by_word(runs: list[RunInfo], word: str) -> RunInfo | None:
+    """A dirty or unversioned build is the latest only as long as nothing has run since.
+
+    Engines that come without commits have no better order than the time of their runs.
+    """
+    newest = max(runs, key=lambda run: run.started_at)
+    versioned = any(run.ordered for run in runs)
+    line = [run for run in runs if run.ordered or run is newest or not versioned]
+    if word == "latest":
+        return line[-1]
+    if word == "previous":
+        return line[-2] if len(line) > 1 else None
+    return next((run for run in reversed(line) if run.green), None)
+
+
+def _by_start(runs: list[RunInfo], name: str) -> RunInfo | None:
+    if len(name) < SHORTEST:
+        return None
+    by_hash = [run for run in runs if run.engine.git_hash.startswith(name.lower())]
+    by_id = [run for run in runs if run.id.startswith(name)]
+    meant = {run.engine.git_hash for run in by_hash} | {run.id for run in by_id}
+    if len(meant) > 1:
+        near = tuple(sorted(text[:12] for text in meant))[:5]
+        raise UnknownName(f"{name!r} could be {', '.join(near)}; write more characters", near)
+    return _newest(by_hash or by_id) if meant else None
+
+
+def _newest(runs: list[RunInfo]) -> RunInfo:
+    """The run meant by a version: clean before dirty, and the last one recorded."""
+    return max(runs, key=lambda run: (not run.engine.dirty, run.started_at, run.id))
+
+
+def _unknown(runs: Sequence[RunInfo], name: str) -> UnknownName:
+    if name == "previous":
+        return UnknownName("there is only one run, and so no previous one; record another with: tracker run")
+    if name == "last-green":
+        return UnknownName("no run has passed all its gates yet; name a version instead")
+    names = [run.engine.version for run in reversed(runs)]
+    names += [run.engine.git_hash[:12] for run in reversed(runs) if run.engine.git_hash]
+    unique = list(dict.fromkeys(names))
+    near = (
+        tuple(difflib.get_close_matches(name, unique, n=3, cutoff=0.5))
+        or tuple(text for text in unique if re.search(re.escape(name), text))[:3]
+    )
+    hint = f"did you mean {', '.join(near)}?" if near else f"the newest is {unique[0]}"
+    return UnknownName(f"no run of a version, commit or id {name[:80]!r}; {hint}", near or tuple(unique[:1]))

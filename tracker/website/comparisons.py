@@ -1,0 +1,182 @@
+"""Comparisons for the page: every ordered pair of some versions, judged by the command's own code.
+
+A comparison of two runs never changes, so those of the last publication are taken over. Texts are kept once in
+a list and named by their place: a few hundred comparisons fit into one page.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.run_document import Number, from_number
+from spook_tracker.tracker.document.wording import (
+    clean,
+    conditions,
+    day,
+    named,
+    number,
+    quantity,
+    short_hash,
+    slug,
+    version,
+)
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.compare import Measured, compare, side_of
+from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.series_history import is_release
+from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.nights import Book, Night, Source
+
+NEWEST = 10  # versions to choose from
+RELEASES = 6  # and the newest releases before them
+QUIET = {"identical", "same", "not_measured"}
+FILE = "data/comparisons.json"
+
+
+@dataclass
+class Comparisons:
+    """The versions to choose from, and what became of every ordered pair."""
+
+    nights: list[Night]
+    pairs: dict[str, Any]  # "run id before/run id after" to what the page shows
+    texts: list[str] = field(default_factory=list)
+
+
+def chosen(book: Book) -> list[Night]:
+    """The versions a reader can choose: the newest nights, the newest releases, the last green night."""
+    newest = book.nights[-NEWEST:]
+    releases = [night for night in book.nights if is_release(night)][-RELEASES:]
+    wanted = {night.index for night in [*newest, *releases]}
+    return [night for night in book.nights if night.index in wanted]
+
+
+def comparisons(
+    history: Source, book: Book, events: Sequence[Event], accepted: Sequence[Accepted], known: dict[str, Any]
+) -> Comparisons:
+    """All ordered pairs; `known` are those of the last publication."""
+    nights = chosen(book)
+    sides: dict[str, Measured] = {}
+    titles = {test.name: test.card.title for test in book.tests}
+    descriptions = {
+        t.definition.key: f"{named(t.definition)[0]} ({conditions(t.definition)})"
+        for test in book.tests
+        for t in test.trends
+    }
+    first_bad = {
+        e.trend.definition.key: (short_hash(e.good.engine) if e.good else "", short_hash(e.first.engine))
+        for e in events
+        if e.lasting
+    }
+
+    def side(night: Night) -> Measured:
+        if night.id not in sides:
+            sides[night.id] = Measured(
+                side=side_of(night),
+                samples=history.samples(night.id),
+                maps=history.maps(night.id),
+            )
+        return sides[night.id]
+
+    pairs: dict[str, Any] = {}
+    for before in nights:
+        for after in nights:
+            if before is after:
+                continue
+            name = f"{before.id}/{after.id}"
+            newest = after is book.tonight
+            if name not in known or newest:
+                told = compare(side(before), side(after), accepted, first_bad if newest else {})
+                pairs[name] = _told(told, titles, descriptions)
+            else:
+                pairs[name] = known[name]
+    return Comparisons(nights, pairs)
+
+
+def read_known(old: Path, made_from: str) -> dict[str, Any]:
+    """The comparisons of the last publication, if they were made by the same code."""
+    try:
+        stored = json.loads((old / FILE).read_text(encoding="utf-8"))
+        if stored["made_from"] == made_from and isinstance(stored["pairs"], dict):
+            return dict(stored["pairs"])
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return {}
+
+
+def stored(told: Comparisons, made_from: str) -> bytes:
+    """The comparisons as a file of the website."""
+    whole = {"made_from": made_from, "pairs": told.pairs}
+    return json.dumps(whole, ensure_ascii=True, separators=(",", ":"), allow_nan=False).encode()
+
+
+def page_data(told: Comparisons) -> dict[str, Any]:
+    """What the page's script reads: versions, texts once, and pairs that name texts by place."""
+    texts: dict[str, int] = {}
+
+    def place(text: str) -> int:
+        return texts.setdefault(text, len(texts))
+
+    pairs = {}
+    index = {night.id: i for i, night in enumerate(told.nights)}
+    for name, pair in told.pairs.items():
+        before, _, after = name.partition("/")
+        pairs[f"{index[before]},{index[after]}"] = {
+            **pair,
+            "changes": [[place(text) for text in change] for change in pair["changes"]],
+            "frontiers": [[place(text) for text in line] for line in pair["frontiers"]],
+        }
+    return {"versions": [choice(night) for night in told.nights], "pairs": pairs, "texts": list(texts)}
+
+
+def choice(night: Night) -> dict[str, str]:
+    """How a version is called in the list and in the address."""
+    words = (version(night.engine), short_hash(night.engine), day(night.started))
+    return {"id": night.id, "label": " · ".join(filter(None, words)), "hash": short_hash(night.engine)}
+
+
+def _told(document: CompareDocument, titles: dict[str, str], descriptions: dict[str, str]) -> dict[str, Any]:
+    """What a reader sees of a comparison."""
+    shown = [change for change in document.changes if change.word not in QUIET]
+    return {
+        "verdict": document.verdict,
+        "code": document.exit_code,
+        "counts": dict(sorted(document.counts.items())),
+        "changes": [_change(change, titles, descriptions) for change in shown],
+        "frontiers": [
+            [
+                clean(titles.get(f.test, f.test)), clean(f.configuration), clean(f.ladder),
+                _ratio(f.time_at_equal_error), _ratio(f.error_at_equal_time), _ratio(f.work_at_equal_error),
+            ]
+            for f in document.frontiers
+        ],
+        "notes": [clean(note) for note in document.notes],
+    }  # fmt: skip
+
+
+def _change(change: Change, titles: dict[str, str], descriptions: dict[str, str]) -> list[str]:
+    said = change.name or change.word.replace("_", " ")
+    since = f"first bad commit {change.first_bad}" if change.first_bad else change.accepted
+    return [
+        change.word,
+        "red" if change.red else "",
+        f"tests/{slug(change.test)}.html",
+        clean(titles.get(change.test, change.test)),
+        clean(descriptions.get(change.series, f"{change.metric} ({change.configuration})")),
+        _value(change.before, change.unit),
+        _value(change.after, change.unit),
+        said,
+        clean(change.sentence),
+        clean(since),
+    ]
+
+
+def _value(value: Number | None, unit: str) -> str:
+    return "–" if value is None else quantity(from_number(value), unit, 7)
+
+
+def _ratio(value: float | None) -> str:
+    return "–" if value is None else f"{number(value, 3)}×"

@@ -1,0 +1,413 @@
+"""Which charts a page shows: values over versions, figures of a test, ladders and maps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample, from_number
+from spook_tracker.tracker.document.wording import (
+    clean,
+    conditions,
+    day,
+    named,
+    number,
+    opening,
+    quantity,
+    seconds,
+    short_hash,
+    slug,
+    version,
+)
+from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
+from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.figures import figure, grid_figure
+from spook_tracker.tracker.website.nights import Night, TestHistory, Trend
+from spook_tracker.tracker.website.svg import Picture, grid_picture, picture
+
+MOST_NIGHTS = 1500  # points of one trend; a value that stands still costs two, so this is many years
+TABLE_ROWS = 60
+WORDS = {
+    "value": "inside",
+    "out_of_limit": "out of limit",
+    "not_finite": "not finite",
+    "timed_out": "timed out",
+}
+
+
+@dataclass
+class View:
+    """A chart as the template wants it: static picture, data for the script, data table."""
+
+    name: str
+    title: str
+    thesis: str
+    note: str
+    picture: Picture
+    figure: dict[str, Any]
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    left_out: int = 0
+
+
+def view(chart: Chart, *, table: bool = True) -> View:
+    """The chart with everything drawn from it."""
+    shown = drawable(chart)
+    columns: tuple[str, ...] = ()
+    rows: list[tuple[str, ...]] = []
+    every = 0
+    lines = [line for line in chart.lines if line.style != "limit"] if table else []
+    if lines:
+        columns = ("line", chart.x_label, chart.y_label)
+        points = [(line, i) for line in lines for i in range(len(line.x))]
+        every = math.ceil(len(points) / TABLE_ROWS) if len(points) > TABLE_ROWS else 0
+        labels = dict(chart.x_ticks)
+        for line, i in points[:: every or 1]:
+            at = labels.get(line.x[i]) or number(line.x[i], 6)
+            rows.append((clean(line.name), at, number(line.y[i], 6)))
+    return View(
+        chart.name, chart.title, chart.thesis, shown.note, picture(chart), figure(chart), columns, rows, every
+    )
+
+
+def grid_view(grid: Grid) -> View:
+    """A map with everything drawn from it."""
+    columns = (f"{grid.y_label} \\ {grid.x_label}", *(number(x, 3) for x in grid.x))
+    rows = [
+        (number(grid.y[j], 3), *(word.replace("_", " ") for word in row)) for j, row in enumerate(grid.cells)
+    ]
+    return View(
+        grid.name, grid.title, grid.thesis, grid.note, grid_picture(grid), grid_figure(grid), columns, rows
+    )
+
+
+def trend_chart(
+    trend: Trend, nights: Sequence[Night], events: Sequence[Event] = (), title: str = ""
+) -> Chart:
+    """A series over versions, with its limit, set point, reference, and where it became worse."""
+    definition = trend.definition
+    values = trend.values[-MOST_NIGHTS * 4 :]
+    at = trend.nights[-MOST_NIGHTS * 4 :]
+    outcomes = trend.outcomes[-MOST_NIGHTS * 4 :]
+    places = turning(values)
+    places = [places[i] for i in thinned(len(places), MOST_NIGHTS)]
+    notes = tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in places)
+    x = tuple(float(at[i]) for i in places)
+    y = tuple(values[i] for i in places)
+    broken = [i for i in places if outcomes[i] == "out_of_limit" and math.isfinite(values[i])]
+    lines = [Line(name="measured", x=x, y=y, style="both", notes=notes)]
+    if broken:
+        lines.append(
+            Line(
+                name="out of limit", style="failed", colour=1, x=tuple(float(at[i]) for i in broken),
+                y=tuple(values[i] for i in broken),
+                notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
+            )
+        )  # fmt: skip
+    began = [e for e in events if e.trend is trend and e.first.index in at]
+    if began:
+        lines.append(_beginnings(began, trend))
+    scale, bounds, note = _axis_of(trend)
+    ends = (float(at[0]), float(at[-1])) if len(at) > 1 else (at[0] - 0.5, at[0] + 0.5)
+    for bound in bounds:
+        lines.append(
+            Line(
+                name=f"limit {quantity(bound, definition.unit, 7)}", x=ends, y=(bound, bound), style="limit",
+                colour=1,
+            )
+        )  # fmt: skip
+    if definition.reference is not None and (scale == "linear" or definition.reference > 0.0):
+        name = f"reference {quantity(definition.reference, definition.unit, 7)}"
+        lines.append(Line(name=name, x=ends, y=(definition.reference,) * 2, style="reference", colour=7))
+    low_high = definition.set_point
+    bands: tuple[Band, ...] = ()
+    if low_high is not None:
+        low, high = low_high
+        if scale == "log":
+            low, high = (
+                (0.0, max(abs(low), abs(high))) if low <= 0.0 <= high else sorted((abs(low), abs(high)))
+            )
+        bands = (Band(low=low, high=high, name="set point"),)
+    kept = [at[i] for i in thinned(len(at), 6)]
+    magnitude = "magnitude of " if scale == "log" and any(v < 0.0 for v in values) else ""
+    return Chart(
+        name=f"v-{slug(definition.key)}",
+        title=(f"{title}: " if title else "") + f"{named(definition)[0]} ({conditions(definition)})",
+        x_label="night",
+        y_label=f"{magnitude}value" + (f" [{definition.unit}]" if definition.unit != "1" else ""),
+        lines=tuple(lines),
+        y_scale=scale,
+        bands=bands,
+        direct=True,
+        x_ticks=_night_ticks(nights, list(dict.fromkeys(kept))),
+        note=note,
+    )
+
+
+def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
+    """A mark at each first bad commit."""
+    places = [trend.nights.index(event.first.index) for event in events]
+    notes = [
+        f"{event.name}: {event.sentence}\nfirst bad commit {short_hash(event.first.engine) or 'unknown'}, "
+        f"{day(event.first.started)}\nnow {event.standing}"
+        for event in events
+    ]
+    return Line(
+        name="became worse",
+        x=tuple(float(event.first.index) for event in events),
+        y=tuple(trend.values[place] for place in places),
+        style="points",
+        colour=3,
+        notes=tuple(notes),
+    )
+
+
+def _night_ticks(nights: Sequence[Night], shown: Sequence[int]) -> tuple[tuple[float, str], ...]:
+    """Days under the axis; where several nights share a day, their commits."""
+    days = [day(nights[n].started)[5:] for n in shown]
+    if len(set(days)) < len(days):
+        days = [short_hash(nights[n].engine)[:7] or version(nights[n].engine) for n in shown]
+    return tuple(zip(map(float, shown), days, strict=True))
+
+
+def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
+    """Scale, the limits worth drawing on it, and what to say about those that are not."""
+    limit = trend.definition.limit
+    sizes = [abs(v) for v in trend.values if math.isfinite(v) and v != 0.0]
+    if not sizes:
+        return "linear", [], ""
+    if isinstance(limit, tuple):
+        band = limit[1] - limit[0]
+        spread = max(v for v in trend.values if math.isfinite(v)) - min(
+            v for v in trend.values if math.isfinite(v)
+        )
+        if band > 1e4 * max(spread, 1e-300) and spread > 0.0:
+            return (
+                "linear",
+                [],
+                f"The limits, {number(limit[0], 7)} and {number(limit[1], 7)}, are off the scale.",
+            )
+        return "linear", list(limit), ""
+    one_sign = trend.definition.better == "smaller_magnitude" or min(trend.values) > 0.0
+    decades = math.log10(max(sizes) / min(sizes))
+    if one_sign and (
+        decades > 1.5 or (limit is not None and limit > 0.0 and not 0.2 < limit / max(sizes) < 5.0)
+    ):
+        return "log", [limit] if limit is not None and limit > 0.0 else [], ""
+    if limit is None:
+        return "linear", [], ""
+    if trend.definition.better == "smaller_magnitude":
+        signs = {math.copysign(1.0, v) for v in trend.values if math.isfinite(v) and v != 0.0}
+        return "linear", [sign * limit for sign in sorted(signs)], ""
+    return "linear", [limit], ""
+
+
+def _at_night(night: Night, value: float, unit: str, outcome: str) -> str:
+    """What a point of a trend says."""
+    shown = quantity(value, unit, 7) if math.isfinite(value) else ""
+    word = WORDS.get(outcome, outcome)
+    head = " · ".join(filter(None, (version(night.engine), short_hash(night.engine), day(night.started))))
+    return f"{head}\n{shown + ' · ' if shown else ''}{word}"
+
+
+def figure_chart(data: FigureData, prefix: str = "") -> Chart:
+    """A figure of the document as a chart."""
+    lines = tuple(
+        Line(
+            name=curve.name,
+            x=tuple(from_number(x) for x in curve.x),
+            y=tuple(from_number(y) for y in curve.y),
+            style=curve.style,
+            colour=i,
+        )
+        for i, curve in enumerate(data.curves)
+    )
+    return Chart(
+        name=f"{prefix}f-{slug(data.name)}",
+        title=data.title,
+        x_label=data.x_label,
+        y_label=data.y_label,
+        lines=lines,
+        x_scale="log" if data.x_scale == "log" else "linear",
+        y_scale=data.y_scale,
+        polar=data.x_scale == "angle",
+        note=data.note,
+        thesis=data.thesis,
+    )
+
+
+def map_grid(data: MapData, prefix: str = "", title: str = "") -> Grid:
+    """A stability map of the document as a grid."""
+    prediction = data.prediction
+    return Grid(
+        name=f"{prefix}m-{slug(data.name + '/' + data.configuration)}",
+        title=(f"{title}: " if title else "") + f"{data.title} ({data.configuration})",
+        x_label=data.x_label,
+        y_label=data.y_label,
+        x=data.x,
+        y=data.y,
+        cells=data.cells,
+        prediction=tuple(tuple(from_number(v) for v in row) for row in prediction) if prediction else None,
+        note=" ".join(filter(None, (data.note, data.definition))),
+    )
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One point of an error-against-run-time ladder."""
+
+    time_step: float
+    error: float
+    seconds: float  # NaN if it was not timed
+    spread: float  # largest of the repeats over the smallest
+    work: float  # sum of the exact counters
+    instructions: int | None
+    failure: str
+
+
+def rungs(trends: Iterable[Trend], sample_of: Callable[[Trend], Sample | None]) -> list[Rung]:
+    """The points of one configuration, coarse to fine."""
+    found = []
+    for trend in trends:
+        sample = sample_of(trend)
+        if sample is None or trend.definition.time_step is None:
+            continue
+        timing = sample.timing
+        found.append(
+            Rung(
+                time_step=trend.definition.time_step,
+                error=from_number(sample.value),
+                seconds=min(timing.seconds) if timing and timing.seconds else math.nan,
+                spread=max(timing.seconds) / min(timing.seconds)
+                if timing and min(timing.seconds) > 0.0
+                else math.nan,
+                work=float(sum(sample.counters.values())),
+                instructions=timing.instructions if timing else None,
+                failure=sample.failure
+                or ("" if sample.outcome == "value" else sample.outcome.replace("_", " ")),
+            )
+        )
+    return sorted(found, key=lambda rung: -rung.time_step)
+
+
+def ladders(test: TestHistory) -> dict[str, dict[str, list[Trend]]]:
+    """Ladder name to configuration to its series."""
+    found: dict[str, dict[str, list[Trend]]] = {}
+    for trend in test.of_kind("ladder"):
+        name = trend.definition.metric.removeprefix("ladder:")
+        found.setdefault(name, {}).setdefault(trend.definition.configuration, []).append(trend)
+    return found
+
+
+Peers = Sequence[tuple[str, TestHistory]]  # other engines on the same machine: name, the same test
+
+
+def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> list[Chart]:
+    """Error against seconds and against work for every ladder of a test; peers against seconds only."""
+    charts = []
+    orders = {
+        (t.definition.metric.removeprefix("ladder:").rpartition(":")[0], t.definition.configuration): t.value
+        for t in test.of_kind("order")
+    }
+    for name, configurations in ladders(test).items():
+        definition = next(iter(configurations.values()))[0].definition
+        points = {c: rungs(trends, lambda t: t.latest) for c, trends in configurations.items()}
+        earlier = {c: rungs(trends, lambda t: t.before) for c, trends in configurations.items()}
+        for axis, label, of in (
+            ("seconds", "run time [s]", lambda r: r.seconds),
+            ("work", "work [operations counted]", lambda r: r.work),
+        ):
+            lines: list[Line] = []
+            for colour, (configuration, found) in enumerate(points.items()):
+                order = orders.get((name, configuration))
+                told = f", order {order:.2f}" if order is not None and math.isfinite(order) else ""
+                lines.append(_ladder_line(f"{configuration}{told}", found, of, colour, definition.unit))
+                before = earlier.get(configuration, [])
+                if axis == "seconds" and any(math.isfinite(r.seconds) for r in before):
+                    line = _ladder_line(
+                        f"{configuration}, the night before", before, of, colour, definition.unit
+                    )
+                    lines.append(_ghost(line))
+            if axis == "seconds":
+                lines += _peer_lines(peers, name, definition.unit, len(points))
+            if not any(line.x for line in lines):
+                continue
+            lines.append(_front([r for found in points.values() for r in found], of))
+            charts.append(
+                Chart(
+                    name=f"{prefix}l-{slug(name)}-{axis}",
+                    title=f"{test.card.title}: {definition.description}"
+                    if prefix
+                    else opening(definition.description),
+                    x_label=label,
+                    y_label=f"error [{definition.unit}]",
+                    x_scale="log",
+                    y_scale="log",
+                    lines=tuple(lines),
+                )
+            )
+    return charts
+
+
+def _peer_lines(peers: Peers, ladder: str, unit: str, colour: int) -> list[Line]:
+    """The ladders of other engines, after ours."""
+    lines = []
+    for engine, test in peers:
+        for configuration, trends in ladders(test).get(ladder, {}).items():
+            found = rungs(trends, lambda t: t.latest)
+            lines.append(_ladder_line(f"{engine}: {configuration}", found, lambda r: r.seconds, colour, unit))
+            colour += 1
+    return lines
+
+
+def _ghost(line: Line) -> Line:
+    return Line(
+        name=line.name,
+        x=line.x,
+        y=line.y,
+        style="reference",
+        colour=line.colour,
+        notes=line.notes,
+        quiet=True,
+    )
+
+
+def _ladder_line(
+    name: str, found: Sequence[Rung], of: Callable[[Rung], float], colour: int, unit: str
+) -> Line:
+    """One configuration; a failed rung stands at the place its neighbours suggest, as a failure."""
+    shown = [r for r in found if math.isfinite(of(r)) and of(r) > 0.0]
+    notes = []
+    for r in shown:
+        spread = f" (slowest repeat {100 * (r.spread - 1):.0f} % more)" if math.isfinite(r.spread) else ""
+        counted = f"{r.work:.0f} operations" + (f", {r.instructions} instructions" if r.instructions else "")
+        error = r.failure if r.failure else f"error {quantity(r.error, unit, 5)}"
+        took = f"{seconds(r.seconds)}{spread}" if math.isfinite(r.seconds) else "not timed"
+        notes.append(f"{name}\nh = {number(r.time_step, 6)} s\n{error}\n{took}\n{counted}")
+    return Line(
+        name=name, x=tuple(of(r) for r in shown), y=tuple(abs(r.error) for r in shown), colour=colour,
+        notes=tuple(notes), style="both",
+    )  # fmt: skip
+
+
+def _front(found: Sequence[Rung], of: Callable[[Rung], float]) -> Line:
+    """The points that no other beats in both error and cost."""
+    points = sorted(
+        (of(r), abs(r.error))
+        for r in found
+        if math.isfinite(of(r)) and math.isfinite(r.error) and of(r) > 0.0
+    )
+    best, front = math.inf, []
+    for cost, error in points:
+        if error < best:
+            best = error
+            front.append((cost, error))
+    return Line(
+        name="best of all",
+        x=tuple(c for c, _ in front),
+        y=tuple(e for _, e in front),
+        style="front",
+        colour=7,
+    )

@@ -1,0 +1,199 @@
+"""Charts as data for Plotly, without importing Plotly: plain lists that the page's script gives to the library.
+
+Names from outside reach the library as escaped text, never as a template: Plotly reads some tags in text and
+every percent sign with braces in a hover template. Colours are slots; the script fills them in from the style
+sheet, so that a chart follows light and dark.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from spook_tracker.tracker.document.wording import clean, number
+from spook_tracker.tracker.website.charts import (
+    Chart,
+    Grid,
+    Line,
+    Scale,
+    drawable,
+    flattened,
+    names_on_lines,
+    thinned,
+    ticks,
+)
+from spook_tracker.tracker.website.svg import CELL_WORDS, describe
+
+DASHES = {"reference": "dash", "limit": "dot", "front": "longdash"}
+SYMBOLS = (
+    "circle",
+    "square",
+    "diamond",
+    "triangle-up",
+    "circle-open",
+    "square-open",
+    "diamond-open",
+    "cross",
+)
+
+
+def plain(text: str) -> str:
+    """Text that Plotly shows as it is."""
+    return clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def figure(chart: Chart) -> dict[str, Any]:
+    """Traces and layout of a chart, colours as slots in `meta`."""
+    chart = flattened(drawable(chart))
+    x_ends, y_ends = chart.ends()
+    layout: dict[str, Any] = {
+        "xaxis": _axis(chart.x_label, chart.x_scale, x_ends),
+        "yaxis": _axis(chart.y_label, chart.y_scale, y_ends),
+        "showlegend": not chart.direct and sum(not line.quiet for line in chart.lines) > 1,
+        "shapes": [],
+        "annotations": [],
+    }
+    if chart.x_ticks:
+        layout["xaxis"] |= {
+            "tickvals": [value for value, _ in chart.x_ticks],
+            "ticktext": [plain(label) for _, label in chart.x_ticks],
+        }
+    if chart.polar:
+        _polar(layout, chart)
+    for y, name in names_on_lines(chart):
+        at = math.log10(y) if chart.y_scale == "log" else y
+        layout["annotations"].append({"meta": "line", "y": at, "text": plain(name)})
+    for band in chart.bands:
+        low = band.low if chart.y_scale == "linear" or band.low > 0.0 else None
+        layout["shapes"].append({"meta": "band", "low": low, "high": band.high, "name": plain(band.name)})
+    return {
+        "data": [_trace(line) for line in chart.lines],
+        "layout": layout,
+        "title": plain(chart.title),
+        "description": plain(describe(chart)),
+    }
+
+
+def grid_figure(grid: Grid) -> dict[str, Any]:
+    """A map as a heat map over places, with the prediction as a contour line at 1."""
+    codes = {word: code for code, word in enumerate(CELL_WORDS)}
+    z = [[codes.get(word, len(CELL_WORDS)) for word in row] for row in grid.cells]
+    told = [
+        [
+            f"{plain(grid.x_label)}: {number(grid.x[i])}<br>{plain(grid.y_label)}: {number(grid.y[j])}"
+            f"<br>{plain(word.replace('_', ' '))}{_predicted(grid, i, j)}"
+            for i, word in enumerate(row)
+        ]
+        for j, row in enumerate(grid.cells)
+    ]
+    x, y = list(range(len(grid.x))), list(range(len(grid.y)))
+    data: list[dict[str, Any]] = [
+        {
+            "type": "heatmap",
+            "x": x,
+            "y": y,
+            "z": z,
+            "text": told,
+            "hoverinfo": "text",
+            "meta": {"role": "cells"},
+        }
+    ]
+    if grid.prediction:
+        logs = [
+            [math.log10(v) if v > 0.0 and math.isfinite(v) else None for v in row] for row in grid.prediction
+        ]
+        data.append(
+            {
+                "type": "contour",
+                "x": x,
+                "y": y,
+                "z": logs,
+                "hoverinfo": "skip",
+                "showscale": False,
+                "contours": {"type": "constraint", "operation": "=", "value": 1e-9},
+                "meta": {"role": "prediction"},
+                "name": "predicted edge",
+            }
+        )
+    return {
+        "data": data,
+        "layout": {
+            "xaxis": _places(grid.x_label, grid.x),
+            "yaxis": _places(grid.y_label, grid.y),
+            "showlegend": False,
+        },
+        "title": plain(grid.title),
+        "description": plain(grid.note),
+    }
+
+
+def _predicted(grid: Grid, i: int, j: int) -> str:
+    if not grid.prediction or j >= len(grid.prediction) or i >= len(grid.prediction[j]):
+        return ""
+    return f"<br>predicted growth per step: {number(grid.prediction[j][i], 6)}"
+
+
+def _places(label: str, values: tuple[float, ...]) -> dict[str, Any]:
+    shown = thinned(len(values), 9)
+    return {
+        "title": {"text": plain(label)},
+        "tickvals": shown,
+        "ticktext": [number(values[i], 3) for i in shown],
+        "showgrid": False,
+        "zeroline": False,
+    }
+
+
+def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]:
+    low, high = ends
+    axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "range": [low, high]}
+    if scale == "log":
+        decades = ticks(low, high, scale)
+        shown = decades if len(decades) > 2 else _within(low, high, (1, 2, 5))
+        if len(shown) < 3:
+            shown = _within(low, high, (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9))
+        axis |= {
+            "tickvals": [10.0**e for e in shown],
+            "ticktext": [number(float(f"{10.0**e:.3g}"), 3) for e in shown],
+            "minor": {"showgrid": False},
+        }
+    return axis
+
+
+def _within(low: float, high: float, steps: Sequence[float]) -> list[float]:
+    """Marks inside the decades, as decades."""
+    marks = [e + math.log10(m) for e in range(math.floor(low), math.ceil(high)) for m in steps]
+    return [e for e in marks if low <= e <= high]
+
+
+def _polar(layout: dict[str, Any], chart: Chart) -> None:
+    """Rings and equal axes instead of a frame."""
+    reach = chart.reach
+    layout["xaxis"] = {"visible": False, "range": [-reach, reach], "scaleanchor": "y"}
+    layout["yaxis"] = {"visible": False, "range": [-reach, reach]}
+    for radius in chart.rings:
+        layout["shapes"].append({"meta": "ring", "radius": radius})
+        layout["annotations"].append({"meta": "ring", "x": 0.0, "y": radius, "text": number(radius, 6)})
+
+
+def _trace(line: Line) -> dict[str, Any]:
+    drawn = {"points": "markers", "failed": "markers", "both": "lines+markers"}.get(line.style, "lines")
+    trace: dict[str, Any] = {
+        "type": "scatter",
+        "mode": drawn,
+        "name": plain(line.name),
+        "x": list(line.x),
+        "y": [y if math.isfinite(y) else None for y in line.y],
+        "meta": {"colour": line.colour % 8, "style": line.style},
+        "showlegend": not line.quiet,
+    }
+    if line.style in DASHES:
+        trace["line"] = {"dash": DASHES[line.style]}
+    if line.style == "steps":
+        trace["line"] = {"shape": "hv"}
+    if "markers" in drawn:
+        trace["marker"] = {"symbol": "x-thin" if line.style == "failed" else SYMBOLS[line.colour % 8]}
+    if line.notes:
+        trace |= {"text": [plain(note).replace("\n", "<br>") for note in line.notes], "hoverinfo": "text"}
+    return trace

@@ -1,0 +1,280 @@
+"""The recorded history as pages need it: nights in order, and for each series its values over them.
+
+A night is one run. Series of one test stay together; the newest wording of a test is its card. Values are kept
+in parallel lists, because ten years of nights are a million of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any, Literal, Protocol
+
+from spook_tracker.tracker.document.run_document import (
+    EngineVersion,
+    FigureData,
+    Machine,
+    MapData,
+    Sample,
+    SeriesDefinition,
+    TestCard,
+    from_number,
+)
+from spook_tracker.tracker.document.wording import instant, version
+
+NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
+MapKey = tuple[str, str, str]  # test, configuration, name
+EARLIEST = datetime.min.replace(tzinfo=UTC)
+State = Literal["pass", "watch", "fail", "none"]
+
+
+@dataclass(frozen=True)
+class Night:
+    """One run, without its values."""
+
+    index: int  # place in commit order
+    id: str
+    started: str
+    finished: str
+    trigger: str
+    ci_address: str
+    tracker_version: str
+    engine: EngineVersion
+    machine: Machine
+
+
+@dataclass
+class Trend:
+    """One series over the nights, in order."""
+
+    definition: SeriesDefinition  # the newest
+    nights: list[int] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    outcomes: list[str] = field(default_factory=list)
+    held: list[bool] = field(default_factory=list)  # set point
+    samples: list[Sample] = field(default_factory=list)  # without evidence
+    versions: list[str] = field(default_factory=list)  # of the test's definition
+    latest: Sample | None = None  # of the newest night that has one, with its evidence
+    before: Sample | None = None  # of the night before that, where it was timed
+    order: int = 0  # place in its run's document
+
+    @property
+    def value(self) -> float:
+        """The newest value; NaN if there is none."""
+        return self.values[-1] if self.values else math.nan
+
+    @property
+    def state(self) -> State:
+        """What the newest value says."""
+        return self.state_at(-1) if self.values else "none"
+
+    def state_at(self, place: int) -> State:
+        """pass, watch (inside the limit, set point left) or fail."""
+        if self.outcomes[place] != "value":
+            return "fail"
+        return "pass" if self.held[place] else "watch"
+
+
+@dataclass
+class TestHistory:
+    """Everything recorded about one test of the newest engine."""
+
+    __test__ = False  # not a test class
+
+    name: str
+    card: TestCard
+    trends: list[Trend]
+    figures: tuple[FigureData, ...] = ()
+    maps: tuple[MapData, ...] = ()
+    earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
+
+    def gates(self) -> list[Trend]:
+        """The series that decide green or red."""
+        return [t for t in self.trends if t.definition.role == "gate"]
+
+    def companions(self) -> list[Trend]:
+        """The scalars that keep the gates honest."""
+        return [t for t in self.trends if t.definition.role == "companion" and t.definition.kind == "scalar"]
+
+    def reported(self) -> list[Trend]:
+        """Scalars that are only followed."""
+        return [t for t in self.trends if t.definition.role == "reported" and t.definition.kind == "scalar"]
+
+    def of_kind(self, kind: str) -> list[Trend]:
+        """Series of a kind: ladder, order, time, break_point."""
+        return [t for t in self.trends if t.definition.kind == kind]
+
+    @property
+    def state(self) -> State:
+        """fail if a gate is red; watch if a companion or a set point is; else pass."""
+        gates = [t.state for t in self.gates()]
+        if "fail" in gates or not gates:
+            return "fail" if gates else "none"
+        others = [t.state for t in self.trends if t.definition.role == "companion"]
+        return "watch" if "watch" in gates or "watch" in others or "fail" in others else "pass"
+
+
+@dataclass
+class Book:
+    """All that the website tells: the nights of one engine in order, and its tests."""
+
+    nights: list[Night]
+    tests: list[TestHistory]
+    others: list[tuple[Night, list[TestHistory]]] = field(default_factory=list)  # other engines, newest night
+
+    def peers(self, test: str) -> list[tuple[str, TestHistory]]:
+        """The same test put to other engines, where it ran on the machine of tonight."""
+        machine = self.tonight.machine.fingerprint if self.nights else ""
+        return [
+            (f"{night.engine.name} {version(night.engine)}", found)
+            for night, tests in self.others
+            if night.machine.fingerprint == machine
+            for found in tests
+            if found.name == test
+        ]
+
+    @property
+    def tonight(self) -> Night:
+        """The newest night."""
+        return self.nights[-1]
+
+
+class Source(Protocol):
+    """What is read of `tracker.store.history.History`."""
+
+    def runs(self, engine: str | None = None) -> Sequence[Any]: ...
+    def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
+    def samples(self, run_id: str) -> Mapping[str, tuple[SeriesDefinition, Sample]]: ...
+    def cards(self, run_id: str) -> Sequence[TestCard]: ...
+    def figures(self, run_id: str) -> Sequence[FigureData]: ...
+    def maps(self, run_id: str) -> Sequence[MapData]: ...
+
+
+def book(history: Source) -> Book:
+    """The book of a history. The engine of the newest run that was not imported is the one it is about."""
+    runs = list(history.runs())
+    if not runs:
+        return Book([], [])
+    own = [run for run in runs if run.trigger != "import"] or runs
+    name = max(own, key=lambda run: instant(run.started) or EARLIEST).engine.name
+    of_engine: dict[str, list[Any]] = {}
+    for run in runs:
+        of_engine.setdefault(run.engine.name, []).append(run)
+    series = history.series(evidence=False)
+    nights, tests = _chapter(history, _line(of_engine.pop(name)), series)
+    others = []
+    for runs_of_other in of_engine.values():
+        other_nights, other_tests = _chapter(history, _line(runs_of_other), series)
+        others.append((other_nights[-1], other_tests))
+    return Book(nights, tests, others)
+
+
+def _line(runs: Sequence[Any]) -> list[Any]:
+    """The runs that have a place in the commit order, and the newest one whatever it was built from.
+
+    This is what `latest` and `previous` choose from on the command line.
+    """
+    newest = max(runs, key=lambda run: instant(run.started) or EARLIEST)
+    return [run for run in runs if (run.engine.git_hash and not run.engine.dirty) or run is newest]
+
+
+def _chapter(
+    history: Source, runs: Sequence[Any], series: Mapping[str, Any]
+) -> tuple[list[Night], list[TestHistory]]:
+    """One engine's nights and tests."""
+    nights = [
+        Night(
+            index, run.id, run.started, run.finished, run.trigger, run.ci_address, run.tracker_version,
+            run.engine, run.machine,
+        )
+        for index, run in enumerate(runs)
+    ]  # fmt: skip
+    place = {night.id: night.index for night in nights}
+    trends: dict[str, Trend] = {}
+    last_with: dict[str, int] = {}  # the newest night of each test
+    for key, found in series.items():
+        trend = Trend(found.definition)
+        for run, sample, test_version in found.points:
+            at = place.get(run.id)
+            if at is not None:
+                trend.nights.append(at)
+                trend.values.append(from_number(sample.value))
+                trend.outcomes.append(sample.outcome)
+                trend.held.append(sample.set_point_held)
+                trend.samples.append(sample)
+                trend.versions.append(test_version)
+        if trend.nights:
+            trends[key] = trend
+            test = trend.definition.test
+            last_with[test] = max(last_with.get(test, 0), trend.nights[-1])
+    _add_evidence(history, nights, trends)
+    _add_earlier_ladders(history, nights, trends)
+    cards: dict[str, TestCard] = {}
+    figures: dict[str, list[FigureData]] = {}
+    maps: dict[MapKey, MapData] = {}
+    earlier_maps: dict[MapKey, MapData] = {}
+    for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
+        figures_found = set(figures)
+        for card in history.cards(night.id):
+            cards.setdefault(card.name, card)
+        for figure in history.figures(night.id):
+            if figure.test not in figures_found:
+                figures.setdefault(figure.test, []).append(figure)
+        for stability_map in history.maps(night.id):
+            place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
+            (earlier_maps if place_of_map in maps else maps).setdefault(place_of_map, stability_map)
+    by_test: dict[str, list[Trend]] = {}
+    for trend in trends.values():
+        by_test.setdefault(trend.definition.test, []).append(trend)
+    for test, of_test in by_test.items():
+        cards.setdefault(test, _bare_card(test, of_test[0].definition.title))
+    for ordered in by_test.values():
+        ordered.sort(key=lambda trend: trend.order)
+    tests = [
+        TestHistory(
+            name=test,
+            card=card,
+            trends=by_test.get(test, []),
+            figures=tuple(figures.get(test, ())),
+            maps=tuple(m for m in maps.values() if m.test == test),
+            earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
+        )
+        for test, card in cards.items()
+    ]
+    return nights, sorted(tests, key=lambda t: not t.card.seven)
+
+
+def _bare_card(name: str, title: str) -> TestCard:
+    """A test of which only values came: results of another tool, perhaps."""
+    return TestCard(
+        name=name, title=title or name, question="", why="", model="", parameters=(), theory=(), reference="",
+        conclusion="", source="", misprints=(), seven=False, stages=(),
+    )  # fmt: skip
+
+
+def _add_evidence(history: Source, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
+    """The newest sample of every series in full: failure, counters, timing."""
+    wanted: dict[int, list[str]] = {}
+    for key, trend in trends.items():
+        wanted.setdefault(trend.nights[-1], []).append(key)
+    for place in sorted(wanted, reverse=True)[:NIGHTS_FOR_FIGURES]:
+        samples = history.samples(nights[place].id)
+        places = {key: i for i, key in enumerate(samples)}
+        for key in wanted[place]:
+            if key in samples:
+                trends[key].latest = samples[key][1]
+                trends[key].order = places[key]
+
+
+def _add_earlier_ladders(history: Source, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
+    """The ladder of the night before beside tonight's."""
+    timed = [(key, trend) for key, trend in trends.items() if trend.definition.kind == "ladder"]
+    before = max((trend.nights[-2] for _, trend in timed if len(trend.nights) > 1), default=None)
+    if before is None:
+        return
+    samples = history.samples(nights[before].id)
+    for key, trend in timed:
+        if key in samples and len(trend.nights) > 1 and trend.nights[-2] == before:
+            trend.before = samples[key][1]

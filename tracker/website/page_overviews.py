@@ -1,0 +1,185 @@
+"""Pages over all tests: error against run time, stability, regressions, versions, data, the printed report."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from spook_tracker.tracker.document.wording import slug, web_address
+from spook_tracker.tracker.website.comparisons import Comparisons, choice, page_data
+from spook_tracker.tracker.website.diagrams import (
+    figure_chart,
+    grid_view,
+    ladder_charts,
+    map_grid,
+    trend_chart,
+    view,
+)
+from spook_tracker.tracker.website.events import Event, map_key, map_verdicts
+from spook_tracker.tracker.website.feed import badge_words
+from spook_tracker.tracker.website.nights import Book, TestHistory
+from spook_tracker.tracker.website.page_index import gates_at, health, summary
+from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.website.scenery import scenery
+from spook_tracker.tracker.website.svg import grid_picture, picture
+
+MOST_CLOSED = 100  # events on the page; the file has all
+MOST_CHANGES = 100  # of a comparison read without scripts
+MOST_NIGHTS = 120
+
+
+def error_time(book: Book) -> Page:
+    """What accuracy costs, for all tests."""
+    charts = []
+    for test in book.tests:
+        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name)):
+            shown = view(chart, table=False)
+            axis = "work" if chart.name.endswith("-work") else "seconds"
+            charts.append((axis, shown, address(test)))
+    rows = {
+        kind: [_row(t, test) for test in book.tests for t in test.of_kind(kind)] for kind in ("order", "time")
+    }
+    context = {
+        "charts": charts,
+        "orders": rows["order"],
+        "scalars": rows["time"],
+    }
+    title = "Error against run time"
+    return Page("error-time.html", "error-time.html", title, "What accuracy costs.", context, plotly=True)
+
+
+def _row(trend: Any, test: TestHistory) -> Any:
+    return row(trend, test.card.title, address(test))
+
+
+def stability(book: Book, events: Sequence[Event]) -> Page:
+    """Break points and maps of all tests."""
+    points = [(test, t) for test in book.tests for t in test.of_kind("break_point")]
+    context = {
+        "break_points": [_row(t, test) for test, t in points],
+        "maps": [
+            (
+                grid_view(map_grid(m, f"{slug(test.name)}-", test.card.title)),
+                address(test),
+                map_verdicts(test).get(map_key(m)),
+            )
+            for test in book.tests
+            for m in test.maps
+        ],
+        "trends": [view(trend_chart(t, book.nights, events, test.card.title)) for test, t in points],
+    }
+    return Page(
+        "stability.html", "stability.html", "Stability", "Break points and maps.", context, plotly=True
+    )
+
+
+def regressions(book: Book, events: Sequence[Event]) -> Page:
+    """What is red, and what was."""
+    closed = [e for e in events if not e.lasting]
+    context = {
+        "open": [event_row(e, book) for e in events if e.lasting],
+        "closed": [event_row(e, book) for e in closed[:MOST_CLOSED]],
+        "left_out": max(0, len(closed) - MOST_CLOSED),
+        "maps": [
+            (test.card.title, address(test), m, verdict)
+            for test in book.tests
+            for m in test.maps
+            if (verdict := map_verdicts(test).get(map_key(m))) is not None and verdict.red
+        ],
+    }
+    return Page(
+        "regressions.html", "regressions.html", "Regressions", "What became worse, and when.", context
+    )
+
+
+def compare(told: Comparisons) -> Page:
+    """Two versions chosen in the page; without scripts, the newest two."""
+    choices = [choice(night) for night in told.nights]
+    first = None
+    if len(told.nights) > 1:
+        before, after = told.nights[-2:]
+        pair = told.pairs[f"{before.id}/{after.id}"]
+        counts = ", ".join(f"{n} {word.replace('_', ' ')}" for word, n in pair["counts"].items())
+        headline = {"identical": "Identical", "same": "No regression", "regressed": "Regressed"}
+        first = {
+            "before": choice(before),
+            "after": choice(after),
+            "headline": headline.get(pair["verdict"], "Not comparable"),
+            "counts": f"{counts}.",
+            "changes": pair["changes"][:MOST_CHANGES],
+            "left_out": max(0, len(pair["changes"]) - MOST_CHANGES),
+        }
+    context = {"versions": choices, "first": first, "comparisons": page_data(told)}
+    return Page("compare.html", "compare.html", "Compare two versions", "Two versions side by side.", context)
+
+
+def versions(book: Book) -> Page:
+    """What ran where."""
+    nights = list(reversed(book.nights))
+    kept = gates_at(book)
+    machines = Counter(night.machine for night in book.nights)
+    context = {
+        "nights": [
+            {
+                "night": night,
+                "anchor": slug(night.id),
+                "machine": slug(night.machine.fingerprint),
+                "kept": kept[night.index][0],
+                "gates": kept[night.index][1],
+                "state": "none"
+                if not kept[night.index][1]
+                else "pass"
+                if kept[night.index][0] == kept[night.index][1]
+                else "fail",
+                "log": web_address(night.ci_address),
+            }
+            for night in nights[:MOST_NIGHTS]
+        ],
+        "left_out": max(0, len(nights) - MOST_NIGHTS),
+        "machines": [
+            {"machine": machine, "anchor": slug(machine.fingerprint), "nights": count}
+            for machine, count in machines.most_common()
+        ],
+        "others": [(night, len(tests)) for night, tests in book.others],
+    }
+    return Page("versions.html", "versions.html", "Versions and machines", "What ran where.", context)
+
+
+def data(book: Book, events: Sequence[Event]) -> Page:
+    """Every number as a file."""
+    _, kept, gates = health(book, events)
+    context = {
+        "badge": f"physics: {badge_words(kept, gates)}",
+        "tests": [{"title": t.card.title, "address": address(t), "slug": slug(t.name)} for t in book.tests],
+    }
+    return Page("data.html", "data.html", "Data", "Every number as CSV and JSON.", context)
+
+
+def document(book: Book, events: Sequence[Event]) -> Page:
+    """The report of tonight in one piece, in the order of the thesis' appendix A."""
+    gates, tests = [], []
+    for test in book.tests:
+        name = slug(test.name)
+        for gate in test.gates():
+            gates.append({**vars(_row(gate, test)), "slug": name})
+        scalars = test.gates() + test.companions() + test.reported() + test.of_kind("order")
+        pictures = [picture(figure_chart(f, f"{name}-")) for f in test.figures]
+        pictures += [
+            picture(chart) for chart in ladder_charts(test, f"{name}-") if chart.name.endswith("-seconds")
+        ]
+        pictures += [grid_picture(map_grid(m, f"{name}-")) for m in test.maps]
+        tests.append(
+            {
+                "card": test.card,
+                "slug": name,
+                "scenery": scenery(test.card.scene) if test.card.scene else None,
+                "state": test.state,
+                "kept": [s.stage for s in test.card.stages if s.kept],
+                "left_out": sum(not s.kept for s in test.card.stages),
+                "rows": [_row(t, test) for t in [*scalars, *test.of_kind("break_point")]],
+                "pictures": pictures,
+            }
+        )
+    context = {"summary": summary(book), "gates": gates, "tests": tests}
+    return Page("document.html", "document.html", "Report", "The report of tonight, for printing.", context)

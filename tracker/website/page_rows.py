@@ -1,0 +1,143 @@
+"""Lines of tables: a series as of its newest night, an event; and what a page is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from spook_tracker.tracker.document.wording import (
+    band,
+    clean,
+    conditions,
+    day,
+    limit,
+    margin,
+    named,
+    number,
+    quantity,
+    seconds,
+    slug,
+)
+from spook_tracker.tracker.website.events import Event, judged
+from spook_tracker.tracker.website.nights import Book, Night, State, TestHistory, Trend
+from spook_tracker.tracker.website.svg import sparkline
+
+SPARK_NIGHTS = 40
+
+
+@dataclass
+class Page:
+    """A page to be written: where, from which template, with what."""
+
+    path: str
+    template: str
+    title: str
+    description: str
+    context: dict[str, Any] = field(default_factory=dict)
+    plotly: bool = False
+
+
+@dataclass
+class Row:
+    """One series as a line of a table or a card."""
+
+    test: str
+    title: str
+    address: str
+    what: str
+    definition: str  # of stable, for a break point
+    configuration: str
+    time_step: str
+    time_step_value: float | str
+    parameters: str
+    value: str
+    exact: str
+    limit: str
+    limit_source: str
+    set_point: str
+    margin: str
+    share: str | None  # of the gauge, per cent
+    state: State
+    judged: bool
+    failure: str
+    spark: dict[str, object]
+    stale: str  # the night the value is of, if it is not tonight
+    search: str
+
+
+def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) -> Row:
+    """The line of one series, as of its newest night; `nights` tell whether that is tonight."""
+    d = trend.definition
+    inside = margin(d, trend.value)
+    share = inside.share
+    state = trend.state
+    if trend.definition.limit is not None and state == "fail":
+        share = 1.0
+    ends = slice(-SPARK_NIGHTS, None)
+    states = [trend.state_at(i) for i in range(*ends.indices(len(trend.values)))]
+    failed = trend.latest.failure if trend.latest else ""
+    word = trend.outcomes[-1].replace("_", " ") if trend.outcomes else "no value"
+    return Row(
+        test=d.test,
+        title=title,
+        address=address,
+        what=named(d)[0],
+        definition=named(d)[1],
+        configuration=d.configuration,
+        time_step=number(d.time_step, 4),
+        time_step_value="" if d.time_step is None else d.time_step,
+        parameters=", ".join(f"{key} {number(value)}" for key, value in sorted(d.parameters.items())),
+        value=_shown(trend, word),
+        exact=repr(trend.value),
+        limit=limit(d),
+        limit_source=d.limit_source,
+        set_point=band(d.set_point, d.unit) if d.set_point else "",
+        margin=inside.text if math.isfinite(trend.value) else "no value",
+        share=None if share is None else f"{100.0 * min(1.0, max(share, 0.012)):.1f}",
+        state=state,
+        judged=judged(trend),
+        failure=failed,
+        spark=sparkline(trend.values[ends], states),
+        stale=day(nights[last].started) if nights and (last := trend.nights[-1]) != nights[-1].index else "",
+        search=clean(f"{d.test} {title} {d.description} {d.configuration}").lower(),
+    )
+
+
+def _shown(trend: Trend, word: str) -> str:
+    """The newest value in words; run times with a fitting prefix."""
+    d = trend.definition
+    if d.kind == "time" and math.isinf(trend.value):
+        return "never"
+    if not math.isfinite(trend.value):
+        return word
+    return seconds(trend.value) if d.kind == "time" and d.unit == "s" else quantity(trend.value, d.unit)
+
+
+def address(test: TestHistory, root: str = "") -> str:
+    """Where the page of a test is."""
+    return f"{root}tests/{slug(test.name)}.html"
+
+
+def event_row(event: Event, book: Book) -> dict[str, Any]:
+    """An event as a line of a table."""
+    d = event.trend.definition
+    test = next(t for t in book.tests if t.name == d.test)
+    return {
+        "test": test.card.title,
+        "what": f"{named(d)[0]} ({conditions(d)})",
+        "address": address(test),
+        "anchor": f"e-{slug(d.key + '/' + event.first.id)}",
+        "state": event.state,
+        "name": event.name,
+        "sentence": event.sentence,
+        "now": quantity(event.value, d.unit, 6),
+        "before": quantity(event.before, d.unit, 6) if math.isfinite(event.before) else "–",
+        "night": event.first,
+        "good": event.good,
+        "end": event.end,
+        "standing": event.standing,
+        "accepted": event.accepted,
+        "key": d.key,
+    }

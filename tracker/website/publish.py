@@ -1,0 +1,169 @@
+"""Write the website: read the history once, make every page from it, swap the folder in.
+
+The same history gives the same bytes: nothing here asks for the time, the machine or a random number. A page
+is made again only if what stands on it, its template or the tracker changed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from spook_tracker.tracker.document.wording import slug
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.resources import resource
+from spook_tracker.tracker.website import data_files, feed
+from spook_tracker.tracker.website.comparisons import FILE, comparisons, read_known, stored
+from spook_tracker.tracker.website.events import Event, all_events
+from spook_tracker.tracker.website.folder import FolderError, digest, replacing
+from spook_tracker.tracker.website.nights import Book, Source, TestHistory, book
+from spook_tracker.tracker.website.page_index import health
+from spook_tracker.tracker.website.page_rows import Page, address
+from spook_tracker.tracker.website.pages import NAVIGATION, pages
+from spook_tracker.tracker.website.templates import environment
+
+__all__ = ["FolderError", "Report", "publish"]
+
+ASSETS = {  # name in templates: file under site/static
+    "css": "site.css",
+    "theme": "theme.js",
+    "site": "site.js",
+    "compare": "compare.js",
+    "plotly": "plotly-cartesian.min.js",
+}
+PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt")
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a publication did."""
+
+    written: int
+    skipped: int  # unchanged since the last time
+    out: Path
+
+    @property
+    def pages(self) -> int:
+        """All files of the website."""
+        return self.written + self.skipped
+
+
+def publish(history: Source, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
+    """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
+
+    `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red.
+    """
+    site = resource("site")
+    static, templates = site / "static", site / "templates"
+    contents = {name: (static / file).read_bytes() for name, file in ASSETS.items()}
+    names = {name: _hashed(ASSETS[name], content) for name, content in contents.items()}
+    making = digest(*(path.read_bytes() for path in sorted([*templates.iterdir(), *_sources()])))
+    made = environment(templates)
+    told = book(history)
+    with replacing(out) as folder:
+        for name, content in contents.items():
+            folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
+        for file in PLAIN_ASSETS:
+            content = (static / file).read_bytes()
+            folder.add(f"assets/{file}", digest(content), partial(bytes, content))
+        events = all_events(told, accepted) if told.nights else []
+        levels = digest(making.encode(), repr(accepted).encode())
+        compared = comparisons(history, told, events, accepted, read_known(out, levels))
+        for page in pages(told, events, compared):
+            context = _context(page, names, told.nights[-1] if told.nights else None)
+            source = digest(making.encode(), page.template.encode(), _bytes_of(context))
+
+            def render(page: Page = page, context: dict[str, Any] = context) -> bytes:
+                return made.get_template(page.template).render(context).encode("utf-8", "replace")
+
+            folder.add(page.path, source, render)
+        pairs = stored(compared, levels)
+        folder.add(FILE, digest(pairs), partial(bytes, pairs))
+        for path, made_from, make in _data(told, events):
+            folder.add(path, digest(making.encode(), made_from), make)
+    return Report(folder.written, folder.skipped, folder.old)
+
+
+def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
+    """Files of numbers: path, what they are made from, and how."""
+    if not told.nights:
+        return
+    newest = _bytes_of({"nights": len(told.nights), "tonight": told.tonight})
+    for test in told.tests:
+        facts = digest(newest, _bytes_of(_facts(test))).encode()
+        yield f"data/{slug(test.name)}.csv", facts, partial(data_files.newest_csv, told, [test])
+        yield (
+            f"data/{slug(test.name)}-history.csv",
+            facts,
+            partial(data_files.history_csv, told, test),
+        )
+        yield f"data/{slug(test.name)}.json", facts, partial(data_files.test_json, told, test)
+    tables = {
+        "tonight": data_files.newest(told, told.tests),
+        "nights": data_files.nights(told),
+        "regressions": data_files.regressions(events),
+    }
+    for name, (columns, lines) in tables.items():
+        source = _bytes_of(
+            {"lines": [[repr(c) if isinstance(c, float) else c for c in line] for line in lines]}
+        )
+        yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
+        yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
+    news = feed.atom(told, events, {test.name: address(test) for test in told.tests})
+    yield "feed.xml", news, partial(bytes, news)
+    state, kept, gates = health(told, events)
+    words = feed.badge_words(kept, gates)
+    yield "badge.svg", (state + words).encode(), partial(feed.badge_svg, state, words)
+    yield "badge.json", (state + words).encode(), partial(feed.badge_json, state, words)
+
+
+def _facts(test: TestHistory) -> dict[str, Any]:
+    """What the files of a test are made from."""
+    trends = [
+        [t.definition, t.nights, list(map(repr, t.values)), t.outcomes, t.held[-1:], t.latest]
+        for t in test.trends
+    ]
+    return {"card": test.card, "trends": trends, "figures": test.figures, "maps": test.maps}
+
+
+def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:
+    return {
+        "title": page.title,
+        "description": page.description,
+        "root": "../" * page.path.count("/"),
+        "here": page.path,
+        "navigation": NAVIGATION,
+        "assets": assets,
+        "plotly": page.plotly,
+        "night": night,
+        **page.context,
+    }
+
+
+def _hashed(file: str, content: bytes) -> str:
+    """A name that changes with the content, so that a browser never shows an old one."""
+    stem, _, kind = file.rpartition(".")
+    return f"{stem}-{hashlib.sha256(content).hexdigest()[:8]}.{kind}"
+
+
+def _sources() -> list[Path]:
+    """The modules whose change makes every page again."""
+    return sorted(Path(__file__).parent.parent.rglob("*.py"))
+
+
+def _bytes_of(context: dict[str, Any]) -> bytes:
+    """What stands on a page, as bytes to be hashed."""
+
+    def plain(thing: Any) -> Any:
+        if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+            return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
+        raise TypeError(f"a page cannot hold {type(thing).__name__}")
+
+    return msgspec.json.encode(context, enc_hook=plain, order="deterministic")

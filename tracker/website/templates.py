@@ -1,0 +1,51 @@
+"""Templates of the website: everything from outside is escaped, missing names are errors.
+
+Only here is Jinja imported. `data` is the one way to put JSON into a page: inside a script element that the
+browser never runs, with every sign escaped that could end it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from spook_tracker.tracker.document import wording
+from spook_tracker.tracker.resources import resource
+
+ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+
+
+def embedded(value: Any) -> Markup:
+    """JSON for a non-executing script element. Non-finite numbers must have been replaced before."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    for sign, escape in ESCAPES.items():
+        text = text.replace(sign, escape)
+    return Markup(text)
+
+
+def environment(folder: Path | None = None) -> jinja2.Environment:
+    """The templates under site/templates with our filters."""
+    made = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder or resource("site") / "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {
+        "data": embedded,
+        "clean": wording.clean,
+        "clock": wording.clock,
+        "day": wording.day,
+        "version": wording.version,
+        "short_hash": wording.short_hash,
+        "commit_address": wording.commit_address,
+        "web_address": wording.web_address,
+        "seconds": wording.seconds,
+        "number": wording.number,
+    }
+    return made
