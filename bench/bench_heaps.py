@@ -39,10 +39,11 @@ GROUND = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0,
 GROWTH = 1.6  # × the cost per contact of the smallest heap: what sorting pairs and leaving the cache may cost
 REST = 0.5  # × one step of a stack that is hit: at rest no matrix is factored
 TALL = 1.6  # × the cost per box of a stack of 100, for one of 500 at rest
+BALL = Sphere(0.25)
 OVERLAP = 1e-3  # m, what heaps of spheres are compared at
 
 
-def heap(count: int, shape: Shape = Sphere(0.25)) -> Scene:
+def heap(count: int, shape: Shape = BALL) -> Scene:
     """Bodies in layers of a square grid."""
     rng = np.random.default_rng(1)
     side = 10 if count <= 1000 else math.ceil(math.sqrt(count / 10))

@@ -230,7 +230,8 @@ def test_a_stop_returns_its_own_restitution(h: float, psi: float) -> None:
         between=(WORLD, "bar"),
         at=(0, 0, 0),
         axis=(0, 0, 1),
-        limit=Limit(lower=-9.0, upper=0.5, restitution=psi),
+        compliance=0.0,
+        limit=Limit(lower=-9.0, upper=0.5, compliance=0.0, restitution=psi),
     )
     result = simulate(
         Scene(bodies=(bar,), constraints=(hinge,)),
@@ -239,8 +240,14 @@ def test_a_stop_returns_its_own_restitution(h: float, psi: float) -> None:
         observe={"w": Trace(quantity=AngularVelocity("bar"))},
     )
 
-    assert result["w"][-1, 2] == pytest.approx(-2.0 * psi, abs=2e-3)
-    assert result["w"][:, 2].min() >= -2.0 * psi - 2e-3
+    speed = result["w"][:, 2]
+    hit = int(np.argmax(speed < 0.5 * speed[0]))
+    met = speed[hit - 1]
+
+    if psi > 0.0:
+        assert speed[hit] == pytest.approx(-psi * met, abs=1e-6)
+    # Without restitution the gap may close within the step: what is left of the speed then ends in the next.
+    assert np.abs(speed[hit + 2 :] + psi * met).max() < (0.02 if psi > 0.0 else 1e-6)
 
 
 # Answers that were not found ----------------------------------------------------------------------------------

@@ -72,7 +72,9 @@ RowBlock ContactStage::row_block(const Point& point, bool tangents) const {
 FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
                                  IslandSolver& islands, FrictionModel model) {
     const ContactOptions& o = options_;
-    if (o.solver == SolverKind::direct && still_right(system, points, model)) return {};
+    if (o.solver == SolverKind::direct && system.velocity.size() == system.mass.size() &&
+        still_right(system, points, model))
+        return {};
     const FrictionReport report = islands.run(
         system, points,
         [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
@@ -137,6 +139,11 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
             if (system.rows.back().size == 3)
                 friction.push_back({static_cast<int>(system.rows.size()) - 1, point.material.friction,
                                     point.material.slip_compliance / options_.time_step, point.before});
+        }
+        if (round == 0) {  // at rest, the velocities before are those after
+            system.velocity.resize(system.mass.size());
+            for (std::size_t b = 0; b < unknown_.size(); ++b)
+                if (unknown_[b] >= 0) system.velocity[unknown_[b]] = velocity_[b];
         }
         report = run(system, friction, resting_solver_, options_.friction);
         if (!report.finite || round == late_rounds) break;

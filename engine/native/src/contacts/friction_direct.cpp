@@ -110,42 +110,42 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
 
 }  // namespace
 
-bool still_right(MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
-    constexpr double rounding = 1e-13;  // of the largest speed in the problem
+bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
+    constexpr double moves = 1e-14, pushes = 1e-13;  // of the largest speed, and of the largest impulse
     for (const FrictionPoint& point : points)
         if (point.normal < 0.0) return false;
-    double pushed = 0.0;
-    for (const RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i) pushed = std::max(pushed, std::abs(block.multiplier[i]));
-    if (pushed == 0.0) return false;
-    std::vector<Vec6> velocity = system.momentum;
-    double speed = 0.0;
+    double largest = 0.0;
     for (const RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i) {
-            const double z = block.multiplier[i];
-            if (z < block.lower[i] || z > block.upper[i]) return false;
-            for (int a = 0; a < 6; ++a) {
-                if (block.first >= 0) velocity[block.first][a] += block.first_jacobian[i][a] * z;
-                if (block.second >= 0) velocity[block.second][a] += block.second_jacobian[i][a] * z;
-            }
+            if (block.multiplier[i] < block.lower[i] || block.multiplier[i] > block.upper[i]) return false;
+            largest = std::max(largest, std::abs(block.multiplier[i]));
         }
-    for (std::size_t b = 0; b < velocity.size(); ++b) {
-        const Mat6 factor = factor_six(system.mass[b]);
-        Vec6 free = system.momentum[b];
-        solve_six(factor, free);
-        solve_six(factor, velocity[b]);
-        for (int a = 0; a < 3; ++a) speed = std::max(speed, std::abs(free[a]));
-    }
-    std::swap(system.velocity, velocity);
-    if (rows_residual(system, points, model).residual <= rounding * speed) return true;
-    std::swap(system.velocity, velocity);
-    return false;
+    if (largest == 0.0) return false;
+    std::vector<Vec6> missing = system.momentum;  // p + Gᵀ z − M v
+    double speed = 0.0;
+    for (std::size_t b = 0; b < missing.size(); ++b)
+        for (int a = 0; a < 6; ++a) {
+            for (int c = 0; c < 6; ++c) missing[b][a] -= system.mass[b][6 * a + c] * system.velocity[b][c];
+            if (a < 3) speed = std::max(speed, std::abs(missing[b][a]) / system.mass[b][7 * a]);
+        }
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i)
+            for (int a = 0; a < 6; ++a) {
+                if (block.first >= 0)
+                    missing[block.first][a] += block.first_jacobian[i][a] * block.multiplier[i];
+                if (block.second >= 0)
+                    missing[block.second][a] += block.second_jacobian[i][a] * block.multiplier[i];
+            }
+    for (const Vec6& part : missing)
+        for (const double impulse : part)
+            if (!(std::abs(impulse) <= pushes * largest)) return false;
+    return rows_residual(system, points, model).residual <= moves * speed;
 }
 
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, PivotSolver& solver, int max_rounds) {
     FrictionReport report;
-    if (still_right(system, points, model)) return report;
+    if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
     MixedSystem start;
     if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
                                        [](const RowBlock& block) { return block.lower[0] == 0.0; }))

@@ -303,8 +303,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     report.converged = false;
     system.velocity.resize(system.mass.size());
     if (analyse(system)) same_matrix = false;
-    // A repeated solve starts from where the one before got, not from what it found to be out of reach.
-    tolerance_ = same_matrix ? std::max(tightest, 0.1 * tolerance_) : tightest;
+    tolerance_ = tightest;
     if (!same_matrix) measure(system);
 
     int bounded = 0;
