@@ -40,6 +40,13 @@ Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
     bounds_.resize(bounded_.size());
 }
 
+std::vector<char> Detection::balls() const {
+    std::vector<char> ball(dynamic_.size(), 1);
+    for (const Collider& c : colliders_)
+        if (c.shape.kind != ShapeKind::sphere || norm(c.part.position) > 0.0) ball[c.body] = 0;
+    return ball;
+}
+
 bool Detection::may_touch(int i, int j) const noexcept {
     const int a = colliders_[i].body, b = colliders_[j].body;
     if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;

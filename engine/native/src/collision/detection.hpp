@@ -52,6 +52,9 @@ public:
     /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.
     const std::vector<double>& radius() const noexcept { return radius_; }
 
+    /// Per body: whether a sphere round its centre is all its surface, so that its orientation does not matter.
+    std::vector<char> balls() const;
+
 private:
     bool may_touch(int i, int j) const noexcept;
     void add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const;

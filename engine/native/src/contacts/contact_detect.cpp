@@ -177,6 +177,7 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
             points_.pop_back();
             continue;
         }
+        point.meeting_gap = contact.point.gap;
         point.contact.point.gap = std::max(0.0, contact.point.gap + time * closing);
         met = true;
     }
@@ -230,7 +231,9 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
     }
 }
 
-/// Islands whose only strike is one pair, and in which nothing else is approached, are led to the strike's time.
+/// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
+/// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
+/// that goes with it changes the energy.
 void ContactStage::find_events() {
     root_.resize(unknown_.size());
     std::iota(root_.begin(), root_.end(), 0);
@@ -252,7 +255,11 @@ void ContactStage::find_events() {
     std::vector<char> plain(unknown_.size(), 1);
     std::vector<double> when(unknown_.size(), -1.0);
     for (std::size_t b = 0; b < unknown_.size(); ++b)
-        if (unknown_[b] >= 0) ++members[root(static_cast<int>(b))];
+        if (unknown_[b] >= 0) {
+            const int island = root(static_cast<int>(b));
+            ++members[island];
+            plain[island] = plain[island] && ball_[b];
+        }
     for (const Point& point : points_) {
         const Contact& contact = point.contact;
         const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
@@ -280,7 +287,7 @@ void ContactStage::find_events() {
         if (point.strike < 0.0) continue;
         const int body = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
         point.event = event_time_[body] >= 0.0;
-        if (point.event) point.contact.point.gap = 0.0;
+        if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
     }
 }
 
@@ -310,7 +317,7 @@ void ContactStage::measure_points() {
         point.bounce = -1.0;
         if (is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
-        } else if (speed > 0.0 && psi > 0.0 && gap + h * (point.approach + point.push) < 0.0) {
+        } else if (speed > 0.0 && psi > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
             const double left =
                 psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));

@@ -10,9 +10,8 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;        // of the larger body's radius: a depth that is rounding
-constexpr double parting_rate = 15.0;  // 1/s, at most; default damping at 1/60 s asks for 12.6
-constexpr int late_rounds = 3;         // of solves that set others in motion towards a third
+constexpr double closed = 1e-9;  // of the larger body's radius: a depth that is rounding
+constexpr int late_rounds = 3;   // of solves that set others in motion towards a third
 
 }  // namespace
 
@@ -36,6 +35,7 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     depth_.assign(bodies, 0.0);
     lead_.assign(bodies, 0.0);
     event_time_.assign(bodies, -1.0);
+    ball_ = detection_.balls();
     for (const auto& [a, b] : joints_)
         for (const int body : {a, b})
             if (body >= 0) jointed_[body] = 1;
@@ -93,6 +93,12 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
     return report;
 }
 
+/// What is left of the step after a point's event, s.
+double ContactStage::time_left(const Point& point) const noexcept {
+    const double h = options_.time_step;
+    return point.event ? std::max(h - point.strike, 1e-3 * h) : h;
+}
+
 double ContactStage::explained_depth(const Point& point) const noexcept {
     const double carried = std::max(0.0, point.before) / options_.time_step;
     return 2.0 * point.material.compliance * carried + closed * size(point.contact);
@@ -109,7 +115,9 @@ RowBlock ContactStage::resting_row(Point& point) const {
     // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
     if (point.approach < -point.rounding) point.approach = 0.0;
     const bool touching = is_closed(point.contact);
-    if (!point.event)
+    if (point.event)  // another point of a pair that meets may still be open
+        block.right[0] -= touching ? 0.0 : gap / time_left(point);
+    else
         block.right[0] += !touching ? -gap / h
                                     : -row.violation_gain * std::max(gap, -explained_depth(point)) +
                                           row.upsilon * point.approach;
@@ -247,8 +255,7 @@ void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) 
         const double ahead =
             gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
         const double excess = -gap - explained_depth(points_[k]);
-        const double rate =
-            std::min(regularise(0.0, points_[k].material.damping, h).violation_gain, parting_rate);
+        const double rate = regularise(0.0, points_[k].material.damping, h).violation_gain;
         block.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
         block.state[0] = excess > 0.0 ? RowState::free : RowState::at_lower;
         parting.rows.push_back(block);

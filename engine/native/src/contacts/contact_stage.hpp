@@ -15,7 +15,7 @@
 // finds that they meet (`collision/sweep.hpp`). Bodies in contact are swept with v, which their supports agree
 // with; flying ones with v + h M⁻¹ f.
 //
-// A strike that no other contact disturbs is an event at its own time t within the step, with the normal and the
+// A strike of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
 // arms of the meeting: impulses act there, with
 // the part t/h of the step's forces before and the rest after, and both bodies are led t v₋ + (h − t) v₊ along.
 // Other strikes act at the start of the step: the gap may close, no more; with restitution a step early, psi then
@@ -32,7 +32,7 @@
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth a contact's own compliance
 // explains, twice eps times the force it carried last, enters r; the rest is parted by positions, at the same
-// rate 4 Ups per step (per 1/60 s, where the step is shorter), through the same solver with joints held.
+// rate 4 Ups per step, through the same solver with joints held.
 // Positions that move without velocities keep the centre of mass to rounding; the angular momentum of bodies in
 // flight, r × p, changes a little while they part.
 #pragma once
@@ -152,6 +152,7 @@ private:
         Vec3 tangent;                // first tangent along world axes, unit
         double strike = -1.0;        // when it touches within the step, s; negative if the pair is closed
         bool event = false;          // acts at that time, not at the start of the step
+        double meeting_gap = 0.0;    // then, m: other points of the pair may still be open
         double approach = 0.0;       // C v, m/s, negative when closing
         double push = 0.0;           // C (free velocity − v), m/s, negative when pressed together
         double bounce = -1.0;        // psi' if the point takes part in the impact, else −1
@@ -187,6 +188,7 @@ private:
                const FrictionReport& report);
     void correct_events(const MixedSystem& system);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
+    double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
     double size(const Contact& contact) const noexcept;
     bool is_closed(const Contact& contact) const noexcept;
@@ -197,6 +199,7 @@ private:
     ContactOptions options_;
     std::vector<IndexPair> joints_;
     std::vector<char> jointed_;  // bodies with rows of joints
+    std::vector<char> ball_;     // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
 
     std::vector<Pose> poses_;
