@@ -6,6 +6,7 @@ import itertools
 from typing import Any
 
 import numpy as np
+from spook_tracker.tracker.measure.question.trajectory import channel
 
 from spook_tracker.tracker.document.run_document import (
     Curve,
@@ -22,7 +23,6 @@ from spook_tracker.tracker.document.run_document import (
     Timing,
     Trajectory,
 )
-from spook_tracker.tracker.measure.trajectory import channel
 
 KEY = "pendulum/plain/length_deviation/h=0.0166667"
 _numbers = itertools.count(1)

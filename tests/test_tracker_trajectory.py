@@ -3,13 +3,13 @@
 import msgspec
 import numpy as np
 import pytest
+from spook_tracker.tracker.measure.question.trajectory import MOST_BYTES, channel, trajectory, values_of
 
 from spook_tracker.engine import Particle, Scene, simulate
 from spook_tracker.engine.errors import SimulationFailed
 from spook_tracker.scalar_tests.case import Example
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.run_document import Trajectory
-from spook_tracker.tracker.measure.trajectory import MOST_BYTES, channel, trajectory, values_of
 
 GRAVITY = 9.81  # m/s²
 

@@ -21,6 +21,8 @@ from datetime import UTC, datetime
 from multiprocessing import get_context
 from typing import Any, Literal
 
+from spook_tracker.tracker.measure.question.trajectory import trajectory
+
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -45,7 +47,6 @@ from spook_tracker.tracker.measure.question import (
     metric_series,
     study,
 )
-from spook_tracker.tracker.measure.trajectory import trajectory
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
