@@ -6,8 +6,8 @@ import itertools
 from typing import Any
 
 import numpy as np
-from spook_tracker.tracker.measure.question.trajectory import channel
 
+import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.tracker.document.run_document import (
     Curve,
     DrawnSolid,
@@ -168,7 +168,7 @@ def trajectory(name: str = "example", **changes: Any) -> Trajectory:
         "solids": (DrawnSolid(kind="particle", position=(0.0, 0.0, 1.0)),),
         "body_of_solid": (0,),
         "channels": (
-            channel("position", "m", np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [np.nan, 0.0, 0.0]])),
+            motion.channel("position", "m", np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [np.nan, 0.0, 0.0]])),
         ),
     }
     return Trajectory(**fields | changes)

@@ -3,7 +3,11 @@
 import msgspec
 import numpy as np
 import pytest
-from spook_tracker.tracker.measure.question.trajectory import MOST_BYTES, channel, trajectory, values_of
+
+import spook_tracker.tracker.measure.trajectory as motion
+
+MOST_BYTES, channel = motion.MOST_BYTES, motion.channel
+trajectory, values_of = motion.trajectory, motion.values_of
 
 from spook_tracker.engine import Particle, Scene, simulate
 from spook_tracker.engine.errors import SimulationFailed
@@ -27,8 +31,8 @@ class Named:
         self.example = example
 
 
-def of(motion, name):
-    return values_of(next(c for c in motion.channels if c.name == name), motion.count)
+def of(moved, name):
+    return values_of(next(c for c in moved.channels if c.name == name), moved.count)
 
 
 def test_numbers_come_back_within_half_a_step_and_gaps_as_gaps():
@@ -51,25 +55,25 @@ def test_a_quantity_that_stands_still_is_exact(constant):
 
 
 def test_a_falling_ball_falls_in_the_recording():
-    motion = trajectory("fall", Named(falling(2.0)), simulate)
-    assert motion is not None
+    moved = trajectory("fall", Named(falling(2.0)), simulate)
+    assert moved is not None
 
-    n = np.round(np.arange(motion.count) * motion.step / 0.01)
+    n = np.round(np.arange(moved.count) * moved.step / 0.01)
     discrete = -GRAVITY * 0.01**2 * n * (n + 1) / 2.0  # the step's own solution, m
 
-    step = next(c.step for c in motion.channels if c.name == "position")
-    assert np.abs(of(motion, "position")[:, 2] - discrete).max() <= step
-    assert motion.exact == "a time step of h/16"
+    step = next(c.step for c in moved.channels if c.name == "position")
+    assert np.abs(of(moved, "position")[:, 2] - discrete).max() <= step
+    assert moved.exact == "a time step of h/16"
 
 
 def test_the_exact_motion_is_the_closed_form_where_a_test_has_one():
     exact = falling(2.0, exact=lambda t: {"ball": (0.0, 0.0, -0.5 * GRAVITY * t * t)})
-    motion = trajectory("fall", Named(exact), simulate)
-    assert motion is not None
+    moved = trajectory("fall", Named(exact), simulate)
+    assert moved is not None
 
-    t = np.arange(motion.count) * motion.step
-    assert motion.exact == "the exact solution"
-    assert np.abs(of(motion, "exact_position")[:, 2] + 0.5 * GRAVITY * t**2).max() < 1e-3
+    t = np.arange(moved.count) * moved.step
+    assert moved.exact == "the exact solution"
+    assert np.abs(of(moved, "exact_position")[:, 2] + 0.5 * GRAVITY * t**2).max() < 1e-3
 
 
 def test_an_engine_that_fails_or_crashes_gives_no_motion():
@@ -87,17 +91,17 @@ def test_a_motion_that_diverges_is_shown_until_it_does():
             **options,
         )
 
-    motion = trajectory("fall", Named(falling(1.0)), explodes)
+    moved = trajectory("fall", Named(falling(1.0)), explodes)
 
-    assert motion is None or "ball" in motion.failure
+    assert moved is None or "ball" in moved.failure
 
 
 @pytest.mark.parametrize("name", ["pendulum", "friction", "cantilever"])
 def test_scenes_of_the_catalogue_move_within_the_budget(name):
-    motion = trajectory(name, CATALOGUE[name], simulate)
-    assert motion is not None
+    moved = trajectory(name, CATALOGUE[name], simulate)
+    assert moved is not None
 
-    assert sum(len(c.data) for c in motion.channels) <= MOST_BYTES
-    assert len(motion.body_of_solid) == len(motion.solids)
-    assert all(c.width * motion.count == values_of(c, motion.count).size for c in motion.channels)
-    assert msgspec.json.decode(msgspec.json.encode(motion), type=Trajectory) == motion
+    assert sum(len(c.data) for c in moved.channels) <= MOST_BYTES
+    assert len(moved.body_of_solid) == len(moved.solids)
+    assert all(c.width * moved.count == values_of(c, moved.count).size for c in moved.channels)
+    assert msgspec.json.decode(msgspec.json.encode(moved), type=Trajectory) == moved

@@ -21,8 +21,7 @@ from datetime import UTC, datetime
 from multiprocessing import get_context
 from typing import Any, Literal
 
-from spook_tracker.tracker.measure.question.trajectory import trajectory
-
+import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -225,7 +224,7 @@ def perform(source: Source, task: Task) -> tuple[Any, ...]:
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], simulate),)
     if task.kind == "trajectory":
-        moved = trajectory(task.test, test, simulate)
+        moved = motion.trajectory(task.test, test, simulate)
         return () if moved is None else (moved,)
     if task.kind == "study":
         return (study(task.test, test, test.stability[first], simulate),)
