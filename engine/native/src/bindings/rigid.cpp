@@ -1,14 +1,12 @@
-// The rigid-body pipeline for Python: arrays in, a report out.
-#include "bindings/common.hpp"
-
-#include <stdexcept>
-
+// The rigid-body pipeline for Python: tables in, a report out.
+#include "bindings/columns.hpp"
 #include "rigid/rigid_program.hpp"
 
 namespace spook {
 
 namespace {
 
+<<<<<<< HEAD
 /// (kind, index or −1, point)
 using QuantityTuple = std::tuple<std::string, int, std::tuple<double, double, double>>;
 using Point = std::tuple<double, double, double>;
@@ -73,12 +71,149 @@ Collider to_collider(const std::int64_t* kind, const double* c) {
         case 1: collider.shape = Primitive::capsule(c[7], c[8]); break;
         case 2: collider.shape = Primitive::box(vec3(c + 7)); break;
         default: collider.shape = Primitive::plane(vec3(c + 7)); break;
+=======
+void read_bodies(const nb::dict& bodies, RigidScene& scene) {
+    Columns table(bodies, "bodies");
+    const std::vector<Motion> motion = table.kinds<Motion>("motion", "motion");
+    const Numbers particle = table.numbers("particle"), mass = table.numbers("mass"),
+                  inertia = table.numbers("inertia", 3), position = table.numbers("position", 3),
+                  orientation = table.numbers("orientation", 4), velocity = table.numbers("velocity", 3),
+                  angular_velocity = table.numbers("angular_velocity", 3), force = table.numbers("force", 3),
+                  torque = table.numbers("torque", 3), friction = table.numbers("friction"),
+                  restitution = table.numbers("restitution"), compliance = table.numbers("compliance"),
+                  damping = table.numbers("damping"), slip_compliance = table.numbers("slip_compliance");
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        RigidBodySpec& body = scene.bodies.emplace_back();
+        body.motion = motion[i];
+        body.particle = particle.flag(i);
+        body.mass = mass[i];
+        body.inertia = inertia.vec(i);
+        body.position = position.vec(i);
+        body.orientation = orientation.quat(i);
+        body.velocity = velocity.vec(i);
+        body.angular_velocity = angular_velocity.vec(i);
+        body.force = force.vec(i);
+        body.torque = torque.vec(i);
+        body.material = {friction[i], restitution[i], compliance[i], damping[i], slip_compliance[i]};
+>>>>>>> main
     }
-    return collider;
+    table.expect_all_read();
+}
+
+void read_joints(const nb::dict& joints, RigidScene& scene) {
+    Columns table(joints, "joints");
+    const std::vector<JointKind> kind = table.kinds<JointKind>("kind", "joint");
+    const Numbers first = table.numbers("first"), second = table.numbers("second"),
+                  first_point = table.numbers("first_point", 3),
+                  second_point = table.numbers("second_point", 3), axes = table.numbers("axes", 9),
+                  length = table.numbers("rest_length"), compliance = table.numbers("compliance", 6),
+                  damping = table.numbers("damping", 6);
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        JointSpec& joint = scene.joints.emplace_back();
+        joint.kind = kind[i];
+        joint.first = first.index(i);
+        joint.second = second.index(i);
+        joint.first_point = first_point.vec(i);
+        joint.second_point = second_point.vec(i);
+        for (std::size_t k = 0; k < 3; ++k) joint.axes[k] = axes.vec(i, k);
+        joint.rest_length = length[i];
+        std::copy_n(compliance.at(i), 6, joint.compliance.begin());
+        std::copy_n(damping.at(i), 6, joint.damping.begin());
+    }
+    table.expect_all_read();
+}
+
+void read_motors(const nb::dict& motors, RigidScene& scene) {
+    Columns table(motors, "motors");
+    const Numbers joint = table.numbers("joint"), speed = table.numbers("speed"),
+                  force = table.numbers("max_force");
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        JointSpec& spec = scene.joints.at(joint.index(i));
+        spec.has_motor = true;
+        spec.motor_speed = speed[i];
+        spec.motor_force = force[i];
+    }
+    table.expect_all_read();
+}
+
+void read_limits(const nb::dict& limits, RigidScene& scene) {
+    Columns table(limits, "limits");
+    const Numbers joint = table.numbers("joint"), lower = table.numbers("lower"),
+                  upper = table.numbers("upper"), compliance = table.numbers("compliance"),
+                  damping = table.numbers("damping");
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        JointSpec& spec = scene.joints.at(joint.index(i));
+        spec.has_limit = true;
+        spec.limit_lower = lower[i];
+        spec.limit_upper = upper[i];
+        spec.limit_compliance = compliance[i];
+        spec.limit_damping = damping[i];
+    }
+    table.expect_all_read();
+}
+
+void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
+    Columns table(springs, "joint_springs");
+    const Numbers joint = table.numbers("joint"), stiffness = table.numbers("stiffness"),
+                  rest = table.numbers("rest"), damping = table.numbers("damping");
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        JointSpec& spec = scene.joints.at(joint.index(i));
+        spec.has_spring = true;
+        spec.spring_stiffness = stiffness[i];
+        spec.spring_rest = rest[i];
+        spec.spring_damping = damping[i];
+    }
+    table.expect_all_read();
+}
+
+void read_forces(const nb::dict& springs, const nb::dict& fields, RigidScene& scene) {
+    Columns spring(springs, "springs");
+    const Numbers first = spring.numbers("first"), second = spring.numbers("second"),
+                  first_point = spring.numbers("first_point", 3),
+                  second_point = spring.numbers("second_point", 3), stiffness = spring.numbers("stiffness"),
+                  length = spring.numbers("rest_length"), viscosity = spring.numbers("viscosity");
+    for (std::size_t i = 0; i < spring.rows(); ++i)
+        scene.springs.push_back({first.index(i), second.index(i), first_point.vec(i), second_point.vec(i),
+                                 stiffness[i], length[i], viscosity[i]});
+    spring.expect_all_read();
+    Columns field(fields, "fields");
+    const Numbers strength = field.numbers("strength"), centre = field.numbers("centre", 3);
+    for (std::size_t i = 0; i < field.rows(); ++i) scene.fields.push_back({strength[i], centre.vec(i)});
+    field.expect_all_read();
+}
+
+void read_colliders(const nb::dict& colliders, RigidScene& scene) {
+    Columns table(colliders, "colliders");
+    const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
+    const Numbers body = table.numbers("body"), position = table.numbers("position", 3),
+                  orientation = table.numbers("orientation", 4), radius = table.numbers("radius"),
+                  length = table.numbers("length"), size = table.numbers("size", 3),
+                  normal = table.numbers("normal", 3);
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        Collider& collider = scene.colliders.emplace_back();
+        collider.body = body.index(i);
+        collider.part = {position.vec(i), rotation(orientation.quat(i))};
+        switch (kind[i]) {
+            case ShapeKind::sphere: collider.shape = Primitive::sphere(radius[i]); break;
+            case ShapeKind::capsule: collider.shape = Primitive::capsule(radius[i], length[i]); break;
+            case ShapeKind::box: collider.shape = Primitive::box(size.vec(i)); break;
+            case ShapeKind::plane: collider.shape = Primitive::plane(normal.vec(i)); break;
+        }
+    }
+    table.expect_all_read();
+}
+
+void read_no_contact(const nb::dict& no_contact, RigidScene& scene) {
+    Columns table(no_contact, "no_contact");
+    const Numbers first = table.numbers("first"), second = table.numbers("second");
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.no_contact.push_back({first.index(i), second.index(i)});
+    table.expect_all_read();
 }
 
 RigidMethod to_method(const nb::dict& method) {
     RigidMethod out;
+<<<<<<< HEAD
     out.time_step = nb::cast<double>(method["time_step"]);
     out.substeps = nb::cast<int>(method["substeps"]);
     out.refinements = nb::cast<int>(method["refinements"]);
@@ -104,9 +239,33 @@ void make(RigidProgram* self, IndexTable body_kinds, Table bodies, IndexTable jo
     expect_columns(springs.shape(1), 9, "springs");
     expect_columns(fields.shape(1), 4, "fields");
     expect_columns(colliders.shape(1), 10, "colliders");
+=======
+    Options options(method);
+    options.read("time_step", out.time_step);
+    options.read("substeps", out.substeps);
+    options.read("refinements", out.refinements);
+    options.read("floor", out.floor);
+    options.read_kind("solver", out.solver);
+    options.read_kind("friction", out.friction);
+    options.read("iterations", out.iterations);
+    options.read("residual_tolerance", out.residual_tolerance);
+    options.read("force_collision", out.force_collision);
+    options.read("force_rotation", out.force_rotation);
+    options.expect_all_read();
+    return out;
+}
+
+void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, const nb::dict& motors,
+          const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& springs,
+          const nb::dict& fields, const nb::dict& colliders, const nb::dict& no_contact, bool contacts,
+          const Point& gravity, const nb::dict& method, const std::vector<QuantityRequest>& quantities,
+          const std::vector<Observation>& observations) {
+>>>>>>> main
     RigidScene scene;
     scene.gravity = to_vec(gravity);
+    scene.contacts = contacts;
     scene.method = to_method(method);
+<<<<<<< HEAD
     for (std::size_t i = 0; i < bodies.shape(0); ++i)
         scene.bodies.push_back(to_body(body_kinds.data() + 2 * i, bodies.data() + 28 * i));
     for (std::size_t i = 0; i < joints.shape(0); ++i)
@@ -136,11 +295,23 @@ nb::dict run(RigidProgram& program, std::int64_t steps, double time_limit, bool 
         report = program.run(steps, time_limit, timed);
     }
     return to_dict(report);
+=======
+    read_bodies(bodies, scene);
+    read_joints(joints, scene);
+    read_motors(motors, scene);
+    read_limits(limits, scene);
+    read_joint_springs(joint_springs, scene);
+    read_forces(springs, fields, scene);
+    read_colliders(colliders, scene);
+    read_no_contact(no_contact, scene);
+    new (self) RigidProgram(scene, quantities, observations);
+>>>>>>> main
 }
 
 }  // namespace
 
 void bind_rigid(nb::module_& m) {
+<<<<<<< HEAD
     nb::class_<RigidProgram>(m, "RigidProgram", "A compiled scene with rigid bodies.")
         .def(
             "__init__", &make, nb::arg("body_kinds"), nb::arg("bodies"), nb::arg("joint_kinds"),
@@ -159,6 +330,16 @@ void bind_rigid(nb::module_& m) {
             "Run from the start, the GIL released; a dict with status, recordings, counters, final_state, ...")
         .def_prop_ro("solver", &RigidProgram::solver, "none, block, pivot or iterative")
         .def_prop_ro("contacts_possible", &RigidProgram::contacts_possible);
+=======
+    bind_program<RigidSystem>(
+        m, "RigidProgram", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"), nb::arg("joints"),
+        nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"), nb::arg("springs"), nb::arg("fields"),
+        nb::arg("colliders"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
+        nb::arg("method"), nb::arg("quantities"), nb::arg("observations"),
+        "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
+        "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits and\n"
+        "joint_springs name the joint they drive.");
+>>>>>>> main
 }
 
 }  // namespace spook

@@ -24,8 +24,9 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
 
 /// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds.
 double bounded_residual(const RowBlock& block, int i, double own, const std::vector<Vec6>& velocity) {
-    const double w = row_residual(block, i, velocity), z = block.multiplier[i];
-    return own * std::abs(z - std::clamp(z - w / own, block.lower[i], block.upper[i]));
+    const double w = row_residual(block, i, velocity),
+                 z = block.multiplier[i];  // z − w/own would round w away
+    return w > 0.0 ? std::min(w, own * (z - block.lower[i])) : std::min(-w, own * (block.upper[i] - z));
 }
 
 }  // namespace
@@ -49,15 +50,19 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
                 std::max(0.0, model == FrictionModel::box ? point->normal : block.multiplier[0]);
             const double bound = point->coefficient * nu;
             const double b1 = block.multiplier[1], b2 = block.multiplier[2];
-            double d1 = b1 - slip(block, *point, 1, system.velocity) / own,
-                   d2 = b2 - slip(block, *point, 2, system.velocity) / own;
+            const double s1 = slip(block, *point, 1, system.velocity),
+                         s2 = slip(block, *point, 2, system.velocity);
+            double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
+            bool sticks = true;
             if (model == FrictionModel::cone) {
                 const double reach = length(d1, d2);
-                if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
+                sticks = reach <= bound;
+                if (!sticks) d1 *= bound / reach, d2 *= bound / reach;
             } else {
+                sticks = std::abs(d1) <= bound && std::abs(d2) <= bound;
                 d1 = std::clamp(d1, -bound, bound), d2 = std::clamp(d2, -bound, bound);
             }
-            residual = std::max(residual, own * length(b1 - d1, b2 - d2));
+            residual = std::max(residual, sticks ? length(s1, s2) : own * length(b1 - d1, b2 - d2));
         }
         if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
     }

@@ -45,10 +45,11 @@
 #include "contacts/contact_material.hpp"
 #include "contacts/friction_direct.hpp"
 #include "contacts/friction_sweeps.hpp"
+#include "run/named_enum.hpp"
 
 namespace spook {
 
-enum class SolverKind : unsigned char { direct, iterative, hybrid };
+SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
 
 /// What bodies that touch but do not approach each other do while a blow passes. simultaneous: they take part in
 /// it. successive: only points that are approached take part, again and again until none is: a blow runs through a

@@ -41,7 +41,6 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             if (spec.has_motor) {
                 axial.speed = spec.motor_speed;
                 axial.impulse = time_step * spec.motor_force;
-                block.bounded = std::isfinite(axial.impulse);
                 block.softness[block.size++] = 0.0;
             }
             if (spec.has_limit) {
@@ -49,7 +48,6 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
                 axial.upper = spec.limit_upper;
                 axial.restitution = spec.limit_restitution;
                 axial.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
-                block.bounded = block.bounded || axial.lower < axial.upper;
                 block.softness[block.size++] = axial.limit.softness;
             }
             if (spec.has_spring) {

@@ -6,11 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "run/named_enum.hpp"
+
 namespace spook {
 
 /// |x| [m] or |v| [m/s] beyond this is a runaway: the run ends as diverged.
 inline constexpr double RUNAWAY = 1e100;
 
+<<<<<<< HEAD
 /// unsettled: all steps done, but some solve left more than its method allows; the values are kept.
 enum class Status { completed, diverged, not_finite, timed_out, unsettled };
 
@@ -23,6 +26,9 @@ constexpr const char* to_text(Status status) noexcept {
         default: return "unsettled";
     }
 }
+=======
+SPOOK_NAMED_ENUM(Status, completed, diverged, not_finite, timed_out)
+>>>>>>> main
 
 /// One observable: `samples` rows of `width` values (one row for a reduction).
 struct Recording {
