@@ -144,7 +144,7 @@ class Program:
         failed_body = self._bodies[body] if body >= 0 else None
         return Result(
             status=status,
-            failure=_failure(status, failed_body, step, time_limit, report["reason"]),
+            failure=_failure(status, failed_body, step, time_limit, report["reason"], report["residual"]),
             failed_body=failed_body,
             failed_step=step if step >= 0 else None,
             time_step=self.time_step,
@@ -161,9 +161,14 @@ class Program:
         )
 
 
-def _failure(status: str, body: str | None, step: int, time_limit: float | None, reason: str) -> str:
+def _failure(
+    status: str, body: str | None, step: int, time_limit: float | None, reason: str, residual: float
+) -> str:
     if status == "unsettled":
-        return f"unsettled since step {step}: rows of body {body!r} {reason}"
+        return (
+            f"unsettled since step {step}: rows of body {body!r} are off by up to {residual:.3g} m/s; "
+            "use more iterations, smaller time steps or the direct solver"
+        )
     if reason:
         return f"in step {step} body {body!r} {reason}"
     if status == "diverged":

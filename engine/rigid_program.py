@@ -110,18 +110,6 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
         if min(joint["first"], joint["second"]) >= 0
     ]
     return {
-<<<<<<< HEAD
-        "body_kinds": indices(body_kinds, 2),
-        "bodies": table(body_rows, 28),
-        "joint_kinds": indices(joint_kinds, 6),
-        "joints": table(joint_rows, 38),
-        "spring_ends": indices(spring_ends, 2),
-        "springs": table(springs, 9),
-        "fields": table(fields, 4),
-        "collider_kinds": indices(collider_kinds, 2),
-        "colliders": table(colliders, 10),
-        "no_contact": indices(apart, 2),
-=======
         "bodies": table([_body(body, push, step) for body, push in zip(scene.bodies, pushes, strict=True)]),
         "joints": table(joints),
         **_drives(scene, step),
@@ -130,22 +118,16 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
         "colliders": table(_colliders(scene)),
         "no_contact": table(apart),
         "contacts": scene.contacts,
->>>>>>> main
         "gravity": scene.gravity,
         "method": {
             "time_step": time_step,
             "substeps": method.substeps,
             "refinements": method.refinements,
             "floor": method.floor,
-<<<<<<< HEAD
-            "solver": _SOLVERS[method.solver],
-            "friction": _FRICTION[method.friction],
-            "impacts": int(method.impacts == "successive"),
-            "unsettled_residual": method.unsettled_residual,
-=======
             "solver": method.solver,
             "friction": method.friction,
->>>>>>> main
+            "impacts": method.impacts,
+            "unsettled_residual": method.unsettled_residual,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "force_collision": "collision" in method.force_stages,
@@ -217,42 +199,16 @@ def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step
     }
     if isinstance(constraint, Distance):
         length = constraint.rest_length
-<<<<<<< HEAD
-        if length is None:
-            length = scene.length(constraint)
-        points = (*scene.anchor(constraint, 0), *scene.anchor(constraint, 1))
-        kinds: tuple[int, ...] = (0, first, second, 0, 0, 0)
-        softness = (*_six(constraint.compliance), *_six(_or(constraint.damping, default)))
-        return kinds, (*points, *_WORLD_AXES, length, *softness, *[0.0] * 10)
-=======
         return columns | {
             "first_point": scene.anchor(constraint, 0),
             "second_point": scene.anchor(constraint, 1),
             "axes": _WORLD_AXES,
             "rest_length": scene.length(constraint) if length is None else length,
         }
->>>>>>> main
     at = constraint.at
     if at is None:
         end = constraint.between[1] if columns["second"] >= 0 else constraint.between[0]
         at = scene.body(end).position
-<<<<<<< HEAD
-    damping = default if constraint.damping is None else constraint.damping
-    motor, limit, spring = (
-        (constraint.motor, constraint.limit, constraint.spring)
-        if isinstance(constraint, AxialJoint)
-        else (None, None, None)
-    )
-    numbers = [*at, *at, *_axes(constraint), 0.0, *_six(constraint.compliance), *_six(damping)]
-    numbers += [motor.speed, _or(motor.max_force, math.inf)] if motor else [0.0, 0.0]
-    numbers += (
-        [limit.lower, limit.upper, limit.compliance, _or(limit.damping, default)] if limit else [0.0] * 4
-    )
-    numbers += [spring.stiffness, spring.rest, _or(spring.damping, default)] if spring else [1.0, 0.0, 0.0]
-    numbers.append(limit.restitution if limit else 0.0)
-    free = (int(motor is not None), int(limit is not None), int(spring is not None))
-    return (_JOINTS[type(constraint)], first, second, *free), tuple(numbers)
-=======
     return columns | {"first_point": at, "second_point": at, "axes": _axes(constraint), "rest_length": 0.0}
 
 
@@ -273,6 +229,7 @@ def _drives(scene: Scene, step: float) -> dict[str, Any]:
                     "upper": limit.upper,
                     "compliance": limit.compliance,
                     "damping": _or(limit.damping, 2.0 * step),
+                    "restitution": limit.restitution,
                 }
             )
         if (spring := joint.spring) is not None:
@@ -285,7 +242,6 @@ def _drives(scene: Scene, step: float) -> dict[str, Any]:
                 }
             )
     return {"motors": table(motors), "limits": table(limits), "joint_springs": table(springs)}
->>>>>>> main
 
 
 def _or(value: float | None, default: float) -> float:

@@ -82,15 +82,10 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
                 case SolverKind::iterative:
                     return solve_iterative(island, own, model, o.iterations, o.residual_tolerance);
                 case SolverKind::hybrid:
-<<<<<<< HEAD
                     return solve_hybrid(island, own, model, solver, o.iterations, o.residual_tolerance);
-                default: return solve_friction_direct(island, own, model, solver);
-=======
-                    return solve_hybrid(island, own, o.friction, solver, o.iterations, o.residual_tolerance);
                 case SolverKind::direct: break;
->>>>>>> main
             }
-            return solve_friction_direct(island, own, o.friction, solver);
+            return solve_friction_direct(island, own, model, solver);
         });
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;

@@ -54,7 +54,7 @@ SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
 /// What bodies that touch but do not approach each other do while a blow passes. simultaneous: they take part in
 /// it. successive: only points that are approached take part, again and again until none is: a blow runs through a
 /// row of touching balls, and the last one leaves.
-enum class ImpactOrder : unsigned char { simultaneous, successive };
+SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
 
 struct ContactOptions {
     double time_step = 0.0;

@@ -62,16 +62,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if (touching) {
         std::vector<char> dynamic;
         std::vector<SurfaceMaterial> materials;
-<<<<<<< HEAD
         std::vector<IndexPair> joint_pairs;
         for (const JointBlock& block : joints_.blocks()) joint_pairs.push_back({block.first, block.second});
-        for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
-        fresh_contacts_.emplace(std::move(detection), materials, slot_,
-                                ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
-                                               method_.residual_tolerance, method_.floor, method_.refinements,
-                                               method_.impacts, method_.unsettled_residual},
-                                joint_pairs);
-=======
         for (const RigidBodySpec& spec : scene.bodies) {
             dynamic.push_back(spec.motion == Motion::dynamic);
             materials.push_back(spec.material);
@@ -83,8 +75,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         fresh_contacts_.emplace(
             Detection(scene.colliders, dynamic, scene.no_contact), materials, slot_,
             ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
-                           method_.floor, method_.refinements});
->>>>>>> main
+                           method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
+            joint_pairs);
     }
     if (solver_ == RigidSolver::block) analyse_block();
     reset(nullptr);
@@ -254,6 +246,14 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     report.counters["force_evaluations"] = substeps * (static_cast<std::int64_t>(springs_.size()) +
                                                        static_cast<std::int64_t>(fields_.size()) * moving);
     report.residual = residual_;
+    if (const Unsettled& left = live_.unsettled; left.body >= 0) {
+        report.residual = std::max(report.residual, left.residual);
+        if (report.status == Status::completed) {
+            report.status = Status::unsettled;
+            report.failed_body = left.body;
+            report.failed_step = (left.step + method_.substeps - 1) / method_.substeps;
+        }
+    }
     if (!contacts_) return;
     const ContactCounters contact = contacts_->counters();
     put("contacts", contact.contacts);

@@ -13,22 +13,8 @@ namespace spook {
 /// |x| [m] or |v| [m/s] beyond this is a runaway: the run ends as diverged.
 inline constexpr double RUNAWAY = 1e100;
 
-<<<<<<< HEAD
 /// unsettled: all steps done, but some solve left more than its method allows; the values are kept.
-enum class Status { completed, diverged, not_finite, timed_out, unsettled };
-
-constexpr const char* to_text(Status status) noexcept {
-    switch (status) {
-        case Status::completed: return "completed";
-        case Status::diverged: return "diverged";
-        case Status::not_finite: return "not_finite";
-        case Status::timed_out: return "timed_out";
-        default: return "unsettled";
-    }
-}
-=======
-SPOOK_NAMED_ENUM(Status, completed, diverged, not_finite, timed_out)
->>>>>>> main
+SPOOK_NAMED_ENUM(Status, completed, diverged, not_finite, timed_out, unsettled)
 
 /// One observable: `samples` rows of `width` values (one row for a reduction).
 struct Recording {
