@@ -80,22 +80,33 @@ def run_command(
     junit_file: Path | None,
     workers: int,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
-    """Run scalar tests (all, or those named), print the pass table and record one run."""
+    """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
     request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
-    document = _measure(request, engine, catalogue, None if no_record else database)
-    _print_run(document, everything)
-    if json_file:
-        _write(json_file, _json(document))
-    if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_run
+    names = engine.split(",")
+    red = False
+    for name in names:
+        document = _measure(request, name, limit, catalogue, None if no_record else database)
+        _print_run(document, everything)
+        if json_file:
+            _write(_of_engine(json_file, name, names), _json(document))
+        if junit_file:
+            from spook_tracker.tracker.cli.report_junit import junit_of_run
 
-        _write(junit_file, junit_of_run(document))
-    _exit_red_if(document)
+            _write(_of_engine(junit_file, name, names), junit_of_run(document))
+        red = red or _red(document)
+    if red:
+        click.get_current_context().exit(RED)
+
+
+def _of_engine(file: Path, name: str, names: list[str]) -> Path:
+    """One file each where several engines were asked: run.json, run-mujoco.json."""
+    return file if name == names[0] else file.with_stem(f"{file.stem}-{name.replace(':', '-')}")
 
 
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
@@ -117,6 +128,7 @@ def nightly(
     json_file: Path | None,
     junit_file: Path | None,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
@@ -124,7 +136,10 @@ def nightly(
     from spook_tracker.tracker.measure.run import Request
 
     request = Request(figures=True, sweep=not quick, stability=not quick, workers=workers, trigger="nightly")
-    document = _measure(request, engine, catalogue, database)
+    ours, *others = engine.split(",")
+    for other in others:
+        _measure(request, other, limit, catalogue, database)
+    document = _measure(request, ours, limit, catalogue, database)
     _print_run(document, everything=False)
     if json_file:
         _write(json_file, _json(document))
@@ -133,9 +148,17 @@ def nightly(
 
         _write(junit_file, junit_of_run(document))
     regressed = _judge_and_publish(database, document.id, out)
-    if regressed:
+    if regressed or _red(document):
         click.get_current_context().exit(RED)
-    _exit_red_if(document)
+
+
+@main.command(epilog=example("tracker engines"))
+def engines() -> None:
+    """The engines that can be asked, in which configurations, and what is missing for the others."""
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.report_engines import engine_lines
+
+    say("\n".join(engine_lines()))
 
 
 @main.command(epilog=example("tracker publish --out public"))
@@ -185,12 +208,12 @@ for command in (compare, trend, list_tests, show, explain, export, import_files,
     main.add_command(command)
 
 
-def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
+def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
     from spook_tracker.tracker.measure.run import Source, run
 
-    source = Source(catalogue=catalogue, engine=engine)
+    source = Source(catalogue=catalogue, engine=engine.strip(), limit=limit)
     if database is None:
         with watching("measuring") as step:
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
@@ -211,11 +234,10 @@ def _print_run(document: Any, everything: bool) -> None:
     say(pass_table(document, everything))
 
 
-def _exit_red_if(document: Any) -> None:
+def _red(document: Any) -> bool:
     from spook_tracker.tracker.cli.report_table import red
 
-    if red(document):
-        click.get_current_context().exit(RED)
+    return bool(red(document))
 
 
 def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:

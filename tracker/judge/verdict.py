@@ -48,6 +48,7 @@ RANK: dict[OutcomeClass, int] = {
     "crashed": 3,
     "timed_out": 3,
     "missing": 4,
+    "not_supported": 0,  # outside the order: never compared
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
@@ -86,6 +87,8 @@ def judge(
         return _incomparable("the definition of the test changed")
     if not same_environment:
         return _incomparable("measured in another float environment")
+    if "not_supported" in (before.outcome, after.outcome):
+        return _unasked(before, after)
     before, after = _honest(before), _honest(after)
     old, new = from_number(before.value), from_number(after.value)
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
@@ -120,6 +123,15 @@ def _honest(sample: Sample) -> Sample:
 
 def _incomparable(why: str) -> Verdict:
     return Verdict(word="not_comparable", sentence=why)
+
+
+def _unasked(before: Sample, after: Sample) -> Verdict:
+    """An engine that cannot be asked is neither better nor worse."""
+    if before.outcome == after.outcome:
+        return Verdict(word="same", sentence="still not supported")
+    if after.outcome == "not_supported":
+        return _incomparable(f"no longer supported: {after.failure}")
+    return _incomparable("supported for the first time")
 
 
 def _unrepeatable(decades: float | None, ulps: int | None) -> Verdict:
