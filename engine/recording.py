@@ -82,9 +82,8 @@ def observed(
     for name, what in observe.items():
         if what.quantity not in values:
             values[what.quantity] = quantity(scene, recording, what.quantity)
-        series: Array = values[what.quantity]
-        if what.from_start:
-            series = np.subtract(series, series[0])
+        whole = values[what.quantity]
+        series: Array = np.subtract(whole, whole[0]) if what.from_start else whole
         last = recording.samples[-1] if what.last is None else what.last
         kept = np.flatnonzero((recording.samples >= what.first) & (recording.samples <= last))
         if isinstance(what, Trace):

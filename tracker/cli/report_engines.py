@@ -19,7 +19,9 @@ def engine_lines() -> list[str]:
             lines.append(f"{name}: {error}")
             continue
         configurations = getattr(engine, "configurations", ())
-        lines.append(f"{name} {version}" + ("" if configurations else ": ours; each test names its configurations"))
+        lines.append(
+            f"{name} {version}" + ("" if configurations else ": ours; each test names its configurations")
+        )
         for one in configurations:
             order = "" if one.expected_order is None else f" (order {one.expected_order:g})"
             text = f"{one.name}{order}: {one.reason}"
