@@ -88,7 +88,7 @@ def observed(
         kept = np.flatnonzero((recording.samples >= what.first) & (recording.samples <= last))
         if isinstance(what, Trace):
             kept = kept[:: what.every]
-            times[name] = recording.samples[kept] * time_step
+            times[name] = np.asarray(recording.samples[kept] * time_step, dtype=np.float64)
         found[name] = _reduced(what, series[kept])
     return found, times
 

@@ -117,8 +117,9 @@ def test_joint_coordinates_move_as_our_engine_does(kind: str) -> None:
     theirs = simulate(scene, "rk4", time_step=1e-3, duration=0.5, observe=observe)
     mine = ours(scene, time_step=1e-3, duration=0.5, observe=observe)
 
-    assert theirs["path"][-1] == pytest.approx(mine["path"][-1], abs=1e-2)
-    assert np.abs(theirs["path"][-1] - theirs["path"][0]).max() > 0.02 or kind == "lock"
+    moved = float(np.abs(mine["path"][-1] - mine["path"][0]).max())
+    assert theirs["path"][-1] == pytest.approx(mine["path"][-1], abs=0.01 * moved + 1e-12)
+    assert moved > 5e-4 or kind == "lock"
 
 
 def _fields(joint: Any) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from spook_tracker.tracker.cli.options import (
     OneLineErrors,
     database_option,
     example,
+    limit_option,
     source_options,
     workers_option,
 )
@@ -67,6 +68,7 @@ def _print_versions() -> None:
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
 @workers_option
+@limit_option
 @source_options
 @database_option
 def run_command(
@@ -113,6 +115,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
 @workers_option
+@limit_option
 @click.option(
     "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
 )

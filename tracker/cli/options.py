@@ -42,12 +42,6 @@ def source_options(command: Command) -> Command:
             help="spook, mujoco, … (see: tracker engines) or module:NAME; also TRACKER_ENGINE.",
         ),
         click.option(
-            "--limit",
-            metavar="SECONDS",
-            type=click.FloatRange(min=0.0, min_open=True),
-            help="Wall time one simulation may take; by default 10 s for engines that do not gate.",
-        ),
-        click.option(
             "--catalogue",
             metavar="MODULE:NAME",
             envvar="TRACKER_CATALOGUE",
@@ -57,6 +51,16 @@ def source_options(command: Command) -> Command:
     ):
         command = option(command)
     return command
+
+
+def limit_option(command: Command) -> Command:
+    """--limit SECONDS, so that a slow engine does not hold up a night."""
+    return click.option(
+        "--limit",
+        metavar="SECONDS",
+        type=click.FloatRange(min=0.0, min_open=True),
+        help="Wall time one simulation may take; by default 10 s for another engine.",
+    )(command)
 
 
 def workers_option(command: Command) -> Command:

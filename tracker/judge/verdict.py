@@ -48,7 +48,6 @@ RANK: dict[OutcomeClass, int] = {
     "crashed": 3,
     "timed_out": 3,
     "missing": 4,
-    "not_supported": 0,  # outside the order: never compared
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
