@@ -158,8 +158,9 @@ def nightly(
 @main.command(epilog=example("tracker engines"))
 def engines() -> None:
     """The engines that can be asked, in which configurations, and what is missing for the others."""
+    from spook_tracker.tracker.cli.main.report_engines import engine_lines
+
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_engines import engine_lines
 
     say("\n".join(engine_lines()))
 

@@ -22,6 +22,8 @@ from functools import partial
 from multiprocessing import get_context
 from typing import Any, Literal
 
+from spook_tracker.tracker.measure.question.others import asked_of
+
 import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
@@ -38,7 +40,6 @@ from spook_tracker.tracker.document.run_document import (
 from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.cards import engine_version, test_card
 from spook_tracker.tracker.measure.machine import machine
-from spook_tracker.tracker.measure.others import asked_of
 from spook_tracker.tracker.measure.question import (
     Measured,
     Outcome,
