@@ -22,7 +22,7 @@ from spook_tracker.scalar_tests.hanging_chain import scene as hanging
 from spook_tracker.scalar_tests.oscillator import damped
 from spook_tracker.scalar_tests.oscillator import scene as oscillator
 from spook_tracker.scalar_tests.pendulum import scene as pendulum
-from spook_tracker.scalar_tests.planetarium.question import OUR_SET_POINT
+from spook_tracker.scalar_tests.planetarium.metrics import OUR_SET_POINT
 from spook_tracker.scalar_tests.planetarium.scene import (
     DURATION,
     GAUSS,
