@@ -142,6 +142,11 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "friction": _FRICTION[method.friction],
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
+            "composition": {"none": 2, "order4": 4, "order6": 6, "order8": 8}[method.composition],
+            "half_step_velocities": method.half_step_velocities,
+            "corrections": method.corrections,
+            "correction_cap": method.correction_cap,
+            "string_stiffness": method.string_stiffness,
             "force_collision": "collision" in method.force_stages,
         },
     }
@@ -151,10 +156,7 @@ def lacking(method: Method) -> str | None:
     """The first option that scenes with rigid bodies do not have and that is not at its default; None if all is
     well."""
     for field, plain in (
-        ("corrections", 0),
-        ("half_step_velocities", False),
         ("string_stiffness", False),
-        ("composition", "none"),
     ):
         if getattr(method, field) != plain:
             return field

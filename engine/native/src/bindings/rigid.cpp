@@ -86,6 +86,11 @@ RigidMethod to_method(const nb::dict& method) {
     out.friction = static_cast<FrictionModel>(nb::cast<int>(method["friction"]));
     out.iterations = nb::cast<int>(method["iterations"]);
     out.residual_tolerance = nb::cast<double>(method["residual_tolerance"]);
+    out.composition = nb::cast<int>(method["composition"]);
+    out.half_step_velocities = nb::cast<bool>(method["half_step_velocities"]);
+    out.corrections = nb::cast<int>(method["corrections"]);
+    out.correction_cap = nb::cast<double>(method["correction_cap"]);
+    out.string_stiffness = nb::cast<bool>(method["string_stiffness"]);
     out.force_collision = nb::cast<bool>(method["force_collision"]);
     return out;
 }

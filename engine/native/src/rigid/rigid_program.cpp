@@ -57,6 +57,9 @@ Sampler momentum_sampler(const RigidSystem* s, bool angular, Vec3 about) {
 Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
     const RigidSystem* s = &system;
     const std::string& kind = request.kind;
+    if (kind != "position" && kind != "orientation" && kind != "violation" && kind != "joint_coordinate" &&
+        kind != "potential_energy")
+        system.see_velocities();
     const int index = request.index, count = system.bodies();
     if (kind == "position")
         return one_or_all(index, count, 3, [s](int i, double* out) { put(out, s->position_of(i)); });
