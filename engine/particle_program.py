@@ -39,6 +39,7 @@ from spook_tracker.engine.program import (
     observes_each_step,
 )
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.smooth import check_smooth
 
 _ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}
 _SCALARS: dict[type[Quantity], str] = {
@@ -57,7 +58,6 @@ _OF_BODIES: dict[type[Quantity], tuple[str, int]] = {
 _OF_ROWS: dict[type[Quantity], str] = {Violation: "violation", ConstraintForce: "constraint_force"}
 _QuantityTuple = tuple[str, int, tuple[float, float, float]]
 _ORIGIN = (0.0, 0.0, 0.0)
-_RIGID = 1e-7  # m/N, the softest row a composition takes for rigid
 
 
 def compile_particles(
@@ -67,7 +67,7 @@ def compile_particles(
     if method.string_stiffness and method.solver == "iterative":
         raise MethodError("method: string_stiffness needs the direct solver")
     if method.composition != "none":
-        _check_smooth(scene, method)
+        check_smooth(scene, method)
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     rows = {row.name: index for index, row in enumerate(scene.constraints)}
     requests, shapes = [], {}
@@ -87,32 +87,6 @@ def compile_particles(
         observe=observe,
         shapes=[shapes[what.quantity] for what in observe.values()],
     )
-
-
-def _check_smooth(scene: Scene, method: Method) -> None:
-    """Compositions go back and forth in time and hold rows rigidly: refuse what that cannot do."""
-    if method.solver == "iterative" or method.string_stiffness:
-        raise MethodError("method: a composition needs the direct solver, without string stiffness")
-    for force in scene.forces:
-        if isinstance(force, Spring) and force.viscosity > 0.0:
-            raise MethodError(
-                f"method: a composition goes back in time, where the viscosity of spring {force.name!r} explodes"
-            )
-    positions = {body.name: body.position for body in scene.bodies}
-    for row in scene.constraints:
-        assert isinstance(row, Distance)
-        if row.compliance > _RIGID:
-            raise MethodError(
-                f"method: a composition holds rows rigidly, but {row.name!r} has a compliance of "
-                f"{row.compliance:g} m/N; make it {_RIGID:g} at most, or a Spring"
-            )
-        first, second = (positions[end] if isinstance(end, str) else end for end in row.between)
-        length = math.dist(first, second)
-        if row.rest_length is not None and abs(length - row.rest_length) > 1e-9 * row.rest_length:
-            raise MethodError(
-                f"method: a composition holds rows rigidly, but {row.name!r} starts {length:g} m long instead of "
-                f"its rest length of {row.rest_length:g} m"
-            )
 
 
 def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, int]) -> dict[str, Any]:

@@ -40,6 +40,7 @@ from spook_tracker.engine.rigid_quantities import request
 from spook_tracker.engine.rigid_stages import choose
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.engine.smooth import check_rigid
 
 _MOTIONS = {"dynamic": 0, "static": 1, "kinematic": 2}
 _JOINTS: dict[type[Constraint], int] = {Distance: 0, Lock: 1, Ball: 2, Hinge: 3, Prismatic: 4, Universal: 5}
@@ -64,6 +65,7 @@ def compile_rigid(
     native = _core.RigidProgram(
         **pack(scene, time_step, method), quantities=requests, observations=observation_tuples(observe)
     )
+    check_rigid(scene, method, native.contacts_possible)
     return Program(
         native,
         time_step=time_step,
@@ -155,9 +157,7 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
 def lacking(method: Method) -> str | None:
     """The first option that scenes with rigid bodies do not have and that is not at its default; None if all is
     well."""
-    for field, plain in (
-        ("string_stiffness", False),
-    ):
+    for field, plain in (("string_stiffness", False),):
         if getattr(method, field) != plain:
             return field
     return None

@@ -99,8 +99,23 @@ def _choices(
         else no_rows,
     )
     yield choice("friction", friction, f"surfaces rub: {method.friction} model", smooth)
-    yield StageChoice("correct_curvature", False, particles_only)
-    yield StageChoice("half_step", False, "velocities live at whole steps")
+    composed = method.composition != "none"
+    yield choice(
+        "correct_curvature",
+        (method.corrections > 0 or composed) and joints,
+        "iteration keeps the curvature of the rows to rounding"
+        if composed
+        else f"{method.corrections} extra back-substitutions keep the curvature of the rows",
+        "the method linearises the rows" if joints else "no joints, so nothing is curved",
+    )
+    yield choice(
+        "half_step",
+        method.half_step_velocities or composed,
+        f"a symmetric composition of half-step steps, {method.composition}"
+        if composed
+        else "velocities live at mid-step: half-kick start, mid-step read-out",
+        "velocities live at whole steps",
+    )
     yield choice("integrate_positions", moving, "bodies can move", "nothing can move")
     yield choice(
         "integrate_rotations",

@@ -146,8 +146,10 @@ class Scene:
             return body.position
         return _placed(body, anchor)
 
-    def length(self, constraint: Distance) -> float:
-        """Distance [m] at the start between the two ends."""
+    def length(self, constraint: Distance, known: Mapping[str, Body] | None = None) -> float:
+        """Distance [m] at the start between the two ends; `known`, bodies by name, saves looking them up."""
+        if known is not None:
+            return self._length(constraint, known)
         return math.dist(self.anchor(constraint, 0), self.anchor(constraint, 1))
 
     def _length(self, constraint: Distance, known: Mapping[str, Body]) -> float:

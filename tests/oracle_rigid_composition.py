@@ -34,7 +34,9 @@ class ComposedOracle(RigidOracle):
             self._stage(gamma * self.h)
 
     def _violation(self) -> Array:
-        return np.concatenate([joint.violation(self.x, self.q, self) for joint in self.joints] or [np.zeros(0)])
+        return np.concatenate(
+            [joint.violation(self.x, self.q, self) for joint in self.joints] or [np.zeros(0)]
+        )
 
     def _jacobian(self) -> Array:
         rows = [self.jacobian(joint.violation) for joint in self.joints]
