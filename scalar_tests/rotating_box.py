@@ -294,7 +294,7 @@ TEST = ScalarTest(
             ),
             error=turn_error,
             run=turn_run,
-            target_error=1e-9,
+            target_error=1e-3,
             target_seconds=0.01,
         ),
     ),
