@@ -10,6 +10,7 @@ from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
 
+ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}  # of a composition, by name
 RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
 
 

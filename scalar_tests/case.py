@@ -198,10 +198,8 @@ class StabilityStudy:
     study: Callable[[Simulate], BreakPoint | StabilityMap]
     unit: str = ""
     better: Literal["larger", "smaller"] = "larger"
-    expected: tuple[float, float] | None = (
-        None  # band for a break point, with its source in `expected_source`
-    )
-    expected_source: str = ""
+    expected: tuple[float, float] | None = None  # band for a break point
+    expected_source: str = ""  # where the band comes from; or, without one, why theory has none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,17 +17,11 @@ ACCEPTED = "accepted.toml"
 @contextmanager
 def history_of(database: str) -> Iterator[Any]:
     """The history in a database, for reading."""
-    from sqlalchemy.orm import Session
-
-    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
 
-    opened = open_database(database, readonly=True)
-    try:
-        with Session(opened) as session:
-            yield History(session)
-    finally:
-        opened.dispose()
+    with session_on(database, readonly=True) as session:
+        yield History(session)
 
 
 def accepted_levels(file: Path | None = None) -> Any:

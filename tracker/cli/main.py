@@ -194,19 +194,13 @@ def _measure(request: Any, engine: str, catalogue: str, database: str | None) ->
     if database is None:
         with watching("measuring") as step:
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
-    from sqlalchemy.orm import Session
-
-    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record
 
-    opened = open_database(database)
-    try:
+    with session_on(database) as session:
         with watching("measuring") as step:
             document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
-        with Session(opened) as session:
-            record(session, document)
-    finally:
-        opened.dispose()
+        record(session, document)
     return document
 
 
@@ -242,18 +236,12 @@ def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
 
 def _retain(database: str) -> None:
     """Drop figures and maps that the retention rule no longer keeps, once they have been compared."""
-    from sqlalchemy.orm import Session
-
-    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
     from spook_tracker.tracker.store.retention import drop_old_figures
 
-    opened = open_database(database)
-    try:
-        with Session(opened) as session:
-            drop_old_figures(session, History(session))
-    finally:
-        opened.dispose()
+    with session_on(database) as session:
+        drop_old_figures(session, History(session))
 
 
 def _publish(history: Any, out: Path) -> None:

@@ -38,7 +38,7 @@ def source_options(command: Command) -> Command:
             "--engine",
             metavar="MODULE",
             envvar="TRACKER_ENGINE",
-            default="engine",
+            default="spook_tracker.engine",
             help="Another engine behind the same simulate(); also TRACKER_ENGINE.",
         ),
         click.option(

@@ -33,17 +33,11 @@ def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
 @database_option
 def import_files(files: tuple[Path, ...], database: str) -> None:
     """Record runs from JSON documents; what is there already is left as it is."""
-    from sqlalchemy.orm import Session
-
-    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
-    opened = open_database(database)
-    try:
-        with Session(opened) as session:
-            done = read_in(session, files)
-    finally:
-        opened.dispose()
+    with session_on(database) as session:
+        done = read_in(session, files)
     click.echo(f"{len(done.stored)} runs recorded, {len(done.present)} were there already")
 
 

@@ -59,7 +59,7 @@ class Source:
     """Where the questions and the engine are found, by name."""
 
     catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
-    engine: str = "engine"  # a module with simulate, explain and build_info
+    engine: str = "spook_tracker.engine"  # a module with simulate, explain and build_info
 
     def tests(self) -> Mapping[str, ScalarTest]:
         module, _, attribute = self.catalogue.partition(":")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,16 @@ from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.store.connection import connected, database_url, in_words, is_file, shown
 
-__all__ = ["database_url", "head", "in_words", "one_writer", "open_database", "shown", "upgrade"]
+__all__ = [
+    "database_url",
+    "head",
+    "in_words",
+    "one_writer",
+    "open_database",
+    "session_on",
+    "shown",
+    "upgrade",
+]
 
 
 def open_database(url: str | URL | None = None, readonly: bool = False) -> Engine:
@@ -45,6 +56,17 @@ def open_database(url: str | URL | None = None, readonly: bool = False) -> Engin
         engine.dispose()
         raise
     return engine
+
+
+@contextmanager
+def session_on(url: str | URL | None = None, readonly: bool = False) -> Iterator[Session]:
+    """A session on the database at `url`, opened as `open_database` does, closed at the end."""
+    engine = open_database(url, readonly)
+    try:
+        with Session(engine) as session:
+            yield session
+    finally:
+        engine.dispose()
 
 
 def head() -> str:

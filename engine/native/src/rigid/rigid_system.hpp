@@ -12,6 +12,7 @@
 #include "rigid/joint_set.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
+#include "run/stages.hpp"
 
 namespace spook {
 
@@ -30,7 +31,10 @@ struct BodyMomenta {
 /// free body keeps it to the last bit. A step in which nothing touches is solved as if contacts were impossible.
 class RigidSystem {
 public:
-    explicit RigidSystem(const RigidScene& scene);
+    /// Built from the stages; throws std::invalid_argument for those it cannot run, or joints nobody solves.
+    RigidSystem(const RigidScene& scene, StageList stages);
+
+    const StageList& stages() const noexcept { return stages_; }
 
     // For run_loop:
     void advance(std::int64_t steps);
@@ -48,7 +52,6 @@ public:
     void reset(StageClock* clock);
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
-    bool contacts_possible() const noexcept { return contacts_ && contacts_->possible(); }
     void count(RunReport& report, std::int64_t steps) const;
     std::vector<double> final_state();
 
@@ -95,6 +98,7 @@ private:
         std::vector<double> history;        // stages × three steps × rows: the rows' forces, N
     };
 
+    void take_stages(const RigidScene& scene);
     void step();
     void velocity_stage();
 
@@ -151,6 +155,7 @@ private:
     }
 
     // The scene.
+    StageList stages_;
     LargeArray<BodyConstants> constants_;
     LargeArray<BodyState> start_;
     std::vector<Vec3> acceleration_;  // gravity and constant loads
