@@ -5,13 +5,15 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help nightly test check bench mutants site serve clean require install develop native-tests FORCE
+.PHONY: help nightly test check bench mutants package release site serve clean require install develop native-tests FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
+	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
+	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
 	@echo "make site      publish the website again from what is recorded"
 	@echo "make serve     look at the website on this machine"
 	@echo "make clean     remove what was built (the database stays)"
@@ -27,7 +29,17 @@ check: develop
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	sh .ci/subjects
 	$(BIN)/clang-format --dry-run -Werror $$(git ls-files 'engine/native/*.[ch]pp' 'engine/native/*.inl')
+
+# The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
+package: develop
+	SPOOK_TEST_REAL_WHEEL=1 $(BIN)/pytest -q -p no:cacheprovider --timeout 1800 tests/test_packaging.py
+
+release:
+	@sh .ci/release --check "$(VERSION)"
+	$(MAKE) check test package
+	@sh .ci/release "$(VERSION)"
 
 mutants: develop
 	$(BIN)/python bench/mutants.py

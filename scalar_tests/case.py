@@ -198,10 +198,8 @@ class StabilityStudy:
     study: Callable[[Simulate], BreakPoint | StabilityMap]
     unit: str = ""
     better: Literal["larger", "smaller"] = "larger"
-    expected: tuple[float, float] | None = (
-        None  # band for a break point, with its source in `expected_source`
-    )
-    expected_source: str = ""
+    expected: tuple[float, float] | None = None  # band for a break point
+    expected_source: str = ""  # where the band comes from; or, without one, why theory has none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,6 +210,10 @@ class Example:
     time_step: float  # s
     method: Method = PLAIN
     observe: Mapping[str, Observable] = field(default_factory=dict)
+    duration: float = 8.0  # s, how long the page's replay is
+    exact: Callable[[float], Mapping[str, tuple[float, float, float]]] | None = (
+        None  # places [m] of bodies at a time [s], by a closed form, for the replay's ghost
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

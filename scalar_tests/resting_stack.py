@@ -268,6 +268,8 @@ TEST = ScalarTest(
             definition="2 s with every load right to 1e-6 and nothing moved by more than 1e-6 of an edge",
             study=tallest_stack,
             unit="boxes",
+            expected=(80.0, 80.0),
+            expected_source="statics: a direct solve carries any number; the search ends at 80",
         ),
     ),
 )

@@ -51,6 +51,13 @@ OBSERVE: dict[str, Observable] = {
 }
 
 
+ORACLE = "the method's own discrete solution, tests/oracle_rigid.py: "
+
+
+def _around(value: float) -> tuple[float, float]:
+    return (value * (1.0 - 1e-6), value * (1.0 + 1e-6))
+
+
 def scene(damping: float = TIME_STEP) -> Scene:
     """The top on its tip at the origin, started in steady precession; damping of the joint in s."""
     axis = np.array([math.sin(LEAN), 0.0, math.cos(LEAN)])
@@ -80,7 +87,7 @@ def steady(simulate: Simulate) -> dict[str, float]:
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
     lean, turned = lean_and_round(result["place"])
     return {
-        "path_error": _path_error(simulate, TIME_STEP, PLAIN),
+        "path_error": _off_the_circle(result),
         "rate_error": float(turned[-1]) / (PRECESSION * DURATION) - 1.0,
         "nutation": float(np.abs(lean - LEAN).max()),
         "energy_deviation": float(result["energy"]) / (MASS * GRAVITY * ARM),
@@ -88,16 +95,9 @@ def steady(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _path_error(simulate: Simulate, time_step: float, method: Method) -> float:
-    result = simulate(
-        scene(time_step / method.substeps),
-        time_step=time_step,
-        duration=DURATION,
-        method=method,
-        observe={"place": Trace(quantity=Position("top"))},
-    )
-    time = result.sample_times["place"]
-    radius, height = ARM * math.sin(LEAN), ARM * math.cos(LEAN)
+def _off_the_circle(result: Result) -> float:
+    """Largest distance [m] of the centre of mass from where steady precession has it."""
+    time, radius, height = result.sample_times["place"], ARM * math.sin(LEAN), ARM * math.cos(LEAN)
     exact = np.column_stack(
         [radius * np.cos(PRECESSION * time), radius * np.sin(PRECESSION * time), np.full(len(time), height)]
     )
@@ -106,7 +106,11 @@ def _path_error(simulate: Simulate, time_step: float, method: Method) -> float:
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest distance of the centre of mass from its circle in 20 s [m]."""
-    return _path_error(simulate, time_step, method)
+    place = {"place": Trace(quantity=Position("top"))}
+    built = scene(time_step / method.substeps)
+    return _off_the_circle(
+        simulate(built, time_step=time_step, duration=DURATION, method=method, observe=place)
+    )
 
 
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
@@ -168,8 +172,8 @@ TEST = ScalarTest(
                     role="gate",
                     limit=0.5 * TIME_STEP * PRECESSION * ARM * (1.0 + math.sin(LEAN)),
                     limit_source="half a step of the path, ½ h v = 2.1 mm, and the nutation it may wake, ½ h Ω l = 4.2 mm",
-                    set_point=(4.5e-3, 4.65e-3),
-                    set_point_source="2.1 mm and l times the measured nutation, 3.1 mm, out of phase",
+                    set_point=_around(4.5745039e-3),
+                    set_point_source=ORACLE + "4.575 mm",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
@@ -178,8 +182,10 @@ TEST = ScalarTest(
                     description="mean rate of precession over 1 rad/s, minus one",
                     unit="1",
                     role="companion",
-                    limit=1e-3,
-                    limit_source="second order: (h ω)²/6 = 5e-3 of the spin's own angle does not enter; ours",
+                    limit=1.9e-5,
+                    limit_source=ORACLE + "1.881e-5, second order in h",
+                    set_point=_around(1.8814935e-5),
+                    set_point_source=ORACLE + "1.881e-5",
                     reference=0.0,
                     relative_tolerance=1e-5,
                 ),
@@ -190,6 +196,8 @@ TEST = ScalarTest(
                     role="companion",
                     limit=0.0085,
                     limit_source="half a step of Ω, ½ h Ω = 8.3 mrad, bounds what the start wakes",
+                    set_point=_around(6.1468142e-3),
+                    set_point_source=ORACLE + "6.147 mrad",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
@@ -198,8 +206,10 @@ TEST = ScalarTest(
                     description="largest |E − E₀| over m g l",
                     unit="1",
                     role="companion",
-                    limit=2e-3,
-                    limit_source="half a step of the nutation's power; ours",
+                    limit=9.4e-4,
+                    limit_source=ORACLE + "9.39e-4, half a step of the nutation's power",
+                    set_point=_around(9.3895169e-4),
+                    set_point_source=ORACLE + "9.39e-4",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
@@ -208,8 +218,10 @@ TEST = ScalarTest(
                     description="largest violation of the ball joint",
                     unit="m",
                     role="companion",
-                    limit=2e-3,
-                    limit_source="linearised rows leave h² ω² l (1 + 2 τ/h)/4 of the fast spin's curvature; ours",
+                    limit=9.2e-4,
+                    limit_source=ORACLE + "9.12e-4 m; linearised rows leave out curvature of the fast spin",
+                    set_point=_around(9.1245961e-4),
+                    set_point_source=ORACLE + "9.12e-4 m",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),

@@ -23,6 +23,7 @@ from spook_tracker.engine import _core
 backend = pytest.importorskip("scikit_build_core.build", reason="the build backend is not installed here")
 
 ROOT = Path(__file__).resolve().parents[1]
+REAL = os.environ.get("SPOOK_TEST_REAL_WHEEL") == "1"
 FOLDERS = ("engine", "scalar_tests", "tracker", "migrations", "site")
 THEIRS = ("engine", "tracker", "scalar_tests", "migrations")
 ASKS = """
@@ -51,17 +52,17 @@ def tracked() -> set[str]:
     return {name for name in done.stdout.splitlines() if (ROOT / name).is_file()}
 
 
-def built(kind: str, folder: Path) -> Path:
-    """An archive of this tree, made in a process of its own: the backend changes folders."""
+def built(kind: str, folder: Path, tree: Path = ROOT) -> Path:
+    """An archive of a tree, made in a process of its own: the backend changes folders."""
     code = "import sys; from scikit_build_core import build; "
     code += (
         "build.build_sdist(sys.argv[1])"
         if kind == "sdist"
-        else "build.build_wheel(sys.argv[1], {'wheel.cmake': 'false', 'wheel.platlib': 'true'})"
+        else f"build.build_wheel(sys.argv[1], {{}} if {REAL} else {{'wheel.cmake': 'false', 'wheel.platlib': 'true'}})"
     )
     folder.mkdir()
     done = subprocess.run(
-        [sys.executable, "-c", code, str(folder)], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code, str(folder)], cwd=tree, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     (archive,) = folder.iterdir()
@@ -82,11 +83,19 @@ def test_the_archive_of_sources_holds_each_file_once(tmp_path: Path) -> None:
     assert wanted - names == set()
 
 
+def unpacked(archive: Path, folder: Path) -> Path:
+    """The tree in an archive."""
+    shutil.unpack_archive(archive, folder, filter="data")
+    (tree,) = folder.iterdir()
+    return tree
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with the wheel, and the dependencies of this one: the network is not asked."""
     folder = tmp_path_factory.mktemp("installed")
-    wheel = built("wheel", folder / "dist")
+    tree = unpacked(built("sdist", folder / "sdist"), folder / "sources") if REAL else ROOT
+    wheel = built("wheel", folder / "dist", tree)
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     wanted = {f"spook_tracker/{name}" for name in tracked() if name.split("/")[0] in FOLDERS}
@@ -101,7 +110,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     install = ["-m", "pip", "--python", str(python), "install", "-q", "--no-deps", "--no-index", str(wheel)]
     subprocess.run([sys.executable, *install], check=True, capture_output=True)
     site = next(place.glob("lib/python3*/site-packages"))
-    shutil.copy(str(_core.__file__), site / "spook_tracker" / "engine")
+    if not REAL:
+        shutil.copy(str(_core.__file__), site / "spook_tracker" / "engine")
     (site / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n")  # its own .pth stay unread
     for name in THEIRS:
         (site / name).mkdir()

@@ -62,7 +62,7 @@ KNOWN = (
 PARTICLE_TESTS = [
     name
     for name, test in CATALOGUE.items()
-    if all(isinstance(body, Particle) for body in test.example().scene.bodies) and name != "hanging_chain"
+    if all(isinstance(body, Particle) for body in test.example().scene.bodies)
 ]
 
 

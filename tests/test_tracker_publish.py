@@ -161,7 +161,12 @@ def test_feed_and_badge_tell_the_regressions(site: Path) -> None:
     assert any(title.startswith("friction: deviation regressed") for title in titles)
     assert len(ids) == len(set(ids))
     badge = json.loads((site / "badge.json").read_text())
-    assert badge == {"schemaVersion": 1, "label": "physics", "message": "21 of 22 limits kept", "color": "red"}
+    assert badge == {
+        "schemaVersion": 1,
+        "label": "physics",
+        "message": "21 of 22 limits kept",
+        "color": "red",
+    }
     assert "21 of 22 limits kept" in ElementTree.parse(site / "badge.svg").getroot().attrib["aria-label"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ from spook_tracker.scalar_tests.hanging_chain.scene import (
 from spook_tracker.scalar_tests.hanging_chain.stability import STUDIES
 from spook_tracker.scalar_tests.sweep import line
 
+LINEAR_MAP = "the powers of the map of small motion, with h² T/(4 l) and its damping on the masses: "
+ORACLE = "the method's own discrete solution, tests/oracle.py: "
 LADDER_RATIO, LADDER_TILT = 1000.0, 1e-4  # rad: small motion to 1e-9
 STRING_HALF_STEP = Method(string_stiffness=True, half_step_velocities=True)
 
@@ -69,6 +72,11 @@ def string_unneeded(simulate: Simulate) -> dict[str, float]:
     return {"energy_cost": with_it["energy_lost"] - without["energy_lost"]}
 
 
+def _near(value: float) -> tuple[float, float]:
+    """A part in a hundred thousand either way: the prototype agrees to a part in a million."""
+    return (value * (1.0 - 1e-5), value * (1.0 + 1e-5))
+
+
 def draw(simulate: Simulate) -> Drawing:
     """The load's path at a million to one."""
     result = simulate(scene(HEAVY), time_step=TIME_STEP, steps=STEPS, method=STRING, observe=OBSERVE)
@@ -84,15 +92,26 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _metrics(role: Any, path: float, lost: float, why: str) -> tuple[Metric, ...]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Owed:
+    """What theory gives a configuration: the limit, the band around the value, and where both come from."""
+
+    limit: float
+    set_point: tuple[float, float] | None = None
+    source: str
+
+
+def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> tuple[Metric, ...]:
     return (
         Metric(
             name="length_deviation",
             description="largest |violation| of a link in 20 s, of its length",
             unit="1",
             role=role,
-            limit=1e-6,
-            limit_source="curvature left out by linearised rows, h² v² (1 + 2 τ/h)/(4 l²), doubled twice",
+            limit=length.limit,
+            limit_source=length.source,
+            set_point=length.set_point,
+            set_point_source=length.source if length.set_point else "",
             reference=0.0,
             relative_tolerance=1e-6,
         ),
@@ -101,8 +120,10 @@ def _metrics(role: Any, path: float, lost: float, why: str) -> tuple[Metric, ...
             description="largest distance of the load from small motion, of the start's excursion",
             unit="1",
             role="companion",
-            limit=path,
-            limit_source=why,
+            limit=path.limit,
+            limit_source=path.source,
+            set_point=path.set_point,
+            set_point_source=path.source if path.set_point else "",
             reference=0.0,
             relative_tolerance=1e-6,
         ),
@@ -112,8 +133,10 @@ def _metrics(role: Any, path: float, lost: float, why: str) -> tuple[Metric, ...
             unit="1",
             role="companion",
             better="smaller",
-            limit=0.02,
-            limit_source="the reading of a velocity half a step old: h √(g/L)/2 = 0.8 %, doubled and more",
+            limit=gain.limit,
+            limit_source=gain.source,
+            set_point=gain.set_point,
+            set_point_source=gain.source if gain.set_point else "",
             reference=0.0,
             relative_tolerance=1e-6,
         ),
@@ -123,8 +146,10 @@ def _metrics(role: Any, path: float, lost: float, why: str) -> tuple[Metric, ...
             unit="1",
             role="companion",
             better="smaller",
-            limit=lost,
-            limit_source=why,
+            limit=lost.limit,
+            limit_source=lost.source,
+            set_point=lost.set_point,
+            set_point_source=lost.source if lost.set_point else "",
             reference=0.0,
             relative_tolerance=1e-6,
         ),
@@ -181,9 +206,16 @@ TEST = ScalarTest(
             time_step=TIME_STEP,
             metrics=_metrics(
                 "gate",
-                0.06,
-                0.12,
-                "damping of taut links takes 4 % of the swing in 20 s; ours, half as much again",
+                length=Owed(
+                    limit=2.1e-8,
+                    set_point=(2.0e-8, 2.05e-8),
+                    source="curvature left out by linearised rows, ¾ h² θ̇², with the swing's θ̇ = 0.01 √(g/L): 2.04e-8",
+                ),
+                path=Owed(limit=0.039, set_point=(0.0386, 0.0390), source=LINEAR_MAP + "0.0388"),
+                gain=Owed(
+                    limit=1e-4, source="damping only takes; the lean bends small motion by its square, 1e-4"
+                ),
+                lost=Owed(limit=0.07, set_point=(0.0685, 0.0699), source=LINEAR_MAP + "0.0692"),
             ),
             measure=string,
             parameters={"mass ratio": HEAVY},
@@ -192,7 +224,21 @@ TEST = ScalarTest(
         Measurement(
             configuration="plain",
             time_step=TIME_STEP,
-            metrics=_metrics("companion", 0.02, 0.02, "half a step of phase, h √(g/L)/2 = 0.8 %"),
+            metrics=_metrics(
+                "companion",
+                length=Owed(limit=3.1e-8, set_point=_near(3.0257854e-8), source=ORACLE + "3.026e-8"),
+                path=Owed(
+                    limit=0.0084,
+                    set_point=_near(8.3610699e-3),
+                    source=ORACLE + "0.00836, of which half a step of phase, ½ h √(g/L), is 0.0083",
+                ),
+                gain=Owed(
+                    limit=0.0082,
+                    set_point=_near(8.1402566e-3),
+                    source=ORACLE + "0.00814, of which a velocity half a step old reads ½ h √(g/L) = 0.0083",
+                ),
+                lost=Owed(limit=4.7e-4, set_point=_near(4.6287472e-4), source=ORACLE + "4.63e-4"),
+            ),
             measure=plain,
             parameters={"mass ratio": BELOW_BREAK},
             note="the SPOOK step as it stands, below its break point",
@@ -206,8 +252,8 @@ TEST = ScalarTest(
                     description="energy lost beyond plain SPOOK where plain SPOOK would do, of the lift",
                     unit="1",
                     role="companion",
-                    limit=1e-3,
-                    limit_source="ours: next to nothing below T h²/(m l) = 0.3",
+                    limit=5e-5,
+                    limit_source="both maps of small motion, with and without h² T/(4 l) on the masses: 4.8e-5",
                     reference=0.0,
                     tolerance=1e-7,
                 ),

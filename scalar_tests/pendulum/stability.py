@@ -31,6 +31,7 @@ OBSERVE: dict[str, Observable] = {
     "violation": Trace(quantity=Violation("rod")),
     "energy": Trace(quantity=Energy(), from_start=True),
 }
+DISCRETE = "where the method's own discrete solution breaks: the dense prototype tests/oracle.py, to 1 %"
 HOLDS = (
     "22 s without the length off by more than 10 % beyond what its compliance yields, or the energy above its start by "
     "more than 10 % of m g l beyond what a velocity half a step old reads, and neither doubling in the last third"
@@ -140,8 +141,19 @@ STUDIES = (
             definition=HOLDS,
             study=_largest_step(method),
             unit="s",
+            expected=expected,
+            expected_source=source,
         )
-        for name, method in (("plain", PLAIN), ("curved", CURVED), ("curved twice", CURVED_TWICE))
+        for name, method, expected, source in (
+            (
+                "plain",
+                PLAIN,
+                (0.0862, 0.0879),
+                DISCRETE + "; to first order 10 % of the length is 3 g h²/(2 l), h = 0.082 s",
+            ),
+            ("curved", CURVED, (0.1888, 0.1927), DISCRETE),
+            ("curved twice", CURVED_TWICE, (0.1897, 0.1936), DISCRETE),
+        )
     ),
     StabilityStudy(
         name="smallest-damping",
@@ -151,6 +163,8 @@ STUDIES = (
         study=smallest_damping,
         unit="1",
         better="smaller",
+        expected=(2.43e-4, 2.53e-4),
+        expected_source=DISCRETE.replace("1 %", "2 %"),
     ),
     StabilityStudy(
         name="smallest-compliance",
@@ -160,6 +174,8 @@ STUDIES = (
         study=smallest_compliance,
         unit="m/N",
         better="smaller",
+        expected=(9.04e-8, 9.41e-8),
+        expected_source=DISCRETE.replace("1 %", "2 %"),
     ),
     StabilityStudy(
         name="farthest-from-origin",
@@ -179,6 +195,9 @@ STUDIES = (
         "of m g l",
         study=largest_start,
         unit="1",
+        expected=(0.0275, 0.0292),
+        expected_source="the first step takes the rod back at a g₀, a = 4/(h (1 + 4 τ/h)) = 48 per second: ½ (a g₀)² is "
+        "10 % of g l at g₀ = 0.0292, found to 5 %",
     ),
     StabilityStudy(
         name="damping-compliance-map",

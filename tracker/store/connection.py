@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -74,15 +75,33 @@ def _sqlite(url: URL, readonly: bool) -> Engine:
     def prepare(connection: Any, _record: Any) -> None:
         connection.isolation_level = None  # the driver begins nothing itself: schema changes roll back, too
         pragmas = ["foreign_keys = ON", "trusted_schema = OFF", "cell_size_check = ON"]
-        pragmas += ["query_only = ON"] if readonly else [f"journal_mode = {journal}", "synchronous = FULL"]
+        pragmas += ["query_only = ON"] if readonly else ["synchronous = FULL"]
         for words in pragmas:
             connection.execute(f"PRAGMA {words}")
+        if not readonly:
+            _patiently(connection, f"PRAGMA journal_mode = {journal}")
 
     @event.listens_for(engine, "begin")
     def take_lock(connection: Any) -> None:
         connection.exec_driver_sql(begin)
 
     return engine
+
+
+def _patiently(connection: Any, statement: str) -> None:
+    """What SQLite refuses at once while another process does it, too, however long it may wait for locks.
+
+    Two that open a new file at the same moment both want to change its journal.
+    """
+    end = time.monotonic() + LOCK_TIMEOUT
+    while True:
+        try:
+            connection.execute(statement)
+            return
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or time.monotonic() > end:
+                raise
+        time.sleep(0.005)
 
 
 def _postgresql(url: URL, readonly: bool) -> Engine:

@@ -19,6 +19,7 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
     TestCard,
+    Trajectory,
 )
 from spook_tracker.tracker.document.wording import version
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -89,6 +90,7 @@ class TestHistory:
     card: TestCard
     trends: list[Trend]
     figures: tuple[FigureData, ...] = ()
+    motions: tuple[tuple[Night, Trajectory], ...] = ()  # newest first
     maps: tuple[MapData, ...] = ()
     earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
 
@@ -148,6 +150,7 @@ class Records(Protocol):
     def cards(self, run_id: str) -> Sequence[TestCard]: ...
     def figures(self, run_id: str) -> Sequence[FigureData]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
+    def trajectories(self, run_id: str) -> Sequence[Trajectory]: ...
 
 
 def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
@@ -189,6 +192,7 @@ def _chapter(
     _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
     figures: dict[str, list[FigureData]] = {}
+    motions: dict[str, list[tuple[Night, Trajectory]]] = {}
     maps: dict[MapKey, MapData] = {}
     earlier_maps: dict[MapKey, MapData] = {}
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
@@ -198,6 +202,8 @@ def _chapter(
         for figure in history.figures(night.id):
             if figure.test not in figures_found:
                 figures.setdefault(figure.test, []).append(figure)
+        for motion in history.trajectories(night.id):
+            motions.setdefault(motion.test, []).append((night, motion))
         for stability_map in history.maps(night.id):
             place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
             (earlier_maps if place_of_map in maps else maps).setdefault(place_of_map, stability_map)
@@ -214,6 +220,7 @@ def _chapter(
             card=card,
             trends=by_test.get(test, []),
             figures=tuple(figures.get(test, ())),
+            motions=tuple(motions.get(test, ())),
             maps=tuple(m for m in maps.values() if m.test == test),
             earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
         )
