@@ -64,7 +64,6 @@ class Count:
     set_points: int = 0
     left: int = 0  # set points, the limit beside it holding
     lost: int = 0  # values that are not there, of series that are only followed
-    followed: int = 0
 
     @property
     def kept(self) -> int:
@@ -82,7 +81,6 @@ def count(pairs: Iterable[tuple[SeriesDefinition, Sample]]) -> Count:
     for definition, sample in pairs:
         stands = standing(definition, sample)
         if not expected(definition):
-            found["followed"] += 1
             found["lost"] += stands == "fail"
             continue
         limited = definition.limit is not None
