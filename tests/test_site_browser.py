@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.tracker.judge.compare import ComparedRun, side_of
+from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.series_history import commit_of
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import MISSING, arrive, browser, look, programs, wait_for

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import msgspec
 
-from spook_tracker.tracker.document.history import Point, SeriesHistory
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
@@ -18,6 +17,7 @@ from spook_tracker.tracker.document.run_document import (
     Timing,
     to_number,
 )
+from spook_tracker.tracker.document.series_over_versions import Point, SeriesHistory
 from spook_tracker.tracker.judge import series_history
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import run_times
