@@ -12,12 +12,13 @@ from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
     MapData,
+    Point,
     Sample,
     SeriesDefinition,
+    SeriesHistory,
     Timing,
     to_number,
 )
-from spook_tracker.tracker.document.series_over_versions import Point, SeriesHistory
 from spook_tracker.tracker.judge import series_history
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import run_times

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.document.series_over_versions import SeriesHistory
+from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
 from spook_tracker.tracker.judge.series_history import Told

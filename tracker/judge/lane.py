@@ -13,8 +13,14 @@ from typing import Any, Protocol
 
 import msgspec
 
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition
-from spook_tracker.tracker.document.series_over_versions import Point, Run, SeriesHistory
+from spook_tracker.tracker.document.run_document import (
+    MapData,
+    Point,
+    Run,
+    Sample,
+    SeriesDefinition,
+    SeriesHistory,
+)
 from spook_tracker.tracker.document.wording import instant
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings

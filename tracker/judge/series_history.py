@@ -16,8 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
-from spook_tracker.tracker.document.series_over_versions import Point, Run, SeriesHistory
+from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.noise import Usual, judge_noisy
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing

@@ -18,8 +18,13 @@ from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
-from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
-from spook_tracker.tracker.document.series_over_versions import Point, SeriesHistory
+from spook_tracker.tracker.document.run_document import (
+    Point,
+    RunDocument,
+    Sample,
+    SeriesDefinition,
+    SeriesHistory,
+)
 from spook_tracker.tracker.store import git, models, rows
 from spook_tracker.tracker.store.ancestry import commit_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
