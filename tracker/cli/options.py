@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import click
@@ -71,6 +72,19 @@ def workers_option(command: Command) -> Command:
         show_default=True,
         type=click.IntRange(1, 256),
         help="Processes that measure values.",
+    )(command)
+
+
+ACCEPTED = "accepted.toml"
+
+
+def accepted_option(command: Command) -> Command:
+    """--accepted FILE: levels that people have accepted."""
+    return click.option(
+        "--accepted",
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help=f"Accepted levels; default {ACCEPTED}.",
     )(command)
 
 

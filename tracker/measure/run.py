@@ -22,8 +22,7 @@ from functools import partial
 from multiprocessing import get_context
 from typing import Any, Literal
 
-from spook_tracker.tracker.measure.question.others import asked_of
-
+import spook_tracker.tracker.measure.others as others
 import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
@@ -62,7 +61,7 @@ class RunError(TrackerError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class Questions:
     """Where the questions and the engine are found, by name."""
 
     catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
@@ -81,7 +80,7 @@ class Source:
             ) from None
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
-        return asked_of(found, configurations, engine.gating) if configurations else found
+        return others.asked_of(found, configurations, engine.gating) if configurations else found
 
     def module(self) -> Any:
         """The engine: simulate, build_info, and its configurations if it is not ours."""
@@ -159,7 +158,7 @@ def select(catalogue: Mapping[str, ScalarTest], names: Iterable[str]) -> dict[st
     return {name: test for name, test in catalogue.items() if not wanted or name in wanted}
 
 
-def run(source: Source, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
+def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
     """Everything asked for at the engine's present version on this machine. Raises RunError only."""
     started = _now()
     tests = select(source.tests(), request.tests)
@@ -232,7 +231,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
-def perform(source: Source, task: Task) -> tuple[Any, ...]:
+def perform(source: Questions, task: Task) -> tuple[Any, ...]:
     """Do one piece of work in this process."""
     test, simulate = source.tests()[task.test], source.simulate()
     first = task.index[0]
@@ -250,7 +249,7 @@ def perform(source: Source, task: Task) -> tuple[Any, ...]:
 
 
 def _perform_all(
-    source: Source, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int, watch: Watch
+    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int, watch: Watch
 ) -> Iterator[tuple[int, tuple[Any, ...]]]:
     """Results by position, as they come; a dead process loses only the piece that killed it."""
     left = {name: sum(task.test == name for task in tasks) for name in tests}
@@ -264,7 +263,7 @@ def _perform_all(
 
 
 def _answers(
-    source: Source, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int
+    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int
 ) -> Iterator[tuple[Task, tuple[Any, ...]]]:
     if workers <= 1:
         yield from ((task, perform(source, task)) for task in tasks)
@@ -295,7 +294,7 @@ def _begin_quietly() -> None:
 
 
 def _gather(
-    pool: Executor, source: Source, tasks: Iterable[Task]
+    pool: Executor, source: Questions, tasks: Iterable[Task]
 ) -> Iterator[tuple[Task, tuple[Any, ...] | None]]:
     futures: dict[Future[tuple[Any, ...]], Task] = {}
     try:
@@ -370,6 +369,6 @@ def ci_address(environment: Mapping[str, str]) -> str:
     return environment.get("CI_JOB_URL") or environment.get("BUILD_URL") or ""
 
 
-def present_version(source: Source) -> EngineVersion:
+def present_version(source: Questions) -> EngineVersion:
     """The engine that would be measured now."""
     return engine_version(source.module())
