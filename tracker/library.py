@@ -111,6 +111,7 @@ class NightlyReport:
     document: RunDocument
     findings: list[Finding]
     published: Any
+    notes: tuple[str, ...] = ()  # entries of accepted.toml that do nothing
 
     @property
     def red(self) -> bool:
@@ -132,6 +133,8 @@ def nightly(
     The database is opened first: no night is measured in vain. `tell` is called with the run document and
     with the findings as soon as they are there. `asked` as for `run`.
     """
+    from spook_tracker.tracker.judge.accepted import unused
+    from spook_tracker.tracker.judge.series_history import night_of
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
@@ -143,7 +146,9 @@ def nightly(
         history = History(session)
         findings = judge(history, document.id, accepted)
         tell(findings)
+        names = {finding.series for finding in findings} | set(history.series_keys())
+        notes = unused(accepted, names, night_of(history.run(document.id)))
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
         published = publish(history, out, accepted)
-    return NightlyReport(document=document, findings=findings, published=published)
+    return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

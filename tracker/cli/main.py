@@ -152,6 +152,8 @@ def nightly(
             stability=not quick,
             workers=workers,
         )
+    for sentence in report.notes:
+        say(f"note: {sentence}")
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 

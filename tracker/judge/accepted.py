@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from fnmatch import fnmatchcase
@@ -46,6 +46,10 @@ class Accepted:
     def names(self, key: str) -> bool:
         """Whether the entry is about that series."""
         return fnmatchcase(key, self.series)
+
+    def over(self, night: date) -> bool:
+        """Whether its day has passed."""
+        return self.until is not None and night > self.until
 
     def takes(self, key: str, value: float, night: date) -> bool:
         """Whether that value of that series is accepted on that night."""
@@ -101,3 +105,15 @@ def _entry(place: str, entry: Any) -> Accepted:
 def acceptance(levels: Sequence[Accepted], key: str, value: float, night: date) -> Accepted | None:
     """The entry that takes this value, if one does."""
     return next((level for level in levels if level.takes(key, value, night)), None)
+
+
+def unused(levels: Sequence[Accepted], keys: Iterable[str], night: date) -> list[str]:
+    """A sentence for each entry that does nothing: its day has passed, or no series has such a name."""
+    names = list(keys)
+    said = []
+    for level in levels:
+        if level.over(night):
+            said.append(f"accepted until {level.until} and over: {level.series}; remove the entry")
+        elif not any(level.names(key) for key in names):
+            said.append(f"accepted, but there is no such series: {level.series}; correct or remove the entry")
+    return said

@@ -120,7 +120,11 @@ def _judge_values(
     red: Judged | None = None  # the night before, if it was red
     calm: Class | None = None  # what the night before stood for, if it can be repeated without a look
     gone: set[float] = set()  # bad values that had been mended
+    lent: tuple[Point, Accepted] | None = None  # the level before one that is accepted until a day
     for night in history:
+        if lent is not None and lent[1].over(night_of(night.run)):
+            level, lent, calm = lent[0], None, None  # what was lent is due: the old level counts again
+            release = settled = level
         if calm is not None and level is not None and _repeats(level, night):
             yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
             level = night
@@ -175,7 +179,11 @@ def _judge_values(
             against=against,
             accepted=str(taken) if bad else "",
         )
-        level, red, calm = night, None, None if bad else own
+        if taken is not None and taken.until is not None and level is not night:
+            lent = lent or (level, taken)
+        elif bad or verdict.word in ("improved", "fixed"):
+            lent = None
+        level, red, calm = night, None, None if bad or lent else own
         if bad or verdict.word in ("improved", "fixed"):
             release = settled = night
         if is_release(night.run):
