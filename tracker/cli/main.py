@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
@@ -209,7 +209,7 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
     main.add_command(command)
 
 

@@ -146,7 +146,8 @@ def _judge_values(
                 words = f"{verdict.sentence}; this value came and went before"
                 verdict = replace(verdict, name="flip-flop", sentence=words)
         bad = verdict.red or broken
-        taken = acceptance(accepted, key, night.value, night_of(night.run)) if bad else None
+        gone_for_good = night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
+        taken = acceptance(accepted, key, night.value, night_of(night.run), gone_for_good) if bad else None
         if bad and taken is None:
             worse = red is None or _worsened(definition, red.night, night)
             good = (

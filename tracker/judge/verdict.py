@@ -118,6 +118,9 @@ def _words(outcome: OutcomeClass) -> str:
 
 def _by_class(before: Sample, after: Sample, decades: float | None, ulps: int | None) -> Verdict | None:
     old, new = RANK[before.outcome], RANK[after.outcome]
+    if after.outcome == "missing" and new > old:
+        gone: Word = "removed" if after.failure.startswith("removed") else "missing"
+        return Verdict(word=gone, sentence=after.failure or "asked for and not answered", name=gone)
     if new > old:
         crossed = after.outcome == "out_of_limit"
         far = "" if ulps is None or ulps > LAST_BITS else f" by {ulps} ULP: the last bits decide"

@@ -73,6 +73,7 @@ def comparisons(
                 side=side_of(night),
                 samples=history.samples(night.id),
                 maps=history.maps(night.id),
+                whole=night.trigger == "nightly",
             )
         return sides[night.id]
 
