@@ -52,10 +52,15 @@ def record(document: RunDocument, database: str) -> bool:
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
     """What changed between two versions, each named as on the command line."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
+    from spook_tracker.tracker.judge.work import with_work
 
     old, new = history.resolve(before), history.resolve(after)
     earlier, later = (
-        ComparedRun(side=side_of(run), samples=history.samples(run.id), maps=history.maps(run.id))
+        ComparedRun(
+            side=side_of(run),
+            samples=with_work(history.samples(run.id), run.engine),
+            maps=history.maps(run.id),
+        )
         for run in (old, new)
     )
     return compare_in(history, (old, earlier), (new, later), accepted)

@@ -17,13 +17,14 @@ from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesD
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
-from spook_tracker.tracker.judge.lane import FAMILIES, Records, histories, line_of
-from spook_tracker.tracker.judge.noise import Usual, judge_time, to_be_confirmed
-from spook_tracker.tracker.judge.series_history import Told, commit_of, judge_all, red_class
+from spook_tracker.tracker.judge.lane import Records, histories, line_of
+from spook_tracker.tracker.judge.noise import Usual, judge_time, only_followed, to_be_confirmed
+from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off, judge_all, red_class
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class
+from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 TIMES = ("time", "run_time")
@@ -168,6 +169,8 @@ def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> 
     changes = []
     for key in before.samples.keys() | after.samples.keys():
         old, new = before.samples.get(key), after.samples.get(key)
+        if (old is None or new is None) and (old or new)[0].kind == "work":  # type: ignore[index]
+            continue  # a sum of what is told by itself
         if old is None and new is not None:
             verdict = Verdict(word="new", sentence="measured for the first time")
             changes.append(_change(key, new[0], None, new[1], verdict))
@@ -183,6 +186,7 @@ def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> 
                 same_machine = before.side.machine == after.side.machine
                 verdict = _time_scalar(old, new, same_machine, history.usual.get(key))
                 verdict = to_be_confirmed(verdict) if key in history.suspected else verdict
+                verdict = only_followed(verdict) if is_read_off(new[0]) else verdict
             else:
                 verdict = judge(
                     new[0],

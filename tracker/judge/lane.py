@@ -22,10 +22,9 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.document.wording import instant
+from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings
-
-Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 
 
 class Records(Protocol):
@@ -123,16 +122,27 @@ def histories(
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
     found = with_missing(found, runs[-RECENT:], recent)
-    return found | run_times(found)
+    tests = None if keys is None else {key.partition("/")[0] for key in keys}
+    return found | run_times(found) | work(runs[-RECENT:], recent, tests)
 
 
-FAMILIES = {
-    "scalar": "values",
-    "ladder": "sweep",
-    "order": "sweep",
-    "time": "sweep",
-    "break_point": "stability",
-}
+def work(
+    runs: Sequence[Run], measured: Mapping[str, Samples], tests: set[str] | None
+) -> dict[str, SeriesHistory]:
+    """The histories of exact work of these tests (all if None): tracker/judge/work.py."""
+    points: dict[str, list[Point]] = {}
+    newest: dict[str, SeriesDefinition] = {}
+    for run in runs:
+        counted = {
+            key: pair
+            for key, pair in measured.get(run.id, {}).items()
+            if tests is None or key.partition("/")[0] in tests
+        }
+        for key, (definition, sample) in with_work(counted, run.engine).items():
+            if definition.kind == "work":
+                newest[key] = definition
+                points.setdefault(key, []).append(Point(run, sample, definition.test_version))
+    return {key: SeriesHistory(newest[key], tuple(found)) for key, found in points.items()}
 
 
 def with_missing(
@@ -150,7 +160,7 @@ def with_missing(
     told = {}
     for key, series in found.items():
         definition = series.definition
-        if definition.kind == "time":
+        if definition.kind in ("time", "work"):
             told[key] = series
             continue
         points = list(series.points)

@@ -18,7 +18,7 @@ from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.noise import Usual, judge_noisy
+from spook_tracker.tracker.judge.noise import Usual, judge_noisy, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class, State
@@ -109,6 +109,11 @@ def judge_history(
 def is_noisy(definition: SeriesDefinition) -> bool:
     """Whether the same build may give another value: run times only."""
     return definition.kind == "time"
+
+
+def is_read_off(definition: SeriesDefinition) -> bool:
+    """Whether a time is read off a ladder: time to an error, error in a time."""
+    return definition.metric.endswith((":time-to-error", ":error-in-time"))
 
 
 def _judge_values(
@@ -304,6 +309,10 @@ def _judge_times(
             accepted=[level is not None for level in taken],
         )
         for i, noisy in enumerate(verdicts):
+            if noisy.state in ("detected", "suspected") and is_read_off(definition):
+                noisy = replace(
+                    noisy, verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
+                )
             own = standing(definition, lane[i].sample)
             stands: Class = "accepted" if noisy.state == "accepted" else own
             first = lane[noisy.first_bad] if noisy.first_bad is not None else None

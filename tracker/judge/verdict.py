@@ -84,6 +84,8 @@ def judge(
         return Verdict(word="changed", sentence="the same value from another final state", ulps=0)
     if same_commit:
         return _unrepeatable(decades, ulps)
+    if definition.kind == "work" and before.state_hash != after.state_hash:
+        return Verdict(word="changed", sentence=_distance(decades, None, "other work for other answers"))
     by_class = _by_class(before, after, decades, ulps)
     if by_class is not None:
         return by_class
