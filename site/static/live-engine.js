@@ -67,8 +67,8 @@ class LiveEngine {
   }
 
   box(mass, size, position, surface, velocity = ORIGIN, turn = ORIGIN) {
-    const [x, y, z] = size, part = mass / 12.0;
-    this.native.live_body(0, mass, part * (y * y + z * z), part * (z * z + x * x), part * (x * x + y * y), ...position, 1, 0, 0, 0);
+    const [x, y, z] = size, moment = (square) => (mass * square) / 12.0;
+    this.native.live_body(0, mass, moment(y * y + z * z), moment(x * x + z * z), moment(x * x + y * y), ...position, 1, 0, 0, 0);
     this.native.live_velocity(...velocity, ...turn);
     this.material(surface);
     this.native.live_box(...size);
@@ -78,7 +78,7 @@ class LiveEngine {
   }
 
   sphere(mass, radius, position, surface, velocity = ORIGIN) {
-    const moment = 0.4 * mass * radius * radius;
+    const moment = 0.4 * mass * (radius * radius);
     this.native.live_body(0, mass, moment, moment, moment, ...position, 1, 0, 0, 0);
     this.native.live_velocity(...velocity, 0, 0, 0);
     this.material(surface);
