@@ -264,7 +264,7 @@ def test_list_show_and_explain_tell_what_is_asked_and_what_it_needs():
         (["run", "fal"], "did you mean fall"),
         (["nonsense"], "tracker --help"),
         (["compare", "latest"], "tracker compare --help"),
-        (["run", "--engine", "no_such_engine"], "build it"),
+        (["run", "--engine", "no_such_engine"], "name one of spook, mujoco"),
         (["run", "--catalogue", "nowhere:X"], "module:NAME"),
         (["serve", "."], "tracker publish"),
         (["import", "nothing.json"], "nothing.json"),

@@ -30,12 +30,12 @@ def run(
     """Put the questions (all, or those named) to the engine; nothing is recorded.
 
     `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
-    tracker.measure.run.Questions (catalogue, engine).
+    tracker.measure.run.Questions (catalogue, engine, limit).
     """
     from spook_tracker.tracker.measure.run import Questions, Request
     from spook_tracker.tracker.measure.run import run as measure
 
-    where = {name: asked.pop(name) for name in ("catalogue", "engine") if name in asked}
+    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit") if name in asked}
     request = Request(tests=tuple(tests), **asked)
     return measure(Questions(**where), request, watch or (lambda progress: None))
 

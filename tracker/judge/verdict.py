@@ -73,6 +73,8 @@ def judge(
         return _incomparable("the definition of the test changed")
     if not same_environment:
         return _incomparable("measured in another float environment")
+    if "not_supported" in (before.outcome, after.outcome):
+        return _unasked(before, after)
     before, after = honest(before), honest(after)
     old, new = from_number(before.value), from_number(after.value)
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
@@ -103,6 +105,15 @@ def judge(
 
 def _incomparable(why: str) -> Verdict:
     return Verdict(word="not_comparable", sentence=why)
+
+
+def _unasked(before: Sample, after: Sample) -> Verdict:
+    """An engine that cannot be asked is neither better nor worse."""
+    if before.outcome == after.outcome:
+        return Verdict(word="same", sentence="still not supported")
+    if after.outcome == "not_supported":
+        return _incomparable(f"no longer supported: {after.failure}")
+    return _incomparable("supported for the first time")
 
 
 def _unrepeatable(decades: float | None, ulps: int | None) -> Verdict:
