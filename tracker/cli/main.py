@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
@@ -174,6 +174,8 @@ def nightly(
             stability=not quick,
             workers=workers,
         )
+    for sentence in report.notes:
+        say(f"note: {sentence}")
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -238,7 +240,7 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
     main.add_command(command)
 
 

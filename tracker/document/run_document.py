@@ -62,7 +62,7 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     unit: Text
     role: Literal["gate", "companion", "reported"]
     better: Literal["smaller_magnitude", "larger", "smaller", "inside"]
-    kind: Literal["scalar", "ladder", "order", "time", "break_point"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point", "work"]
     time_step: float | None  # s
     parameters: dict[str, float]
     limit: float | tuple[float, float] | None
