@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -238,7 +239,18 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (
+    releases.backfill,
+    compare,
+    trend,
+    list_tests,
+    show,
+    explain,
+    export,
+    import_files,
+    db,
+    schema,
+):
     main.add_command(command)
 
 
