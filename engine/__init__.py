@@ -53,7 +53,7 @@ What cannot be simulated is refused with one sentence, and a run that goes wrong
 from spook_tracker.engine.bodies import WORLD, Body, Material, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo, build_info
 from spook_tracker.engine.compiler import compile, explain
-from spook_tracker.engine.errors import EngineError, MethodError, SceneError, SimulationFailed
+from spook_tracker.engine.errors import EngineError, MethodError, SceneError
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import (
     Ball,
@@ -91,7 +91,7 @@ from spook_tracker.engine.observe import (
     Violation,
 )
 from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.result import Result
+from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Shape, Sphere
 from spook_tracker.engine.simulation import simulate

@@ -3,51 +3,57 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 def build_facts() -> dict[str, str]: ...
+
+Point = tuple[float, float, float]
+Columns = dict[str, Any]
+
+class QuantityRequest:
+    def __init__(self, kind: str, index: int, point: Point, other: int) -> None: ...
+
+class Observation:
+    def __init__(
+        self, quantity: int, reduction: str, first: int, last: int, from_start: bool, every: int
+    ) -> None: ...
 
 class ParticleProgram:
     def __init__(
         self,
-        bodies: npt.NDArray[np.float64],
-        row_ends: npt.NDArray[np.int64],
-        rows: npt.NDArray[np.float64],
-        spring_ends: npt.NDArray[np.int64],
-        springs: npt.NDArray[np.float64],
-        fields: npt.NDArray[np.float64],
-        gravity: tuple[float, float, float],
+        bodies: Columns,
+        rows: Columns,
+        springs: Columns,
+        fields: Columns,
+        gravity: Point,
         method: dict[str, Any],
-        quantities: Sequence[tuple[str, int, tuple[float, float, float]]],
-        observations: Sequence[tuple[int, str, int, int, bool, int]],
+        quantities: Sequence[QuantityRequest],
+        observations: Sequence[Observation],
     ) -> None: ...
     def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
     @property
-    def solver(self) -> str: ...
+    def choices(self) -> list[tuple[str, bool, str]]: ...
     @property
-    def held_twice(self) -> bool: ...
+    def stages(self) -> list[str]: ...
 
 class RigidProgram:
     def __init__(
         self,
-        body_kinds: npt.NDArray[np.int64],
-        bodies: npt.NDArray[np.float64],
-        joint_kinds: npt.NDArray[np.int64],
-        joints: npt.NDArray[np.float64],
-        spring_ends: npt.NDArray[np.int64],
-        springs: npt.NDArray[np.float64],
-        fields: npt.NDArray[np.float64],
-        collider_kinds: npt.NDArray[np.int64],
-        colliders: npt.NDArray[np.float64],
-        no_contact: npt.NDArray[np.int64],
-        gravity: tuple[float, float, float],
+        bodies: Columns,
+        joints: Columns,
+        motors: Columns,
+        limits: Columns,
+        joint_springs: Columns,
+        springs: Columns,
+        fields: Columns,
+        colliders: Columns,
+        no_contact: Columns,
+        contacts: bool,
+        gravity: Point,
         method: dict[str, Any],
-        quantities: Sequence[tuple[str, int, tuple[float, float, float]]],
-        observations: Sequence[tuple[int, str, int, int, bool, int]],
+        quantities: Sequence[QuantityRequest],
+        observations: Sequence[Observation],
     ) -> None: ...
     def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
     @property
-    def solver(self) -> str: ...
+    def choices(self) -> list[tuple[str, bool, str]]: ...
     @property
-    def contacts_possible(self) -> bool: ...
+    def stages(self) -> list[str]: ...

@@ -9,31 +9,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from spook_tracker.engine import _core
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
 from spook_tracker.engine.result import Array, Result
 
-STAGES = (
-    "collision",
-    "apply_gravity",
-    "apply_central_gravity",
-    "apply_springs",
-    "apply_loads",
-    "impact",
-    "string_stiffness",
-    "assemble_rows",
-    "tangents",
-    "solve_path",
-    "solve_block",
-    "solve_iterative",
-    "pivot",
-    "friction",
-    "correct_curvature",
-    "half_step",
-    "integrate_positions",
-    "integrate_rotations",
-    "observe",
-)
 _REDUCTIONS: dict[type[Observable], str] = {
     Trace: "trace",
     Final: "final",
@@ -54,34 +34,47 @@ class StageChoice:
 
 
 class NativeProgram(Protocol):
-    """What a pipeline's native object offers; see bindings_common.hpp for the report."""
+    """What a pipeline's native object offers; see bindings/common.hpp for the report."""
 
+    @property
+    def choices(self) -> list[tuple[str, bool, str]]: ...
+    @property
+    def stages(self) -> list[str]: ...
     def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
 
 
-def observation_tuples(observe: Mapping[str, Observable]) -> list[tuple[int, str, int, int, bool, int]]:
-    """(quantity, reduction, first, last or -1, from_start, every) in the order given.
+def table(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Rows with the same names as columns by name, the form in which the native side takes a table."""
+    if not rows:
+        return {}
+    return {name: _column([row[name] for row in rows]) for name in rows[0]}
+
+
+def _column(values: list[Any]) -> Any:
+    return values if isinstance(values[0], str) else np.array(values)
+
+
+def observations(observe: Mapping[str, Observable]) -> list[_core.Observation]:
+    """What the native side keeps, in the order given.
 
     Quantity k is the k-th of `distinct_quantities`: observables of equal quantities share one reading.
     """
     quantities = distinct_quantities(observe)
-    tuples = []
+    found = []
     for name, what in observe.items():
         if type(what) not in _REDUCTIONS:
             raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
-        last = -1 if what.last is None else what.last
-        every = what.every if isinstance(what, Trace) else 1
-        tuples.append(
-            (
-                quantities.index(what.quantity),
-                _REDUCTIONS[type(what)],
-                what.first,
-                last,
-                what.from_start,
-                every,
+        found.append(
+            _core.Observation(
+                quantity=quantities.index(what.quantity),
+                reduction=_REDUCTIONS[type(what)],
+                first=what.first,
+                last=-1 if what.last is None else what.last,
+                from_start=what.from_start,
+                every=what.every if isinstance(what, Trace) else 1,
             )
         )
-    return tuples
+    return found
 
 
 def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
@@ -95,11 +88,6 @@ def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
     return quantities
 
 
-def observes_each_step(observe: Mapping[str, Observable]) -> bool:
-    """Whether some observable reads samples while the loop runs; a Final reads once, after it."""
-    return any(not isinstance(what, Final) for what in observe.values())
-
-
 class Program:
     """A scene compiled for one time step and method. Running it again starts from the start again."""
 
@@ -108,7 +96,6 @@ class Program:
         native: NativeProgram,
         *,
         time_step: float,
-        choices: Sequence[StageChoice],
         bodies: Sequence[str],
         observe: Mapping[str, Observable],
         shapes: Sequence[tuple[int, ...]],
@@ -116,7 +103,7 @@ class Program:
         """`shapes` are those of one sample of each observable, in order."""
         self._native = native
         self._running = threading.Lock()  # one native state: a second thread waits
-        self._choices = tuple(choices)
+        self._choices = tuple(StageChoice(*choice) for choice in native.choices)
         self._bodies = tuple(bodies)
         self._observe = dict(observe)
         self._shapes = tuple(shapes)
@@ -124,8 +111,8 @@ class Program:
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """The stages of a step, in order: what this scene needs and nothing else."""
-        return tuple(choice.stage for choice in self._choices if choice.kept)
+        """The stages that the native step runs, in order: what this scene needs and nothing else."""
+        return tuple(self._native.stages)
 
     def explain(self) -> tuple[StageChoice, ...]:
         """Every stage there is, kept or left out, with the reason in words."""

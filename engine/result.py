@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.errors import SimulationFailed
+from spook_tracker.engine.errors import EngineError
 
 Status = Literal["completed", "diverged", "not_finite", "timed_out"]
 Array = npt.NDArray[np.float64]
@@ -60,3 +60,11 @@ class Result:
     def completed(self) -> bool:
         """Whether every step was done with finite, bounded values."""
         return self.status == "completed"
+
+
+class SimulationFailed(EngineError):
+    """An observable of an incomplete run was read; `result` holds the run with its partial data."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__(result.failure)
+        self.result = result

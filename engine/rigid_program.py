@@ -1,4 +1,4 @@
-"""Rigid bodies: pack a scene for the native pipeline, choose the stages, say why.
+"""Rigid bodies: pack a scene for the native pipeline, which chooses its stages.
 
 Conventions. The frame of a joint is fixed to its first body. Violations [m, rad] are measured in that frame:
 translations along the world axes of the start (ball, lock), along (axis, cross axis, their normal) (universal) or
@@ -35,16 +35,21 @@ from spook_tracker.engine.joints import (
 )
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.observe import Observable
-from spook_tracker.engine.program import Program, distinct_quantities, observation_tuples
-from spook_tracker.engine.rigid_quantities import request
-from spook_tracker.engine.rigid_stages import choose
+from spook_tracker.engine.particle_program import ends
+from spook_tracker.engine.program import Program, observations, table
+from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
 
-_MOTIONS = {"dynamic": 0, "static": 1, "kinematic": 2}
-_JOINTS: dict[type[Constraint], int] = {Distance: 0, Lock: 1, Ball: 2, Hinge: 3, Prismatic: 4, Universal: 5}
-_SOLVERS = {"direct": 0, "iterative": 1, "hybrid": 2}
-_FRICTION = {"cone": 0, "box": 1, "scaled_box": 2}
+_MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
+_JOINTS: dict[type[Constraint], str] = {
+    Distance: "distance",
+    Lock: "lock",
+    Ball: "ball",
+    Hinge: "hinge",
+    Prismatic: "prismatic",
+    Universal: "universal",
+}
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 _WORLD_AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -57,21 +62,12 @@ def compile_rigid(
     field = lacking(method)
     if field is not None:
         raise MethodError(f"method: {field} is for scenes of particles only; leave it out for rigid bodies")
-    requests, shapes = [], {}
-    for quantity in distinct_quantities(observe):
-        wanted, shapes[quantity] = request(quantity, scene)
-        requests.append(wanted)
+    quantities, shapes = requests(scene, observe)
     native = _core.RigidProgram(
-        **pack(scene, time_step, method), quantities=requests, observations=observation_tuples(observe)
+        **pack(scene, time_step, method), quantities=quantities, observations=observations(observe)
     )
-    return Program(
-        native,
-        time_step=time_step,
-        choices=choose(scene, method, observe, native.solver, native.contacts_possible),
-        bodies=[body.name for body in scene.bodies],
-        observe=observe,
-        shapes=[shapes[what.quantity] for what in observe.values()],
-    )
+    names = [body.name for body in scene.bodies]
+    return Program(native, time_step=time_step, bodies=names, observe=observe, shapes=shapes)
 
 
 def normals(axis: Vector) -> tuple[Vector, Vector]:
@@ -91,58 +87,49 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     step = time_step / method.substeps
     pushes = np.zeros((len(bodies), 6))
-    fields, springs, spring_ends = [], [], []
+    fields, springs = [], []
     for force in scene.forces:
         if isinstance(force, Load):
             pushes[bodies[force.body]] += (*force.force, *force.torque)
         elif isinstance(force, CentralGravity):
-            fields.append((force.strength, *force.centre))
+            fields.append({"strength": force.strength, "centre": force.centre})
         elif isinstance(force, Spring):
-            spring_ends.append([bodies[end] if isinstance(end, str) else -1 for end in force.between])
-            points = [_ORIGIN if isinstance(end, str) else end for end in force.between]
-            springs.append((*points[0], *points[1], force.stiffness, force.rest_length, force.viscosity))
-    body_kinds, body_rows = [], []
-    for body, push in zip(scene.bodies, pushes, strict=True):
-        kind, row = _body(body, push, step, turning="rotation" in method.force_stages)
-        body_kinds.append(kind)
-        body_rows.append(row)
-    joint_kinds, joint_rows = [], []
-    for constraint in scene.constraints:
-        kinds, numbers = _constraint(scene, constraint, bodies, step)
-        joint_kinds.append(kinds)
-        joint_rows.append(numbers)
-    collider_kinds, colliders = _colliders(scene)
-    apart = [(bodies[first], bodies[second]) for first, second in scene.no_contact]
-    apart += [(kinds[1], kinds[2]) for kinds in joint_kinds if min(kinds[1], kinds[2]) >= 0]
-
-    def table(rows: list[Any], columns: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-        return np.array(rows, dtype=np.float64).reshape(-1, columns)
-
-    def indices(rows: list[Any], columns: int) -> np.ndarray[Any, np.dtype[np.int64]]:
-        return np.array(rows, dtype=np.int64).reshape(-1, columns)
-
+            springs.append(
+                ends(force.between, bodies)
+                | {
+                    "stiffness": force.stiffness,
+                    "rest_length": force.rest_length,
+                    "viscosity": force.viscosity,
+                }
+            )
+    joints = [_joint(scene, constraint, bodies, step) for constraint in scene.constraints]
+    apart = [{"first": bodies[first], "second": bodies[second]} for first, second in scene.no_contact]
+    apart += [
+        {"first": joint["first"], "second": joint["second"]}
+        for joint in joints
+        if min(joint["first"], joint["second"]) >= 0
+    ]
     return {
-        "body_kinds": indices(body_kinds, 2),
-        "bodies": table(body_rows, 28),
-        "joint_kinds": indices(joint_kinds, 6),
-        "joints": table(joint_rows, 37),
-        "spring_ends": indices(spring_ends, 2),
-        "springs": table(springs, 9),
-        "fields": table(fields, 4),
-        "collider_kinds": indices(collider_kinds, 2),
-        "colliders": table(colliders, 10),
-        "no_contact": indices(apart, 2),
+        "bodies": table([_body(body, push, step) for body, push in zip(scene.bodies, pushes, strict=True)]),
+        "joints": table(joints),
+        **_drives(scene, step),
+        "springs": table(springs),
+        "fields": table(fields),
+        "colliders": table(_colliders(scene)),
+        "no_contact": table(apart),
+        "contacts": scene.contacts,
         "gravity": scene.gravity,
         "method": {
             "time_step": time_step,
             "substeps": method.substeps,
             "refinements": method.refinements,
             "floor": method.floor,
-            "solver": _SOLVERS[method.solver],
-            "friction": _FRICTION[method.friction],
+            "solver": method.solver,
+            "friction": method.friction,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "force_collision": "collision" in method.force_stages,
+            "force_rotation": "rotation" in method.force_stages,
         },
     }
 
@@ -161,61 +148,97 @@ def lacking(method: Method) -> str | None:
     return None
 
 
-def _body(
-    body: Particle | RigidBody, push: Any, step: float, *, turning: bool
-) -> tuple[tuple[int, int], tuple[float, ...]]:
-    """`turning` gives a particle an inertia, to measure what its rotation would cost."""
+def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
+    columns: dict[str, Any] = {
+        "motion": "dynamic",
+        "particle": True,
+        "mass": body.mass,
+        "inertia": _ORIGIN,
+        "position": body.position,
+        "orientation": _UPRIGHT,
+        "velocity": body.velocity,
+        "angular_velocity": _ORIGIN,
+        "force": push[:3],
+        "torque": push[3:],
+        "friction": 0.0,
+        "restitution": 0.0,
+        "compliance": 0.0,
+        "damping": 4.5 * step,
+        "slip_compliance": 0.0,
+    }
     if isinstance(body, Particle):
-        place = (*body.position, *_UPRIGHT, *body.velocity, *_ORIGIN)
-        inertia = (body.mass,) * 3 if turning else _ORIGIN
-        return (0, int(not turning)), (body.mass, *inertia, *place, *push, 0.0, 0.0, 0.0, 4.5 * step, 0.0)
+        return columns
     material = body.material
-    surface = (
-        material.friction,
-        material.restitution,
-        material.compliance,
-        4.5 * step if material.damping is None else material.damping,
-        material.slip_compliance,
-    )
-    place = (*body.position, *body.orientation, *body.velocity, *body.angular_velocity)
     dynamic = body.motion == "dynamic"
-    mass = body.mass if dynamic and body.mass is not None else 0.0
-    inertia = body.inertia if dynamic and body.inertia is not None else _ORIGIN
-    return (_MOTIONS[body.motion], 0), (mass, *inertia, *place, *push, *surface)
+    return columns | {
+        "motion": _MOTIONS[body.motion],
+        "particle": False,
+        "mass": body.mass if dynamic and body.mass is not None else 0.0,
+        "inertia": body.inertia if dynamic and body.inertia is not None else _ORIGIN,
+        "orientation": body.orientation,
+        "angular_velocity": body.angular_velocity,
+        "friction": material.friction,
+        "restitution": material.restitution,
+        "compliance": material.compliance,
+        "damping": _or(material.damping, 4.5 * step),
+        "slip_compliance": material.slip_compliance,
+    }
 
 
-def _constraint(
-    scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step: float
-) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Kinds and numbers of one joint, as documented at the native program."""
-    default = 2.0 * step
-    first, second = (bodies.get(end, -1) if isinstance(end, str) else -1 for end in constraint.between)
+def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step: float) -> dict[str, Any]:
+    columns: dict[str, Any] = {
+        "kind": _JOINTS[type(constraint)],
+        **{
+            side: bodies.get(end, -1) if isinstance(end, str) else -1
+            for side, end in zip(("first", "second"), constraint.between, strict=True)
+        },
+        "compliance": _six(constraint.compliance),
+        "damping": _six(2.0 * step if constraint.damping is None else constraint.damping),
+    }
     if isinstance(constraint, Distance):
         length = constraint.rest_length
-        if length is None:
-            length = scene.length(constraint)
-        points = (*scene.anchor(constraint, 0), *scene.anchor(constraint, 1))
-        kinds: tuple[int, ...] = (0, first, second, 0, 0, 0)
-        softness = (*_six(constraint.compliance), *_six(_or(constraint.damping, default)))
-        return kinds, (*points, *_WORLD_AXES, length, *softness, *[0.0] * 9)
+        return columns | {
+            "first_point": scene.anchor(constraint, 0),
+            "second_point": scene.anchor(constraint, 1),
+            "axes": _WORLD_AXES,
+            "rest_length": scene.length(constraint) if length is None else length,
+        }
     at = constraint.at
     if at is None:
-        end = constraint.between[1] if second >= 0 else constraint.between[0]
+        end = constraint.between[1] if columns["second"] >= 0 else constraint.between[0]
         at = scene.body(end).position
-    damping = default if constraint.damping is None else constraint.damping
-    motor, limit, spring = (
-        (constraint.motor, constraint.limit, constraint.spring)
-        if isinstance(constraint, AxialJoint)
-        else (None, None, None)
-    )
-    numbers = [*at, *at, *_axes(constraint), 0.0, *_six(constraint.compliance), *_six(damping)]
-    numbers += [motor.speed, _or(motor.max_force, math.inf)] if motor else [0.0, 0.0]
-    numbers += (
-        [limit.lower, limit.upper, limit.compliance, _or(limit.damping, default)] if limit else [0.0] * 4
-    )
-    numbers += [spring.stiffness, spring.rest, _or(spring.damping, default)] if spring else [1.0, 0.0, 0.0]
-    free = (int(motor is not None), int(limit is not None), int(spring is not None))
-    return (_JOINTS[type(constraint)], first, second, *free), tuple(numbers)
+    return columns | {"first_point": at, "second_point": at, "axes": _axes(constraint), "rest_length": 0.0}
+
+
+def _drives(scene: Scene, step: float) -> dict[str, Any]:
+    """Motors, limits and springs of the free coordinates, each with the index of its joint."""
+    motors, limits, springs = [], [], []
+    for index, joint in enumerate(scene.constraints):
+        if not isinstance(joint, AxialJoint):
+            continue
+        if (motor := joint.motor) is not None:
+            force = _or(motor.max_force, math.inf)
+            motors.append({"joint": index, "speed": motor.speed, "max_force": force})
+        if (limit := joint.limit) is not None:
+            limits.append(
+                {
+                    "joint": index,
+                    "lower": limit.lower,
+                    "upper": limit.upper,
+                    "compliance": limit.compliance,
+                    "damping": _or(limit.damping, 2.0 * step),
+                }
+            )
+        if (spring := joint.spring) is not None:
+            springs.append(
+                {
+                    "joint": index,
+                    "stiffness": spring.stiffness,
+                    "rest": spring.rest,
+                    "damping": _or(spring.damping, 2.0 * step),
+                }
+            )
+    return {"motors": table(motors), "limits": table(limits), "joint_springs": table(springs)}
 
 
 def _or(value: float | None, default: float) -> float:
@@ -238,11 +261,10 @@ def _axes(joint: Joint) -> tuple[float, ...]:
     return _WORLD_AXES
 
 
-def _colliders(scene: Scene) -> tuple[list[tuple[int, int]], list[tuple[float, ...]]]:
-    kinds: list[tuple[int, int]] = []
-    rows: list[tuple[float, ...]] = []
+def _colliders(scene: Scene) -> list[dict[str, Any]]:
+    colliders: list[dict[str, Any]] = []
     if not scene.contacts:
-        return kinds, rows
+        return colliders
     for index, body in enumerate(scene.bodies):
         if not isinstance(body, RigidBody) or body.shape is None:
             continue
@@ -251,19 +273,20 @@ def _colliders(scene: Scene) -> tuple[list[tuple[int, int]], list[tuple[float, .
             if isinstance(body.shape, Compound)
             else [(_ORIGIN, _UPRIGHT, body.shape)]
         )
-        for place, turn, shape in placed:
-            kind, size = _primitive(shape)
-            kinds.append((index, kind))
-            rows.append((*place, *turn, *size))
-    return kinds, rows
+        for position, orientation, shape in placed:
+            colliders.append(
+                {"body": index, "position": position, "orientation": orientation} | _primitive(shape)
+            )
+    return colliders
 
 
-def _primitive(shape: Shape) -> tuple[int, Vector]:
+def _primitive(shape: Shape) -> dict[str, Any]:
+    columns: dict[str, Any] = {"radius": 0.0, "length": 0.0, "size": _ORIGIN, "normal": _ORIGIN}
     if isinstance(shape, Sphere):
-        return 0, (shape.radius, 0.0, 0.0)
+        return columns | {"kind": "sphere", "radius": shape.radius}
     if isinstance(shape, Capsule):
-        return 1, (shape.radius, shape.length, 0.0)
+        return columns | {"kind": "capsule", "radius": shape.radius, "length": shape.length}
     if isinstance(shape, Box):
-        return 2, shape.size
+        return columns | {"kind": "box", "size": shape.size}
     assert isinstance(shape, Plane)
-    return 3, shape.normal
+    return columns | {"kind": "plane", "normal": shape.normal}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from spook_tracker.engine.errors import SimulationFailed
+from spook_tracker.engine.result import SimulationFailed
 from spook_tracker.scalar_tests.case import Curve
 
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from spook_tracker.engine.errors import SimulationFailed
-from spook_tracker.engine.result import Result
+from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Figure,

@@ -1,7 +1,6 @@
 // The block factor against a dense elimination with pivoting in long double, and the promises of its ordering.
 #include "linear/block_ldlt.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -288,30 +287,19 @@ void a_malformed_graph_is_refused() {
     EXPECT(refused({{6, 6}, {{0, 2}}, {0, 1}}));
 }
 
-void large_chains_are_analysed_in_linear_time() {
-    using clock = std::chrono::steady_clock;
-    for (int n : {100, 10000, 100000}) {
+/// Work and memory grow with the chain. Quadratic time would take minutes here and meet the time limit of the test.
+void a_large_chain_costs_no_more_per_body_than_a_small_one() {
+    double work[2];
+    for (const int n : {1000, 100000}) {
         const System s = chain(n);
         BlockLdlt a;
-        const auto start = clock::now();
         a.analyse(s.sizes, s.edges, s.is_constraint);
-        const double analysis = std::chrono::duration<double>(clock::now() - start).count();
         fill_values(a, s, 1e-6);
-        std::vector<double> rhs(a.unknowns(), 1.0), x(a.unknowns());
-        double best[2] = {1e9, 1e9};
-        for (int round = 0; round < 2000000 / n / 10 + 3; ++round) {
-            const auto t0 = clock::now();
-            EXPECT(a.factor(1e-12));
-            const auto t1 = clock::now();
-            a.solve_refined(rhs.data(), x.data(), 1);
-            const auto t2 = clock::now();
-            best[0] = std::min(best[0], std::chrono::duration<double>(t1 - t0).count());
-            best[1] = std::min(best[1], std::chrono::duration<double>(t2 - t1).count());
-        }
-        std::printf("chain of %6d: analysis %.0f ns, factor %.0f ns, refined solve %.0f ns per body\n", n,
-                    analysis / n * 1e9, best[0] / n * 1e9, best[1] / n * 1e9);
-        EXPECT(analysis < 60e-6 * n);
+        EXPECT(a.factor(1e-12));
+        EXPECT(a.fill() == 0);
+        work[n > 1000] = static_cast<double>(a.counters().block_operations) / n;
     }
+    EXPECT_NEAR(work[1] / work[0], 1.0, 0.01);
 }
 
 }  // namespace
@@ -327,6 +315,6 @@ int main() {
     equal_input_gives_equal_bits_on_every_instruction_set();
     counts_are_exact();
     a_malformed_graph_is_refused();
-    large_chains_are_analysed_in_linear_time();
+    a_large_chain_costs_no_more_per_body_than_a_small_one();
     return report();
 }

@@ -34,8 +34,12 @@ ParticleScene chain(int links) {
     return scene;
 }
 
+ParticleSystem system_of(const ParticleScene& scene) {
+    return {scene, StageList(choose_stages(scene, false))};
+}
+
 Vec3 tip_after(const ParticleScene& scene, int steps) {
-    ParticleSystem system(scene);
+    ParticleSystem system = system_of(scene);
     system.reset(nullptr);
     system.advance(steps);
     return system.position(static_cast<int>(scene.bodies.size()) - 1);
@@ -54,7 +58,7 @@ void a_step_allocates_nothing() {
         ParticleProgram program(
             scene, {{"violation", -1, {}}, {"energy", -1, {}}},
             {{0, Reduction::maximum_absolute, 0, -1, false, 1}, {1, Reduction::final, 0, -1, false, 1}});
-        ParticleSystem system(scene);
+        ParticleSystem system = system_of(scene);
         system.reset(nullptr);
         system.advance(1);
         const long before = allocations;
@@ -88,11 +92,47 @@ void every_direct_solver_gives_one_answer() {
     EXPECT(norm(tip_after(scene, 60) - path) < 1e-8);
 }
 
+template <class Build> bool is_refused(Build build) {
+    try {
+        build();
+    } catch (const std::invalid_argument&) {
+        return true;
+    }
+    return false;
+}
+
+/// Nothing but the list decides: what it leaves out does not happen, what it cannot have is refused.
+void only_the_listed_stages_run() {
+    ParticleScene falling = chain(1);
+    falling.rows.clear();
+    falling.bodies[0].load = {3.0, 0.0, 0.0};
+    const auto after = [&](StageList stages) {
+        ParticleSystem system(falling, stages);
+        system.reset(nullptr);
+        system.advance(10);
+        return system.position(0) - falling.bodies[0].position;
+    };
+    const Stage fall = Stage::apply_gravity, load = Stage::apply_loads, move = Stage::integrate_positions;
+    EXPECT(is_zero(after({move})));
+    EXPECT(after({fall, move}).z < -0.1 && after({fall, move}).x == 0.0);
+    EXPECT(after({load, move}).z == 0.0 && after({load, move}).x > 0.04);
+    EXPECT(is_refused([&] { after({fall}); }));
+    EXPECT(is_refused([&] { after({move, Stage::collision}); }));
+    EXPECT(is_refused([&] { after({move, Stage::solve_path}); }));
+    EXPECT(is_refused([&] { ParticleSystem(chain(2), {fall, move}); }));
+    ParticleScene ring = chain(3);
+    ring.rows[0].ends[0] = {2, {}};
+    EXPECT(is_refused([&] { ParticleSystem(ring, {Stage::assemble_rows, Stage::solve_path, move}); }));
+    const std::vector<Stage> all =
+        ParticleSystem(ring, {move, Stage::solve_block, Stage::assemble_rows}).stages().taken();
+    EXPECT((all == std::vector{Stage::assemble_rows, Stage::solve_block, move}));
+}
+
 void scattered_rows_are_put_in_order() {
     ParticleScene scene = chain(5), scattered = scene;
     std::swap(scattered.rows[0], scattered.rows[3]);
     std::swap(scattered.rows[2].ends[0], scattered.rows[2].ends[1]);
-    EXPECT(ParticleSystem(scattered).solver() == ParticleSolver::path);
+    EXPECT(system_of(scattered).solver() == ParticleSolver::path);
     EXPECT(norm(tip_after(scene, 60) - tip_after(scattered, 60)) < 1e-12);
 }
 
@@ -100,7 +140,7 @@ void loops_and_branches_are_no_paths() {
     ParticleScene ring = chain(3);
     ring.rows[0].ends[0] = {2, {}};
     EXPECT(find_paths(ring).empty());
-    EXPECT(ParticleSystem(ring).solver() == ParticleSolver::block);
+    EXPECT(system_of(ring).solver() == ParticleSolver::block);
     ParticleScene branch = chain(3);
     branch.rows[2].ends[0].body = 0;
     EXPECT(find_paths(branch).empty());
@@ -174,6 +214,7 @@ void every_way_through_a_step_gives_the_same_bits() {
 int main() {
     a_step_allocates_nothing();
     every_direct_solver_gives_one_answer();
+    only_the_listed_stages_run();
     scattered_rows_are_put_in_order();
     loops_and_branches_are_no_paths();
     a_runaway_names_its_step_and_body();

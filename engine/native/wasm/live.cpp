@@ -148,7 +148,7 @@ char* live_name() { return name; }
 
 int live_observe(int index, double other, int every) {
     const int number = static_cast<int>(live->quantities.size());
-    live->quantities.push_back({name, index, {other, 0.0, 0.0}});
+    live->quantities.push_back({name, index, {}, static_cast<int>(other)});
     Observation trace;
     trace.quantity = number;
     trace.reduction = Reduction::trace;

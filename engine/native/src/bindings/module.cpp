@@ -9,17 +9,17 @@
 
 namespace spook {
 
-std::vector<Observation> to_observations(const std::vector<ObservationTuple>& tuples) {
-    static constexpr const char* NAMES[] = {"trace", "final", "maximum", "minimum", "maximum_absolute",
-                                            "mean"};
-    std::vector<Observation> observations;
-    for (const auto& [quantity, reduction, first, last, from_start, every] : tuples) {
-        const auto name = std::find(std::begin(NAMES), std::end(NAMES), reduction);
-        if (name == std::end(NAMES)) throw std::invalid_argument("there is no reduction " + reduction);
-        observations.push_back(
-            {quantity, static_cast<Reduction>(name - std::begin(NAMES)), first, last, from_start, every});
-    }
-    return observations;
+nb::list to_list(const StageChoices& choices) {
+    nb::list list;
+    for (std::size_t k = 0; k < STAGES; ++k)
+        list.append(nb::make_tuple(to_text(static_cast<Stage>(k)), choices[k].kept, choices[k].reason));
+    return list;
+}
+
+nb::list to_list(const std::vector<Stage>& stages) {
+    nb::list list;
+    for (const Stage stage : stages) list.append(to_text(stage));
+    return list;
 }
 
 nb::object to_array(const std::vector<double>& values, std::size_t rows, std::size_t columns) {
@@ -53,6 +53,33 @@ nb::dict to_dict(const RunReport& report) {
     return out;
 }
 
+namespace {
+
+void bind_observing(nb::module_& m) {
+    nb::class_<QuantityRequest>(m, "QuantityRequest", "A quantity of the state, by name.")
+        .def(
+            "__init__",
+            [](QuantityRequest* self, const std::string& kind, int index, const Point& point, int other) {
+                from_text<Quantity>(kind, "quantity");
+                new (self) QuantityRequest{kind, index, to_vec(point), other};
+            },
+            nb::arg("kind"), nb::arg("index"), nb::arg("point"), nb::arg("other"),
+            "index: of a body, row or joint, -1 for all; point: centre of an angular momentum;\n"
+            "other: the other body of a contact force, -1 for all.");
+    nb::class_<Observation>(m, "Observation", "How a quantity is reduced over samples first to last.")
+        .def(
+            "__init__",
+            [](Observation* self, int quantity, const std::string& reduction, std::int64_t first,
+               std::int64_t last, bool from_start, std::int64_t every) {
+                const Reduction kind = from_text<Reduction>(reduction, "reduction");
+                new (self) Observation{quantity, kind, first, last, from_start, every};
+            },
+            nb::arg("quantity"), nb::arg("reduction"), nb::arg("first"), nb::arg("last"),
+            nb::arg("from_start"), nb::arg("every"),
+            "quantity: index of its request; last: -1 for the last step; every: traces only.");
+}
+
+}  // namespace
 }  // namespace spook
 
 NB_MODULE(_core, m) {
@@ -69,6 +96,7 @@ NB_MODULE(_core, m) {
         nanobind::gil_scoped_acquire hold;
         return PyErr_CheckSignals() != 0;
     };
+    spook::bind_observing(m);
     spook::bind_particles(m);
     spook::bind_rigid(m);
 }

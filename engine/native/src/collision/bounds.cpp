@@ -27,8 +27,9 @@ double reach(const Primitive& shape) noexcept {
         case ShapeKind::sphere: return shape.radius;
         case ShapeKind::capsule: return shape.half_length + shape.radius;
         case ShapeKind::box: return norm(shape.half);
-        default: return std::numeric_limits<double>::infinity();
+        case ShapeKind::plane: break;
     }
+    return std::numeric_limits<double>::infinity();
 }
 
 }  // namespace spook

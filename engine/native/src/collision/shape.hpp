@@ -4,11 +4,12 @@
 #include <cstdint>
 
 #include "linear/vec.hpp"
+#include "run/named_enum.hpp"
 
 namespace spook {
 
 /// The order matters: the narrow phase knows each pair with the lower kind first.
-enum class ShapeKind : std::uint8_t { sphere, capsule, box, plane };
+SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, plane)
 
 struct Pose {
     Vec3 position;                     // m

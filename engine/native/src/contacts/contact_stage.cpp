@@ -160,8 +160,9 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
                     return solve_iterative(island, own, o.friction, o.iterations, o.residual_tolerance);
                 case SolverKind::hybrid:
                     return solve_hybrid(island, own, o.friction, solver, o.iterations, o.residual_tolerance);
-                default: return solve_friction_direct(island, own, o.friction, solver);
+                case SolverKind::direct: break;
             }
+            return solve_friction_direct(island, own, o.friction, solver);
         });
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;

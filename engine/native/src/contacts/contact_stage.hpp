@@ -29,10 +29,11 @@
 #include "contacts/contact_material.hpp"
 #include "contacts/friction_direct.hpp"
 #include "contacts/friction_sweeps.hpp"
+#include "run/named_enum.hpp"
 
 namespace spook {
 
-enum class SolverKind : unsigned char { direct, iterative, hybrid };
+SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
 
 struct ContactOptions {
     double time_step = 0.0;

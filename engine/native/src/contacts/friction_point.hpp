@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "contacts/pivot_system.hpp"
+#include "run/named_enum.hpp"
 
 namespace spook {
 
 /// cone: |beta| <= mu nu, isotropic. box: each |beta_i| <= mu nu of the step before, tangents along world axes.
 /// scaled_box: the box with the normal force of this step.
-enum class FrictionModel : unsigned char { cone, box, scaled_box };
+SPOOK_NAMED_ENUM(FrictionModel, cone, box, scaled_box)
 
 /// A block of three rows of one contact: 0 the normal, 1 and 2 the tangents.
 struct FrictionPoint {

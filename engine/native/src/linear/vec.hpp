@@ -40,6 +40,7 @@ constexpr Vec3 cross(Vec3 a, Vec3 b) noexcept {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline double norm(Vec3 a) noexcept { return std::sqrt(dot(a, a)); }
+constexpr bool is_zero(Vec3 a) noexcept { return a.x == 0.0 && a.y == 0.0 && a.z == 0.0; }
 inline bool finite(Vec3 a) noexcept { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 
 /// Row-major 3×3 matrix.

@@ -58,7 +58,7 @@ void ParticleSystem::analyse_blocks() {
         };
         if (a >= 0) at.a = edge(a, at.row);
         if (b >= 0) at.b = edge(b, at.row);
-        if (a >= 0 && b >= 0 && scene_.method.string_stiffness) {
+        if (a >= 0 && b >= 0 && stiff_strings_) {
             const auto pair = std::minmax(a, b);
             const auto [found, fresh] = between.try_emplace(pair, -1);
             if (fresh) found->second = edge(pair.first, pair.second);
@@ -86,7 +86,7 @@ void ParticleSystem::factor_blocks() {
         if (at.b >= 0) put(ldlt_.coupling(at.b), link_[k].u);
     }
     std::fill(saddle_rhs_.begin(), saddle_rhs_.end(), 0.0);
-    if (scene_.method.string_stiffness) stiffen_strings();
+    if (stiff_strings_) stiffen_strings();
     factor_saddle();
 }
 

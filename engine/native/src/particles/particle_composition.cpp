@@ -96,13 +96,13 @@ void ParticleSystem::drift_kick(double tau) noexcept {
     find_kicks();
     for (std::size_t node = 0; node < x_.size(); ++node) v_[node] += part * kick_[node];
     pending_ = 0.5 * tau;
-    if (clock_) clock_->mark(scene_.fields.empty() ? Stage::apply_gravity : Stage::apply_central_gravity);
+    if (clock_) clock_->mark(fields_.empty() ? Stage::apply_gravity : Stage::apply_central_gravity);
 }
 
 void ParticleSystem::find_kicks() noexcept {
     if (!moving_forces_) return;
     kick_ = steady_kick_;
-    if (!scene_.fields.empty()) apply_central_gravity();
+    if (!fields_.empty()) apply_central_gravity();
     if (!springs_.empty()) apply_springs();
 }
 

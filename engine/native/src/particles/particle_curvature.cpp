@@ -20,7 +20,7 @@ void ParticleSystem::bend_rows_back() noexcept {
 }
 
 void ParticleSystem::correct_curvature() {
-    for (int round = 0; round < scene_.method.corrections; ++round) {
+    for (int round = 0; round < corrections_; ++round) {
         trial_ = v_;
         kick_nodes(trial_);
         for (std::size_t k = 0; k < row_.size(); ++k) {
@@ -39,11 +39,11 @@ void ParticleSystem::correct_curvature() {
 /// none and moves light bodies under a heavy load far too fast; its tensions are right all the same.
 void ParticleSystem::find_tensions() {
     kick_ = steady_kick_;
-    if (!scene_.fields.empty()) apply_central_gravity();
+    if (!fields_.empty()) apply_central_gravity();
     if (!springs_.empty()) apply_springs();
     for (int round = 0; round < 3; ++round) {
         assemble_rows();
-        if (scene_.method.corrections > 0) bend_rows_back();
+        if (corrections_ > 0) bend_rows_back();
         solve_rows();
     }
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
@@ -53,13 +53,13 @@ void ParticleSystem::find_tensions() {
 /// way back; with v constant that is −h Ġ v, found first, and with curved constraints it is iterated.
 void ParticleSystem::half_kick_back() {
     kick_ = steady_kick_;
-    if (!scene_.fields.empty()) apply_central_gravity();
+    if (!fields_.empty()) apply_central_gravity();
     if (!springs_.empty()) apply_springs();
     const std::vector<Vec3> start = v_;
     if (solver_ != ParticleSolver::none) {
         assemble_rows();
         for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
-        for (int round = 0; round <= 3 * scene_.method.corrections; ++round) {
+        for (int round = 0; round <= 3 * corrections_; ++round) {
             for (std::size_t k = 0; k < row_.size(); ++k) {
                 const Row& row = row_[k];
                 const double back = curvature(link_[k].u, link_[k].length, -h_ * (v_[row.b] - v_[row.a]));
@@ -75,7 +75,7 @@ void ParticleSystem::half_kick_back() {
     } else {
         for (std::size_t node = 0; node < v_.size(); ++node) v_[node] -= 0.5 * kick_[node];
     }
-    if (!scene_.method.string_stiffness)
+    if (!stiff_strings_)
         for (Link& link : link_) link.lambda = 0.0;
     sweeps_ = 0;
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);

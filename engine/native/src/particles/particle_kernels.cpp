@@ -11,7 +11,7 @@ namespace spook {
 /// steps with its state in registers.
 void ParticleSystem::fly(std::int64_t steps) noexcept {
     const double h = h_;
-    if (scene_.fields.empty()) {
+    if (fields_.empty()) {
         for (std::size_t node = 0; node < x_.size(); ++node) {
             Vec3 x = x_[node], v = v_[node];
             const Vec3 kick = steady_kick_[node];
@@ -24,8 +24,8 @@ void ParticleSystem::fly(std::int64_t steps) noexcept {
         }
         return;
     }
-    const Vec3 centre = scene_.fields[0].centre;
-    const double pull = h * scene_.fields[0].strength;
+    const Vec3 centre = fields_[0].centre;
+    const double pull = h * fields_[0].strength;
     for (std::size_t node = 0; node < x_.size(); ++node) {
         Vec3 x = x_[node], v = v_[node];
         const Vec3 kick = steady_kick_[node];
@@ -44,7 +44,7 @@ void ParticleSystem::fly(std::int64_t steps) noexcept {
 /// Each correction of the curvature adds a pass down, with the same factor, and one up.
 template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcept {
     const double h = h_, fraction = scene_.method.correction_cap;
-    const int corrections = Curved ? scene_.method.corrections : 0;
+    const int corrections = Curved ? corrections_ : 0;
     Vec3* const x = x_.data();
     Vec3* const v = v_.data();
     Vec3* const trial = trial_.data();
@@ -141,7 +141,7 @@ template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcep
 }
 
 void ParticleSystem::swing(std::int64_t steps) noexcept {
-    if (scene_.method.corrections > 0) swing_by<true>(steps);
+    if (corrections_ > 0) swing_by<true>(steps);
     else swing_by<false>(steps);
 }
 

@@ -2,36 +2,41 @@
 #include "particles/particle_system.hpp"
 
 #include <algorithm>
+#include <stdexcept>
+#include <utility>
 
 #include "particles/path_order.hpp"
 #include "run/composition.hpp"
 
 namespace spook {
 
-namespace {
-
-/// A path between two points of the world without any compliance: stretched out straight, each of its rows says
-/// what the others say. An open end, a bend or a compliance anywhere keeps the rows independent.
-bool rigid_between_anchors(const ParticleScene& scene, const Path& path) {
-    return path.nodes.front() < 0 && path.nodes.back() < 0 &&
-           std::all_of(
-               path.rows.begin(), path.rows.end(),
-               [&](int row) { return scene.rows[row].compliance == 0.0; });
-}
-
-}  // namespace
-
-ParticleSystem::ParticleSystem(const ParticleScene& scene)
-    : scene_(scene), h_(scene.method.time_step / scene.method.substeps) {
-    const std::vector<Path> paths = find_paths(scene);
-    if (!scene.rows.empty()) {
-        held_twice_ = std::any_of(paths.begin(), paths.end(),
-                                  [&](const Path& path) { return rigid_between_anchors(scene, path); });
-        solver_ = paths.empty() || held_twice_ || scene.method.force_block || scene.method.string_stiffness
-                      ? ParticleSolver::block
-                      : ParticleSolver::path;
-        if (scene.method.iterative) solver_ = ParticleSolver::iterative;
+ParticleSystem::ParticleSystem(const ParticleScene& scene, StageList stages)
+    : scene_(scene), h_(scene.method.time_step / scene.method.substeps), stages_(std::move(stages)) {
+    std::vector<Path> paths;
+    if (stages_.take(Stage::assemble_rows)) {
+        if (stages_.take(Stage::solve_path)) {
+            solver_ = ParticleSolver::path;
+            paths = find_paths(scene);
+            if (paths.empty()) throw std::invalid_argument("the stage solve_path needs rows in open paths");
+        } else if (stages_.take(Stage::solve_block)) {
+            solver_ = ParticleSolver::block;
+            stiff_strings_ = stages_.take(Stage::string_stiffness);
+        } else if (stages_.take(Stage::solve_iterative)) {
+            solver_ = ParticleSolver::iterative;
+        }
+        if (stages_.take(Stage::correct_curvature)) corrections_ = scene.method.corrections;
     }
+    if (solver_ == ParticleSolver::none && !scene.rows.empty())
+        throw std::invalid_argument("rows need the stage assemble_rows and one that solves them");
+    half_step_ = stages_.take(Stage::half_step);
+    composed_ = half_step_ && scene.method.composition > 2;
+    const bool weighs = stages_.take(Stage::apply_gravity), loaded = stages_.take(Stage::apply_loads);
+    if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
+    const bool sprung = stages_.take(Stage::apply_springs);
+    stages_.take(Stage::observe);
+    if (!stages_.take(Stage::integrate_positions))
+        throw std::invalid_argument("particles need the stage integrate_positions");
+    stages_.expect_all_taken("particles");
     node_of_body_.assign(scene.bodies.size(), -1);
     slot_of_row_.assign(scene.rows.size(), 0);
     if (solver_ == ParticleSolver::path) lay_out_paths(paths);
@@ -41,7 +46,7 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
         node_of_body_[body] = static_cast<int>(x_.size());
         anchor(scene.bodies[body].position);
     }
-    for (const SpringForce& spring : scene.springs) {
+    for (const SpringForce& spring : sprung ? scene.springs : std::vector<SpringForce>{}) {
         int node[2];
         for (int side = 0; side < 2; ++side) {
             const End& end = spring.ends[side];
@@ -54,13 +59,13 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
         const int node = node_of_body_[body];
         body_of_node_[node] = static_cast<int>(body);
         w_[node] = 1.0 / scene.bodies[body].mass;
-        steady_kick_[node] = h_ * (scene.gravity + w_[node] * scene.bodies[body].load);
+        const Vec3 load = loaded ? scene.bodies[body].load : Vec3{};
+        steady_kick_[node] = h_ * ((weighs ? scene.gravity : Vec3{}) + w_[node] * load);
     }
     for (Row& row : row_) {
         row.stiff = w_[row.a] + w_[row.b];
         row.diagonal = row.stiff + row.softness;
     }
-    composed_ = scene.method.composition > 2;
     if (composed_) {
         history_.resize(3 * row_.size() * composition_stages(scene.method.composition).size());
         for (int depth = 0; depth < MOST_HALVINGS; ++depth) {
@@ -68,7 +73,7 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene)
             step_v_[depth].reserve(x_.size());
         }
     }
-    moving_forces_ = !scene.fields.empty() || !springs_.empty();
+    moving_forces_ = !fields_.empty() || !springs_.empty();
     v_.resize(x_.size());
     kick_ = steady_kick_;
     trial_.resize(x_.size());
@@ -145,9 +150,9 @@ void ParticleSystem::reset(StageClock* clock) {
     for (Link& link : link_) link = {};
     std::fill(seen_lambda_.begin(), seen_lambda_.end(), 0.0);
     seen_v_ = v_;
-    if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) find_tensions();
+    if (stiff_strings_ && solver_ == ParticleSolver::block) find_tensions();
     if (composed_) start_composition();
-    else if (scene_.method.half_step_velocities) half_kick_back();
+    else if (half_step_) half_kick_back();
     save();
 }
 

@@ -14,7 +14,7 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     seen_v_ = v_;
     if (composed_) {
         if (sample > 0) read_composition();
-    } else if (scene_.method.half_step_velocities) {
+    } else if (half_step_) {
         velocity_stage<false>();
         velocity_ready_ = true;
         for (std::size_t node = 0; node < v_.size(); ++node) seen_v_[node] = 0.5 * (seen_v_[node] + v_[node]);
@@ -78,11 +78,11 @@ void ParticleSystem::restore() {
 void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
     const std::int64_t inner = steps * scene_.method.substeps;
     const auto rows = static_cast<std::int64_t>(row_.size());
-    const std::int64_t passes = 1 + scene_.method.corrections;
+    const std::int64_t passes = 1 + corrections_;
     report.counters["steps"] = steps;
     report.counters["substeps"] = inner;
     report.counters["force_evaluations"] =
-        inner * static_cast<std::int64_t>(springs_.size() + scene_.fields.size() * scene_.bodies.size());
+        inner * static_cast<std::int64_t>(springs_.size() + fields_.size() * scene_.bodies.size());
     report.counters["rows_assembled"] = inner * rows;
     report.counters["contacts"] = 0;
     report.counters["sweeps"] = sweeps_;
@@ -114,7 +114,7 @@ std::vector<double> ParticleSystem::final_state() {
     if (composed_) {
         read_composition();
         reported = seen_v_;
-    } else if (scene_.method.half_step_velocities) {
+    } else if (half_step_) {
         if (velocity_ready_) reported = seen_v_;
         else {
             velocity_stage<false>();
@@ -145,7 +145,7 @@ double ParticleSystem::potential_energy() const noexcept {
     double energy = 0.0;
     for (int body = 0; body < bodies(); ++body) {
         energy -= mass(body) * dot(scene_.gravity, position(body));
-        for (const CentralField& field : scene_.fields)
+        for (const CentralField& field : fields_)
             energy -= mass(body) * field.strength / norm(position(body) - field.centre);
     }
     for (const SpringNodes& s : springs_) {

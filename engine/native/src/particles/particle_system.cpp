@@ -15,7 +15,7 @@ void ParticleSystem::advance(std::int64_t steps) {
         velocity_ready_ = false;
         --steps;
     }
-    if (solver_ == ParticleSolver::none && springs_.empty() && scene_.fields.size() <= 1) fly(steps);
+    if (solver_ == ParticleSolver::none && springs_.empty() && fields_.size() <= 1) fly(steps);
     else if (solver_ == ParticleSolver::path && !moving_forces_) swing(steps);
     else advance_by<false>(steps);
 }
@@ -34,7 +34,7 @@ template <bool Timed> void ParticleSystem::velocity_stage() {
     if (moving_forces_) {
         kick_ = steady_kick_;
         mark<Timed>(Stage::apply_gravity);
-        if (!scene_.fields.empty()) {
+        if (!fields_.empty()) {
             apply_central_gravity();
             mark<Timed>(Stage::apply_central_gravity);
         }
@@ -49,13 +49,13 @@ template <bool Timed> void ParticleSystem::velocity_stage() {
         return;
     }
     assemble_rows();
-    if (scene_.method.corrections > 0) bend_rows_back();
+    if (corrections_ > 0) bend_rows_back();
     mark<Timed>(Stage::assemble_rows);
     solve_rows();
     mark<Timed>(solver_ == ParticleSolver::path    ? Stage::solve_path
                 : solver_ == ParticleSolver::block ? Stage::solve_block
                                                    : Stage::solve_iterative);
-    if (scene_.method.corrections > 0) {
+    if (corrections_ > 0) {
         correct_curvature();
         mark<Timed>(Stage::correct_curvature);
     }
@@ -68,7 +68,7 @@ void ParticleSystem::position_stage() noexcept {
 }
 
 void ParticleSystem::apply_central_gravity() noexcept {
-    for (const CentralField& field : scene_.fields)
+    for (const CentralField& field : fields_)
         for (std::size_t node = 0; node < x_.size(); ++node) {
             if (w_[node] == 0.0) continue;
             const Vec3 d = x_[node] - field.centre;
@@ -155,7 +155,7 @@ void ParticleSystem::solve_iterative() noexcept {
 void ParticleSystem::kick_nodes(std::vector<Vec3>& v) const noexcept {
     if (solver_ == ParticleSolver::path) return kick_paths(v);
     for (std::size_t node = 0; node < v.size(); ++node) v[node] += kick_[node];
-    if (scene_.method.string_stiffness && solver_ == ParticleSolver::block) {
+    if (stiff_strings_ && solver_ == ParticleSolver::block) {
         for (std::size_t node = 0; node < v.size(); ++node)
             if (block_of_node_[node] >= 0)
                 v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));

@@ -18,6 +18,7 @@
 #include "run/report.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
+#include "run/stages.hpp"
 
 namespace spook {
 
@@ -31,12 +32,13 @@ inline double curvature(Vec3 u, double length, Vec3 s) noexcept {
 
 class ParticleSystem {
 public:
-    explicit ParticleSystem(const ParticleScene& scene);
+    /// Built from the stages; throws std::invalid_argument for those it cannot run, or for rows nobody solves.
+    ParticleSystem(const ParticleScene& scene, StageList stages);
+
+    const StageList& stages() const noexcept { return stages_; }
 
     ParticleSolver solver() const noexcept { return solver_; }
     const std::vector<int>& node_of_body() const noexcept { return node_of_body_; }
-    /// Whether the rows form open paths, but one of them is rigid and held at both ends: it may be redundant.
-    bool held_twice() const noexcept { return held_twice_; }
 
     // --- what run_loop asks for ---
     void advance(std::int64_t steps);
@@ -139,7 +141,11 @@ private:
 
     ParticleScene scene_;
     double h_;  // s, of a substep
+    StageList stages_;
     ParticleSolver solver_ = ParticleSolver::none;
+    bool stiff_strings_ = false, half_step_ = false;
+    int corrections_ = 0;  // extra solves per step for the curvature of the rows
+    std::vector<CentralField> fields_;
     bool moving_forces_ = false;   // forces that depend on the state
     bool velocity_ready_ = false;  // the velocity stage of the coming step is already done
     std::int64_t block_ = 1024;
@@ -164,8 +170,7 @@ private:
     std::vector<RowBlocks> row_blocks_;
     std::vector<double> saddle_rhs_, saddle_, saddle_left_;
     std::int64_t operations_at_start_ = 0;
-    bool solvable_ = true;  // false: the factor met a value that is not finite, so nothing it gives is used
-    bool held_twice_ = false;
+    bool solvable_ = true;    // false: the factor met a value that is not finite, so nothing it gives is used
     bool redundant_ = false;  // the last factor has floors: some row says what others say
     double share_ = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
     int contradicted_ = -1;  // a body held by rows that cannot hold together

@@ -41,14 +41,12 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             if (spec.has_motor) {
                 axial.speed = spec.motor_speed;
                 axial.impulse = time_step * spec.motor_force;
-                block.bounded = std::isfinite(axial.impulse);
                 block.softness[block.size++] = 0.0;
             }
             if (spec.has_limit) {
                 axial.lower = spec.limit_lower;
                 axial.upper = spec.limit_upper;
                 axial.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
-                block.bounded = block.bounded || axial.lower < axial.upper;
                 block.softness[block.size++] = axial.limit.softness;
             }
             if (spec.has_spring) {

@@ -19,7 +19,6 @@ struct JointBlock {
     int first = -1, second = -1;  // bodies of the scene, −1 the world
     int size = 1;
     std::array<double, 6> softness{};
-    bool bounded = false;  // some row has a finite bound
 };
 
 /// The numbers of a block in one step, besides its Jacobians. A row reads

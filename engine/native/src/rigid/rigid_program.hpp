@@ -1,29 +1,15 @@
-// A compiled rigid-body scene with its observables: what Python holds and runs.
+// A compiled rigid-body scene with its observables.
 #pragma once
 
-#include <string>
-#include <vector>
-
-#include "particles/particle_program.hpp"
+#include "rigid/rigid_stages.hpp"
 #include "rigid/rigid_system.hpp"
+#include "run/program.hpp"
 
 namespace spook {
 
-/// Quantities are those of QuantityRequest; two more use `index`: "joint_coordinate" (joint) and
-/// "contact_force" (body, and `other` in point.x, −1 for all).
-class RigidProgram {
-public:
-    RigidProgram(const RigidScene& scene, const std::vector<QuantityRequest>& quantities,
-                 std::vector<Observation> observations);
+/// The sampler of a quantity; it reads `system`, which must outlive it. Throws std::invalid_argument.
+Sampler sampler_of(RigidSystem& system, const QuantityRequest& request);
 
-    /// Run from the start. time_limit in s, 0 for none; timed asks for seconds by stage.
-    RunReport run(std::int64_t steps, double time_limit, bool timed);
-    const char* solver() const noexcept;
-    bool contacts_possible() const noexcept { return system_.contacts_possible(); }
-
-private:
-    RigidSystem system_;
-    Recorder recorder_;
-};
+using RigidProgram = Program<RigidSystem>;
 
 }  // namespace spook

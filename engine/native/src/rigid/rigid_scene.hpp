@@ -2,16 +2,18 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "collision/detection.hpp"
 #include "contacts/contact_stage.hpp"
 #include "linear/vec.hpp"
+#include "run/named_enum.hpp"
 
 namespace spook {
 
-enum class Motion { dynamic, fixed, kinematic };
-enum class JointKind { distance, lock, ball, hinge, prismatic, universal };
+SPOOK_NAMED_ENUM(Motion, dynamic, fixed, kinematic)
+SPOOK_NAMED_ENUM(JointKind, distance, lock, ball, hinge, prismatic, universal)
 
 struct RigidBodySpec {
     Motion motion = Motion::dynamic;
@@ -47,8 +49,16 @@ constexpr int row_count(JointKind kind) noexcept {
         case JointKind::lock: return 6;
         case JointKind::ball: return 3;
         case JointKind::universal: return 4;
-        default: return 5;
+        case JointKind::hinge:
+        case JointKind::prismatic: return 5;
     }
+    return 0;
+}
+
+/// Whether some row of the joint has a finite bound.
+inline bool can_let_go(const JointSpec& joint) noexcept {
+    return (joint.has_motor && std::isfinite(joint.motor_force)) ||
+           (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }
 
 struct RigidSpring {
@@ -72,6 +82,7 @@ struct RigidMethod {
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
     bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs
+    bool force_rotation = false;   // give particles a rotation nobody sees, to measure what it costs
 };
 
 struct RigidScene {
@@ -81,6 +92,7 @@ struct RigidScene {
     std::vector<RigidField> fields;
     std::vector<Collider> colliders;    // of all bodies that can touch
     std::vector<IndexPair> no_contact;  // pairs of bodies that never touch
+    bool contacts = true;               // false: the scene switches them off
     Vec3 gravity;
     RigidMethod method;
 };

@@ -249,7 +249,7 @@ void RigidSystem::solve_mixed(bool touching) {
     const auto blocks = joints_.blocks();
     mixed_.rows.resize(blocks.size());
     fill_masses();
-    if (touching && contacts_->impact_needed()) impact();
+    if (touching && stages_.runs(Stage::impact) && contacts_->impact_needed()) impact();
     fill_momenta(true);
     fill_rows();
     if (clock_) clock_->mark(Stage::assemble_rows);

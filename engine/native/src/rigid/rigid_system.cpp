@@ -2,34 +2,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace spook {
 
-RigidSystem::RigidSystem(const RigidScene& scene)
-    : springs_(scene.springs),
-      fields_(scene.fields),
+namespace {
+
+/// A particle with a rotation nobody sees, to measure what its stages cost.
+RigidBodySpec turning(RigidBodySpec body) {
+    body.particle = false;
+    body.inertia = {body.mass, body.mass, body.mass};
+    return body;
+}
+
+}  // namespace
+
+RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
+    : stages_(std::move(stages)),
       gravity_(scene.gravity),
       method_(scene.method),
       h_(scene.method.time_step / scene.method.substeps),
       joints_(scene, h_) {
-    for (const RigidBodySpec& spec : scene.bodies) {
+    take_stages(scene);
+    const bool weighs = stages_.runs(Stage::apply_gravity), loaded = stages_.runs(Stage::apply_loads);
+    const bool turns = stages_.runs(Stage::integrate_rotations);
+    for (RigidBodySpec spec : scene.bodies) {
+        if (spec.particle && method_.force_rotation) spec = turning(spec);
+        if (!spec.particle && spec.motion != Motion::fixed && !turns)
+            throw std::invalid_argument("bodies that turn need the stage integrate_rotations");
+        if (!loaded) spec.force = spec.torque = {};
         constants_.push_back(constants_of(spec));
         start_.push_back(start_of(spec, constants_.back()));
         const bool moves = constants_.back().moves();
-        acceleration_.push_back(moves ? scene.gravity + (1.0 / spec.mass) * spec.force : Vec3{});
+        acceleration_.push_back(moves ? (weighs ? scene.gravity : Vec3{}) + (1.0 / spec.mass) * spec.force
+                                      : Vec3{});
     }
     if (!springs_.empty() || !fields_.empty()) force_.resize(constants_.size());
 
-    std::vector<char> dynamic;
-    for (const BodyConstants& body : constants_) dynamic.push_back(body.moves());
-    Detection detection(scene.colliders, dynamic, scene.no_contact);
-    const bool touching = detection.possible() || method_.force_collision;
-
     slot_.assign(constants_.size(), -1);
-    bool bounded = false;
+    const bool touching = stages_.runs(Stage::collision);
     std::size_t spare = 0;
     for (const JointBlock& block : joints_.blocks()) {
-        bounded = bounded || block.bounded;
         rows_ += static_cast<std::uint64_t>(block.size);
         spare_at_.push_back(spare);
         spare += static_cast<std::size_t>(12 * block.size);
@@ -47,21 +60,51 @@ RigidSystem::RigidSystem(const RigidScene& scene)
             driven_.push_back(body);
         }
     if (touching) {
+        std::vector<char> dynamic;
         std::vector<SurfaceMaterial> materials;
-        for (const RigidBodySpec& spec : scene.bodies) materials.push_back(spec.material);
+        for (const RigidBodySpec& spec : scene.bodies) {
+            dynamic.push_back(spec.motion == Motion::dynamic);
+            materials.push_back(spec.material);
+            if (!stages_.runs(Stage::friction)) materials.back().friction = 0.0;
+        }
+        const SolverKind solver = stages_.runs(Stage::solve_iterative)   ? SolverKind::iterative
+                                  : method_.solver == SolverKind::hybrid ? SolverKind::hybrid
+                                                                         : SolverKind::direct;
         fresh_contacts_.emplace(
-            std::move(detection), materials, slot_,
-            ContactOptions{h_, method_.friction, method_.solver, method_.iterations,
-                           method_.residual_tolerance, method_.floor, method_.refinements});
+            Detection(scene.colliders, dynamic, scene.no_contact), materials, slot_,
+            ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
+                           method_.floor, method_.refinements});
     }
-    if (method_.solver == SolverKind::iterative)
-        solver_ = joints_.blocks().empty() ? RigidSolver::none : RigidSolver::iterative;
-    else
-        solver_ = joints_.blocks().empty() ? RigidSolver::none
-                  : bounded                ? RigidSolver::pivot
-                                           : RigidSolver::block;
     if (solver_ == RigidSolver::block) analyse_block();
     reset(nullptr);
+}
+
+/// Which stages run here; what the scene has and no stage handles is refused.
+void RigidSystem::take_stages(const RigidScene& scene) {
+    const bool joints = !scene.joints.empty();
+    if (stages_.take(Stage::collision)) {
+        stages_.take(Stage::impact);
+        if (stages_.take(Stage::tangents)) stages_.take(Stage::friction);
+    }
+    if (stages_.take(Stage::assemble_rows)) {
+        const bool block = stages_.take(Stage::solve_block), iterative = stages_.take(Stage::solve_iterative);
+        const bool pivot = stages_.take(Stage::pivot);
+        if (joints)
+            solver_ = iterative ? RigidSolver::iterative
+                      : block   ? RigidSolver::block
+                      : pivot   ? RigidSolver::pivot
+                                : RigidSolver::none;
+    }
+    if (joints && solver_ == RigidSolver::none)
+        throw std::invalid_argument("joints need the stage assemble_rows and one that solves them");
+    stages_.take(Stage::apply_gravity);
+    stages_.take(Stage::apply_loads);
+    if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
+    if (stages_.take(Stage::apply_springs)) springs_ = scene.springs;
+    stages_.take(Stage::integrate_positions);
+    stages_.take(Stage::integrate_rotations);
+    stages_.take(Stage::observe);
+    stages_.expect_all_taken("rigid bodies");
 }
 
 void RigidSystem::reset(StageClock* clock) {

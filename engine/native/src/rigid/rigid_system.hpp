@@ -12,6 +12,7 @@
 #include "rigid/joint_set.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
+#include "run/stages.hpp"
 
 namespace spook {
 
@@ -25,7 +26,10 @@ enum class RigidSolver { none, block, pivot, iterative };
 /// free body keeps it to the last bit. A step in which nothing touches is solved as if contacts were impossible.
 class RigidSystem {
 public:
-    explicit RigidSystem(const RigidScene& scene);
+    /// Built from the stages; throws std::invalid_argument for those it cannot run, or joints nobody solves.
+    RigidSystem(const RigidScene& scene, StageList stages);
+
+    const StageList& stages() const noexcept { return stages_; }
 
     // For run_loop:
     void advance(std::int64_t steps);
@@ -43,7 +47,6 @@ public:
     void reset(StageClock* clock);
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
-    bool contacts_possible() const noexcept { return contacts_ && contacts_->possible(); }
     void count(RunReport& report, std::int64_t steps) const;
     std::vector<double> final_state() const;
 
@@ -79,6 +82,7 @@ private:
         int contradicted = -1;  // a body held by rows that cannot hold together
     };
 
+    void take_stages(const RigidScene& scene);
     void step();
     void apply_forces();
     void kick_free_bodies();
@@ -106,6 +110,7 @@ private:
     }
 
     // The scene.
+    StageList stages_;
     LargeArray<BodyConstants> constants_;
     LargeArray<BodyState> start_;
     std::vector<Vec3> acceleration_;  // gravity and constant loads

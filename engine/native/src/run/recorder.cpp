@@ -88,7 +88,8 @@ void Recorder::sample(std::int64_t n) {
                     if (first || size > out[i] || size != size) out[i] = size;
                     break;
                 case Reduction::mean: out[i] = first ? value : out[i] + value; break;
-                default: out[i] = value;
+                case Reduction::trace:
+                case Reduction::final: out[i] = value; break;
             }
         }
     }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "run/named_enum.hpp"
 #include "run/report.hpp"
 
 namespace spook {
@@ -15,7 +16,7 @@ struct Sampler {
     std::function<void(double*)> read;
 };
 
-enum class Reduction { trace, final, maximum, minimum, maximum_absolute, mean };
+SPOOK_NAMED_ENUM(Reduction, trace, final, maximum, minimum, maximum_absolute, mean)
 
 /// One observable: how to reduce a quantity over samples first … last, both included.
 struct Observation {

@@ -6,21 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "run/named_enum.hpp"
+
 namespace spook {
 
 /// |x| [m] or |v| [m/s] beyond this is a runaway: the run ends as diverged.
 inline constexpr double RUNAWAY = 1e100;
 
-enum class Status { completed, diverged, not_finite, timed_out };
-
-constexpr const char* to_text(Status status) noexcept {
-    switch (status) {
-        case Status::completed: return "completed";
-        case Status::diverged: return "diverged";
-        case Status::not_finite: return "not_finite";
-        default: return "timed_out";
-    }
-}
+SPOOK_NAMED_ENUM(Status, completed, diverged, not_finite, timed_out)
 
 /// One observable: `samples` rows of `width` values (one row for a reduction).
 struct Recording {

@@ -5,51 +5,9 @@
 #include <array>
 #include <chrono>
 
+#include "run/stages.hpp"
+
 namespace spook {
-
-enum class Stage {
-    collision,
-    apply_gravity,
-    apply_central_gravity,
-    apply_springs,
-    apply_loads,
-    impact,
-    string_stiffness,
-    assemble_rows,
-    tangents,
-    solve_path,
-    solve_block,
-    solve_iterative,
-    pivot,
-    friction,
-    correct_curvature,
-    half_step,
-    integrate_positions,
-    integrate_rotations,
-    observe,
-    count
-};
-
-inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::count)> STAGE_NAMES = {
-    "collision",
-    "apply_gravity",
-    "apply_central_gravity",
-    "apply_springs",
-    "apply_loads",
-    "impact",
-    "string_stiffness",
-    "assemble_rows",
-    "tangents",
-    "solve_path",
-    "solve_block",
-    "solve_iterative",
-    "pivot",
-    "friction",
-    "correct_curvature",
-    "half_step",
-    "integrate_positions",
-    "integrate_rotations",
-    "observe"};
 
 class StageClock {
 public:
@@ -66,7 +24,7 @@ public:
 
 private:
     Clock::time_point last_ = Clock::now();
-    std::array<double, static_cast<std::size_t>(Stage::count)> seconds_{};
+    std::array<double, STAGES> seconds_{};
 };
 
 }  // namespace spook

@@ -1,9 +1,11 @@
-"""What can be observed of a scene with rigid bodies, and the shape of one sample."""
+"""What the native side is asked to observe, and the shape of one sample."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
+from spook_tracker.engine import _core
+from spook_tracker.engine.check import Vector
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.joints import AxialJoint, Distance
 from spook_tracker.engine.observe import (
@@ -16,6 +18,7 @@ from spook_tracker.engine.observe import (
     JointCoordinate,
     KineticEnergy,
     Momentum,
+    Observable,
     Orientation,
     Penetration,
     Position,
@@ -24,9 +27,10 @@ from spook_tracker.engine.observe import (
     Velocity,
     Violation,
 )
+from spook_tracker.engine.program import distinct_quantities
 from spook_tracker.engine.scene import Scene
 
-QuantityRequest = tuple[str, int, tuple[float, float, float]]  # name, index or -1, point
+Shape = tuple[int, ...]
 
 _SCALARS: dict[type[Quantity], str] = {
     KineticEnergy: "kinetic_energy",
@@ -44,48 +48,65 @@ _OF_BODIES: dict[type[Quantity], tuple[str, int]] = {
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
-def request(quantity: Quantity, scene: Scene) -> tuple[QuantityRequest, tuple[int, ...]]:
-    """What the native side is asked for, and the shape of one sample. Raises MethodError for unknown names."""
+def requests(
+    scene: Scene, observe: Mapping[str, Observable]
+) -> tuple[list[_core.QuantityRequest], list[Shape]]:
+    """A request per distinct quantity, and per observable the shape of one sample.
+
+    Raises MethodError for unknown names.
+    """
+    asked, shapes = [], {}
+    for quantity in distinct_quantities(observe):
+        request, shapes[quantity] = _request(quantity, scene)
+        asked.append(request)
+    return asked, [shapes[what.quantity] for what in observe.values()]
+
+
+def _ask(kind: str, index: int = -1, point: Vector = _ORIGIN, other: int = -1) -> _core.QuantityRequest:
+    return _core.QuantityRequest(kind=kind, index=index, point=point, other=other)
+
+
+def _request(quantity: Quantity, scene: Scene) -> tuple[_core.QuantityRequest, Shape]:
     kind = type(quantity)
     if kind in _SCALARS:
-        return (_SCALARS[kind], -1, _ORIGIN), ()
+        return _ask(_SCALARS[kind]), ()
     if isinstance(quantity, Position | Velocity | Orientation | AngularVelocity):
         name, width = _OF_BODIES[kind]
         if quantity.body is None:
-            return (name, -1, _ORIGIN), (len(scene.bodies), width)
-        return (name, _body(scene, quantity.body), _ORIGIN), (width,)
+            return _ask(name), (len(scene.bodies), width)
+        return _ask(name, _body(scene, quantity.body)), (width,)
     if isinstance(quantity, Violation | ConstraintForce):
         return _of_constraint(quantity, scene)
     if isinstance(quantity, Momentum):
-        return ("momentum", -1, _ORIGIN), (3,)
+        return _ask("momentum"), (3,)
     if isinstance(quantity, AngularMomentum):
-        return ("angular_momentum", -1, quantity.about), (3,)
+        return _ask("angular_momentum", point=quantity.about), (3,)
     if isinstance(quantity, ContactForce):
         other = -1 if quantity.other is None else _body(scene, quantity.other)
-        return ("contact_force", _body(scene, quantity.body), (float(other), 0.0, 0.0)), (3,)
+        return _ask("contact_force", _body(scene, quantity.body), other=other), (3,)
     if isinstance(quantity, JointCoordinate):
         index = _constraint(scene, quantity.joint)
         if not isinstance(scene.constraints[index], AxialJoint):
             raise MethodError(
-                f"observe: {quantity.joint!r} is no hinge or prismatic joint and has no coordinate"
+                f"observe: {quantity!r} names no hinge or prismatic joint, and only those have a coordinate"
             )
-        return ("joint_coordinate", index, _ORIGIN), ()
-    raise MethodError(f"observe: {quantity!r} means nothing in a scene of rigid bodies")
+        return _ask("joint_coordinate", index), ()
+    raise MethodError(f"observe: {quantity!r} is no quantity of this engine")
 
 
 def _of_constraint(
     quantity: Violation | ConstraintForce, scene: Scene
-) -> tuple[QuantityRequest, tuple[int, ...]]:
+) -> tuple[_core.QuantityRequest, Shape]:
     force = isinstance(quantity, ConstraintForce)
     name = "constraint_force" if force else "violation"
     if quantity.constraint is None:
         count = sum(isinstance(constraint, Distance) for constraint in scene.constraints)
-        return (name, -1, _ORIGIN), (count,)
+        return _ask(name), (count,)
     index = _constraint(scene, quantity.constraint)
     constraint = scene.constraints[index]
     if isinstance(constraint, Distance):
-        return (name, index, _ORIGIN), ()
-    return (name, index, _ORIGIN), (6 if force else constraint.rows,)
+        return _ask(name, index), ()
+    return _ask(name, index), (6 if force else constraint.rows,)
 
 
 def _body(scene: Scene, name: str) -> int:

@@ -1,0 +1,115 @@
+#include "rigid/rigid_stages.hpp"
+
+#include <algorithm>
+#include <string>
+
+namespace spook {
+
+namespace {
+
+/// What the choice of a stage depends on.
+struct Facts {
+    bool joints, bounded, contacts, rubbing, iterative, turning, moving, loaded;
+    int with_surface = 0;
+};
+
+Facts facts_of(const RigidScene& scene) {
+    Facts facts{};
+    std::vector<char> dynamic, surface(scene.bodies.size(), 0);
+    for (const Collider& collider : scene.colliders) surface[collider.body] = 1;
+    int rubbing = 0;
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+        const RigidBodySpec& body = scene.bodies[i];
+        dynamic.push_back(body.motion == Motion::dynamic);
+        facts.with_surface += surface[i];
+        rubbing += surface[i] && body.material.friction > 0.0;
+        facts.moving = facts.moving || body.motion != Motion::fixed;
+        facts.turning = facts.turning || (!body.particle && body.motion != Motion::fixed);
+        facts.loaded = facts.loaded || !is_zero(body.force) || !is_zero(body.torque);
+    }
+    facts.joints = !scene.joints.empty();
+    facts.bounded = std::any_of(scene.joints.begin(), scene.joints.end(),
+                                [](const JointSpec& joint) { return can_let_go(joint); });
+    facts.contacts = Detection(scene.colliders, dynamic, scene.no_contact).possible();
+    facts.rubbing = facts.contacts && rubbing >= 2;
+    facts.iterative = scene.method.solver == SolverKind::iterative && (facts.joints || facts.contacts);
+    return facts;
+}
+
+}  // namespace
+
+StageChoices choose_stages(const RigidScene& scene, bool observing) {
+    const Facts is = facts_of(scene);
+    const RigidMethod& method = scene.method;
+    const bool rows = is.joints || is.contacts, direct = method.solver != SolverKind::iterative;
+    const bool pivots = direct && (is.contacts || (is.joints && is.bounded));
+    const std::string no_rows = "no joints and no contacts, so nothing to solve";
+    const std::string particles_only = "rigid scenes do not have it", forced = "forced by the method";
+    const std::string asks_iterative = "the method asks for the iterative solver";
+    const std::string no_contact = !scene.contacts ? "the scene switches contacts off"
+                                   : is.with_surface < 2
+                                       ? "fewer than two bodies have a surface"
+                                       : "every pair of surfaces is tied, excluded or cannot move";
+    const std::string smooth = is.contacts ? "no two surfaces have friction" : no_contact;
+    return choose_each([&](Stage stage) -> StageChoice {
+        switch (stage) {
+            case Stage::collision:
+                return choose_if(is.contacts || method.force_collision,
+                                 is.contacts ? "surfaces may touch" : forced, no_contact);
+            case Stage::apply_gravity:
+                return choose_if(!is_zero(scene.gravity), "uniform gravity acts", "gravity is zero");
+            case Stage::apply_central_gravity:
+                return choose_if(!scene.fields.empty(), "a centre attracts every body",
+                                 "there is no central gravity");
+            case Stage::apply_springs:
+                return choose_if(!scene.springs.empty(), "springs pull as plain forces",
+                                 "there are no springs");
+            case Stage::apply_loads:
+                return choose_if(is.loaded, "constant loads act, one kick with gravity",
+                                 "there are no loads");
+            case Stage::impact:
+                return choose_if(is.contacts, "surfaces that meet exchange impulses first", no_contact);
+            case Stage::assemble_rows:
+                return choose_if(rows,
+                                 !is.contacts ? "joints give rows"
+                                 : is.joints  ? "joints and contacts give rows"
+                                              : "contacts give rows",
+                                 no_rows);
+            case Stage::tangents:
+                return choose_if(is.rubbing, "friction needs two directions per contact", smooth);
+            case Stage::solve_path: return leave_out("rigid bodies couple in blocks");
+            case Stage::solve_block:
+                return choose_if(direct && is.joints && !is.bounded,
+                                 std::string("joints are bilateral: one sparse LDLᵀ per step, ordered once") +
+                                     (is.contacts ? " (while nothing touches)" : ""),
+                                 is.iterative ? asks_iterative
+                                 : is.joints  ? "some joint row has a bound"
+                                              : "there are no joints");
+            case Stage::solve_iterative:
+                return choose_if(is.iterative, "the method asks for projected Gauss–Seidel",
+                                 rows ? "the method asks for a direct solver" : no_rows);
+            case Stage::pivot:
+                return choose_if(
+                    pivots, is.contacts ? "contacts can let go" : "a limit or a bounded motor can let go",
+                    is.iterative ? asks_iterative
+                    : is.joints  ? "all rows are bilateral: no row can let go"
+                                 : no_rows);
+            case Stage::friction:
+                return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
+            case Stage::string_stiffness:
+            case Stage::correct_curvature: return leave_out(particles_only);
+            case Stage::half_step: return leave_out("velocities live at whole steps");
+            case Stage::integrate_positions:
+                return choose_if(is.moving, "bodies can move", "nothing can move");
+            case Stage::integrate_rotations:
+                return choose_if(is.turning || method.force_rotation,
+                                 is.turning ? "rigid bodies can turn" : forced, "no rigid body can turn");
+            case Stage::observe:
+                return choose_if(observing, "observables are reduced inside the loop",
+                                 "nothing is read while the loop runs");
+        }
+        return {};
+    });
+}
+
+}  // namespace spook

@@ -1,0 +1,82 @@
+// The stages of a step: which there are, which of them a scene needs and why, and which a pipeline runs.
+//
+// A pipeline's choose_stages() looks at a scene once and decides every stage. The system is built from what it kept
+// and from nothing else: each part takes the stages it runs, and a stage nobody takes is an error at the start.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+#include <utility>
+
+#include "run/named_enum.hpp"
+
+namespace spook {
+
+/// In the order of the step.
+SPOOK_NAMED_ENUM(Stage, collision, apply_gravity, apply_central_gravity, apply_springs, apply_loads, impact,
+                 string_stiffness, assemble_rows, tangents, solve_path, solve_block, solve_iterative, pivot,
+                 friction, correct_curvature, half_step, integrate_positions, integrate_rotations, observe)
+
+inline constexpr std::size_t STAGES = static_cast<std::size_t>(Stage::observe) + 1;
+
+struct StageChoice {
+    bool kept = false;
+    std::string reason;
+};
+
+/// One choice per stage, in the order of the step.
+using StageChoices = std::array<StageChoice, STAGES>;
+
+/// choose(stage) for every stage there is.
+template <class Choose> StageChoices choose_each(Choose choose) {
+    StageChoices choices;
+    for (std::size_t k = 0; k < STAGES; ++k) choices[k] = choose(static_cast<Stage>(k));
+    return choices;
+}
+
+/// A stage kept or left out, with the reason for the one or the other.
+inline StageChoice choose_if(bool kept, const std::string& why, const std::string& why_not) {
+    return {kept, kept ? why : why_not};
+}
+inline StageChoice leave_out(const std::string& why_not) { return {false, why_not}; }
+
+/// The stages of one program while its system is built.
+class StageList {
+public:
+    StageList() = default;
+    StageList(std::initializer_list<Stage> stages) {
+        for (const Stage stage : stages) listed_[index(stage)] = true;
+    }
+    explicit StageList(const StageChoices& choices) {
+        for (std::size_t k = 0; k < STAGES; ++k) listed_[k] = choices[k].kept;
+    }
+
+    /// Whether the stage is listed; who asks will run it.
+    bool take(Stage stage) noexcept {
+        taken_[index(stage)] = listed_[index(stage)];
+        return listed_[index(stage)];
+    }
+    /// Whether the stage is listed and somebody runs it.
+    bool runs(Stage stage) const noexcept { return taken_[index(stage)]; }
+    /// The stages that are run, in the order of the step.
+    std::vector<Stage> taken() const {
+        std::vector<Stage> stages;
+        for (std::size_t k = 0; k < STAGES; ++k)
+            if (taken_[k]) stages.push_back(static_cast<Stage>(k));
+        return stages;
+    }
+    /// Throws std::invalid_argument when a stage is listed that no part of the pipeline runs.
+    void expect_all_taken(const char* pipeline) const {
+        for (std::size_t k = 0; k < STAGES; ++k)
+            if (listed_[k] && !taken_[k])
+                throw std::invalid_argument(std::string(pipeline) + " cannot run the stage " +
+                                            to_text(static_cast<Stage>(k)));
+    }
+
+private:
+    static constexpr std::size_t index(Stage stage) noexcept { return static_cast<std::size_t>(stage); }
+    std::array<bool, STAGES> listed_{}, taken_{};
+};
+
+}  // namespace spook
