@@ -6,11 +6,8 @@ changes is noticed. `make mutation` changes them one by one and sees a test here
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
 import math
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -23,7 +20,6 @@ from tests.run_documents import definition, engine, run_of
 from tests.test_tracker_compare import side
 from tests.test_tracker_verdict import sample, series
 
-ROOT = Path(__file__).resolve().parents[1]
 LEVELS = [1e-6, 1.0, 1e6]  # s: what counts is relative, so the unit of time makes no difference
 
 
@@ -145,16 +141,3 @@ def test_only_the_same_commit_can_contradict_itself(facts: dict, why: str) -> No
     assert told({}, {}) == "non_deterministic"
     assert told({}, facts) != "non_deterministic", why
     assert told(facts, {}) != "non_deterministic", why
-
-
-def test_every_mutant_of_the_mutation_run_still_applies() -> None:
-    """A rule that is written differently takes its mutant along, or the run would say less than it seems to."""
-    spec = importlib.util.spec_from_file_location("mutation", ROOT / "bench" / "mutation.py")
-    assert spec is not None and spec.loader is not None
-    mutation = importlib.util.module_from_spec(spec)
-    sys.modules["mutation"] = mutation
-    spec.loader.exec_module(mutation)
-
-    for mutant in mutation.MUTANTS:
-        text = (ROOT / mutant.file).read_text()
-        assert mutation.applied(mutant, text) != text

@@ -13,7 +13,9 @@ from spook_tracker.tracker.cli.options import (
     OneLineErrors,
     database_option,
     example,
+    recorded,
     source_options,
+    terminated_is_interrupted,
     workers_option,
 )
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
@@ -79,6 +81,7 @@ def run_command(
     json_file: Path | None,
     junit_file: Path | None,
     workers: int,
+    time_limit: float,
     engine: str,
     catalogue: str,
     database: str,
@@ -86,7 +89,9 @@ def run_command(
     """Run scalar tests (all, or those named), print the pass table and record one run."""
     from spook_tracker.tracker.measure.run import Request
 
-    request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
+    request = Request(
+        tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
+    )
     document = _measure(request, engine, catalogue, None if no_record else database)
     _print_run(document, everything)
     if json_file:
@@ -114,6 +119,7 @@ def nightly(
     out: Path,
     quick: bool,
     workers: int,
+    time_limit: float,
     json_file: Path | None,
     junit_file: Path | None,
     engine: str,
@@ -123,7 +129,14 @@ def nightly(
     """Run everything, record it, judge it against the history and publish the website."""
     from spook_tracker.tracker.measure.run import Request
 
-    request = Request(figures=True, sweep=not quick, stability=not quick, workers=workers, trigger="nightly")
+    request = Request(
+        figures=True,
+        sweep=not quick,
+        stability=not quick,
+        workers=workers,
+        time_limit=time_limit,
+        trigger="nightly",
+    )
     document = _measure(request, engine, catalogue, database)
     _print_run(document, everything=False)
     if json_file:
@@ -188,19 +201,28 @@ for command in (compare, trend, list_tests, show, explain, export, import_files,
 def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Source, run
+    from spook_tracker.tracker.measure.run import Interrupted, Source, run
 
     source = Source(catalogue=catalogue, engine=engine)
     if database is None:
-        with watching("measuring") as step:
+        with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+    from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record
 
     with session_on(database) as session:
-        with watching("measuring") as step:
-            document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        try:
+            with watching("measuring") as step, terminated_is_interrupted():
+                document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        except Interrupted as ended:
+            record(session, ended.document)
+            done = f"{len(ended.document.tests)} of {ended.asked} tests were finished"
+            raise TrackerError(
+                f"interrupted; {done} and are recorded as partial run {ended.document.id}"
+            ) from None
         record(session, document)
+    recorded(document.id)
     return document
 
 

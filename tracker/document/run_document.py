@@ -210,6 +210,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     samples: tuple[Sample, ...]
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
+    partial: bool = False  # interrupted: only what was finished by then
 
 
 def to_number(value: float) -> Number:
