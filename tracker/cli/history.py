@@ -73,7 +73,9 @@ def compare(
     if form == "json":
         import msgspec
 
-        click.echo(msgspec.json.format(msgspec.json.encode(document), indent=1).decode())
+        from spook_tracker.tracker.document.outside import escaped
+
+        click.echo(escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()))
     elif form == "junit":
         from spook_tracker.tracker.cli.report_junit import junit_of_comparison
 

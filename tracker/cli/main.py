@@ -278,7 +278,9 @@ def _publish(history: Any, out: Path) -> None:
 def _json(document: Any) -> str:
     import msgspec
 
-    return msgspec.json.format(msgspec.json.encode(document), indent=1).decode() + "\n"
+    from spook_tracker.tracker.document.outside import escaped
+
+    return escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
 
 
 def _write(file: Path, text: str) -> None:

@@ -18,6 +18,7 @@ import click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+MOST = 600  # characters of a complaint
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
 
 
@@ -154,5 +155,8 @@ def terminated_is_interrupted() -> Iterator[None]:
 
 
 def complain(sentence: str) -> None:
-    """One line on standard error."""
-    click.echo("tracker: " + " ".join(sentence.split()), err=True)
+    """One line on standard error, which repeats only so much of what it was given."""
+    from spook_tracker.tracker.document.outside import clean
+
+    line = clean(" ".join(sentence.split()))
+    click.echo("tracker: " + (line if len(line) <= MOST else f"{line[: MOST - 1]}…"), err=True)

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from spook_tracker.tracker.cli.report_compare import red_line
 from spook_tracker.tracker.cli.report_table import is_red, limit, measured, pairs
+from spook_tracker.tracker.document.outside import clean
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
 
@@ -15,8 +16,8 @@ ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def legal(text: str) -> str:
-    """Text that XML 1.0 can hold."""
-    return ILLEGAL.sub("\N{REPLACEMENT CHARACTER}", text)
+    """Text that XML 1.0 can hold, with nothing in it that cannot be seen."""
+    return ILLEGAL.sub("\N{REPLACEMENT CHARACTER}", clean(text))
 
 
 def junit_of_run(run: RunDocument) -> str:

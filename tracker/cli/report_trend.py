@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, sparkline, table, width
+from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition, from_number
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -27,11 +27,11 @@ def trend_lines(
     values = [from_number(night.sample.value) for night in history]
     unit = "" if definition.unit in ("", "1") else f" {definition.unit}"
     lines = [
-        click.style(key, bold=True),
-        f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {limit(definition)})",
+        click.style(clean(key), bold=True),
+        f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {clean(limit(definition))})",
     ]
     judged = judge_history(key, definition, history, accepted)
-    lines += [f"  {line}" for line in changes(definition, judged)]
+    lines += [f"  {clean(line)}" for line in changes(definition, judged)]
     rows = [
         (
             j.night.run.started[:10],

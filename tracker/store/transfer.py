@@ -15,6 +15,7 @@ import msgspec
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.document.outside import escaped
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
@@ -32,7 +33,8 @@ class Imported:
 
 def encoded(run: RunDocument) -> bytes:
     """The document as JSON, one line for each part, with a line feed at the end."""
-    return msgspec.json.format(msgspec.json.encode(checked(run)), indent=1) + b"\n"
+    text = msgspec.json.format(msgspec.json.encode(checked(run)), indent=1).decode()
+    return escaped(text).encode() + b"\n"
 
 
 def write_document(run: RunDocument, path: Path) -> None:
