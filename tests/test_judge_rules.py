@@ -141,3 +141,8 @@ def test_only_the_same_commit_can_contradict_itself(facts: dict, why: str) -> No
     assert told({}, {}) == "non_deterministic"
     assert told({}, facts) != "non_deterministic", why
     assert told(facts, {}) != "non_deterministic", why
+
+
+def test_where_larger_is_better_less_is_worse() -> None:
+    assert judge_noisy([1.0] * 10 + [0.9, 0.9], larger_is_better=True)[-1].state == "detected"
+    assert judge_noisy([1.0] * 10 + [1.1, 1.1], larger_is_better=True)[-1].state == "green"
