@@ -11,10 +11,10 @@ import math
 
 import pytest
 
-from spook_tracker.tracker.document.run_document import MapData
+from spook_tracker.tracker.document.run_document import MapData, Point
 from spook_tracker.tracker.judge.compare import same_commit
 from spook_tracker.tracker.judge.noise import judge_noisy
-from spook_tracker.tracker.judge.series_history import judge_history, nights
+from spook_tracker.tracker.judge.series_history import judge_history
 from spook_tracker.tracker.judge.verdict import judge, judge_map
 from tests.run_documents import definition, engine, run_of
 from tests.test_tracker_compare import side
@@ -135,7 +135,7 @@ def test_only_the_same_commit_can_contradict_itself(facts: dict, why: str) -> No
             run_of({"a": value}, id=str(value), engine=engine(**{"git_hash": "a" * 40, **changes}))
             for value, changes in ((1.0, first), (1.0 + 2**-40, second))
         ]
-        history = nights((run, run.samples[0], "1") for run in runs)
+        history = [Point(run, run.samples[0], "1") for run in runs]
         return judge_history("a", definition("a"), history)[-1].verdict.word
 
     assert told({}, {}) == "non_deterministic"

@@ -14,13 +14,13 @@ import pytest
 from spook_tracker.tracker.cli import options
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.measure import run as measuring
-from spook_tracker.tracker.measure.run import Interrupted, Request, Source, run
+from spook_tracker.tracker.measure.run import Interrupted, Questions, Request, run
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
 from tests.test_tracker_cli import tracker
 from tests.test_tracker_workers import SOON, alive, children, until
 
-SOURCE = Source(catalogue="toy_stuck:CATALOGUE", engine="toy_engine")
+SOURCE = Questions(catalogue="toy_stuck:CATALOGUE", engine="toy_engine")
 
 
 @pytest.fixture(autouse=True)
@@ -94,7 +94,7 @@ def test_interrupted_before_anything_was_finished_nothing_is_recorded(
 def test_the_library_hands_over_what_was_finished(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def sometimes(source: Source, task: measuring.Task) -> object:
+    def sometimes(source: Questions, task: measuring.Task) -> object:
         asked.append(task.test)
         if task.test != "quick":
             raise KeyboardInterrupt

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.cli.report_junit import junit_of_run
-from spook_tracker.tracker.document.outside import COLOUR, UNSEEN, escaped, inert
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.record import record
@@ -36,7 +36,7 @@ def hostile_run() -> RunDocument:
 
 def obeyed(text: str) -> list[str]:
     """What a terminal or a CI service would act on."""
-    plain = COLOUR.sub("", text)
+    plain = outside.COLOUR.sub("", text)
     lines = [line for line in plain.splitlines() if line.lstrip().startswith(("::", "##["))]
     return lines + SHOWN.findall(plain)
 
@@ -77,7 +77,7 @@ def test_files_for_machines_carry_no_character_that_cannot_be_seen() -> None:
     text = encoded(document).decode()
     junit = junit_of_run(document)
 
-    assert UNSEEN.search(text) is None
+    assert outside.UNSEEN.search(text) is None
     assert msgspec.json.decode(text, type=RunDocument) == document  # an escape loses nothing
     assert SHOWN.findall(junit) == []
     ElementTree.fromstring(junit)
@@ -93,6 +93,6 @@ def test_a_refusal_repeats_only_so_much_of_what_it_was_given() -> None:
 
 @given(st.text(max_size=60))
 def test_whatever_is_written_lines_are_inert_and_json_keeps_its_meaning(text: str) -> None:
-    assert obeyed(inert(text.replace("\x0b", "").replace("\x0c", ""))) == []
-    assert json.loads(escaped(json.dumps(text, ensure_ascii=False))) == text
-    assert inert("\x1b[31m✗ red\x1b[0m\n  plain") == "\x1b[31m✗ red\x1b[0m\n  plain"
+    assert obeyed(outside.inert(text.replace("\x0b", "").replace("\x0c", ""))) == []
+    assert json.loads(outside.escaped(json.dumps(text, ensure_ascii=False))) == text
+    assert outside.inert("\x1b[31m✗ red\x1b[0m\n  plain") == "\x1b[31m✗ red\x1b[0m\n  plain"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from spook_tracker.tracker.measure.workers import Limits, Lost, answers
+import spook_tracker.tracker.measure.workers as crew
 
 ROOT = Path(__file__).resolve().parents[1]
 SOON = 60.0  # s: what takes longer hangs, on a machine however busy
@@ -32,7 +32,7 @@ def work(piece: str) -> str:
 
 
 def told(pieces: list[str], workers: int = 2, **limits: float) -> dict[str, object]:
-    return dict(answers(work, pieces, workers, Limits(**limits)))
+    return dict(crew.answers(work, pieces, workers, crew.Limits(**limits)))
 
 
 def test_every_piece_is_answered_once():
@@ -48,9 +48,9 @@ def test_who_hangs_dies_or_is_greedy_costs_its_own_piece():
     assert {piece: answer for piece, answer in found.items() if isinstance(answer, str)} == {
         "a": "A", "b": "B", "c": "C", "d": "D"
     }  # fmt: skip
-    assert found["hang"] == Lost("timed_out", "no answer within 1 s, so its process was ended")
-    assert found["die"] == Lost("crashed", "the engine's process died while answering")
-    assert found["hog"] == Lost("crashed", "the piece of work ran out of memory")
+    assert found["hang"] == crew.Lost("timed_out", "no answer within 1 s, so its process was ended")
+    assert found["die"] == crew.Lost("crashed", "the engine's process died while answering")
+    assert found["hog"] == crew.Lost("crashed", "the piece of work ran out of memory")
 
 
 def test_an_error_of_ours_is_raised_and_ends_everything():
@@ -88,7 +88,7 @@ def until(condition, limit: float = SOON) -> bool:
 def test_leaving_early_ends_the_workers():
     told(["a"])
     before = children(os.getpid())  # the one that Python keeps to count what processes share
-    asked = answers(work, ["a", "hang", "hang on"], 2, Limits())
+    asked = crew.answers(work, ["a", "hang", "hang on"], 2, crew.Limits())
     next(asked)
     working = alive(children(os.getpid()) - before)
 
@@ -101,10 +101,10 @@ def test_leaving_early_ends_the_workers():
 HANGING = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from spook_tracker.tracker.measure.workers import Limits, answers
+import spook_tracker.tracker.measure.workers as crew
 from tests.test_tracker_workers import work
 if __name__ == "__main__":
-    for answer in answers(work, ["a", "b", "hang", "hang on"], 2, Limits()):
+    for answer in crew.answers(work, ["a", "b", "hang", "hang on"], 2, crew.Limits()):
         print(answer, flush=True)
 """
 

@@ -11,6 +11,7 @@ from spook_tracker.tracker.cli.history import compare, explain, list_tests, show
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
+    accepted_option,
     database_option,
     example,
     recorded,
@@ -47,9 +48,9 @@ def main(context: click.Context, version: bool) -> None:
 
 
 def _print_versions() -> None:
-    from spook_tracker.tracker.measure.run import Source, present_version, tracker_version
+    from spook_tracker.tracker.measure.run import Questions, present_version, tracker_version
 
-    engine = present_version(Source())
+    engine = present_version(Questions())
     click.echo(
         f"tracker {tracker_version()}, {engine.name} {engine.version} ({engine.git_hash[:10] or 'no commit'})"
     )
@@ -113,6 +114,7 @@ def run_command(
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@accepted_option
 @source_options
 @database_option
 def nightly(
@@ -120,6 +122,7 @@ def nightly(
     quick: bool,
     workers: int,
     time_limit: float,
+    accepted: Path | None,
     json_file: Path | None,
     junit_file: Path | None,
     engine: str,
@@ -127,41 +130,59 @@ def nightly(
     database: str,
 ) -> None:
     """Run everything, record it, judge it against the history and publish the website."""
-    from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.cli.console import say, watching
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import nightly as night
 
-    request = Request(
-        figures=True,
-        sweep=not quick,
-        stability=not quick,
-        workers=workers,
-        time_limit=time_limit,
-        trigger="nightly",
-    )
-    document = _measure(request, engine, catalogue, database)
-    _print_run(document, everything=False)
-    if json_file:
-        _write(json_file, _json(document))
+    def tell(news: Any) -> None:
+        if isinstance(news, list):
+            from spook_tracker.tracker.cli.report_compare import finding_lines
+
+            say("\n".join(finding_lines(news, f"{out}/")))
+            return
+        recorded(news.id)
+        _print_run(news, everything=False)
+        if json_file:
+            _write(json_file, _json(news))
+
+    with watching("measuring") as step, terminated_is_interrupted():
+        report = night(
+            database,
+            out,
+            accepted=accepted_levels(accepted),
+            watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
+            tell=tell,
+            catalogue=catalogue,
+            engine=engine,
+            figures=True,
+            sweep=not quick,
+            stability=not quick,
+            workers=workers,
+            time_limit=time_limit,
+        )
     if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_run
+        from spook_tracker.tracker.cli.report_junit import junit_of_night
 
-        _write(junit_file, junit_of_run(document))
-    regressed = _judge_and_publish(database, document.id, out)
-    if regressed:
+        _write(junit_file, junit_of_night(report.findings))
+    _say_published(report.published, out)
+    if report.red:
         click.get_current_context().exit(RED)
-    _exit_red_if(document)
 
 
 @main.command(epilog=example("tracker publish --out public"))
 @click.option(
     "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
 )
+@accepted_option
 @database_option
-def publish(out: Path, database: str) -> None:
+def publish(out: Path, accepted: Path | None, database: str) -> None:
     """Build the website from what is recorded."""
-    from spook_tracker.tracker.cli.history import history_of
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.library import publish as build
 
-    with history_of(database) as history:
-        _publish(history, out)
+    with History.open(database) as history:
+        _say_published(build(history, out, accepted_levels(accepted)), out)
 
 
 @main.command(epilog=example("tracker serve public --port 8000"))
@@ -201,13 +222,12 @@ for command in (compare, trend, list_tests, show, explain, export, import_files,
 def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Interrupted, Source, run
+    from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
-    source = Source(catalogue=catalogue, engine=engine)
+    source = Questions(catalogue=catalogue, engine=engine)
     if database is None:
         with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
-    from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record
 
@@ -217,10 +237,8 @@ def _measure(request: Any, engine: str, catalogue: str, database: str | None) ->
                 document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
         except Interrupted as ended:
             record(session, ended.document)
-            done = f"{len(ended.document.tests)} of {ended.asked} tests were finished"
-            raise TrackerError(
-                f"interrupted; {done} and are recorded as partial run {ended.document.id}"
-            ) from None
+            ended.recorded = True
+            raise
         record(session, document)
     recorded(document.id)
     return document
@@ -240,47 +258,18 @@ def _exit_red_if(document: Any) -> None:
         click.get_current_context().exit(RED)
 
 
-def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
-    """Whether tonight is worse than the history, having said so and published the site."""
+def _say_published(report: Any, out: Path) -> None:
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import accepted_levels, history_of
-    from spook_tracker.tracker.cli.report_compare import finding_lines
-    from spook_tracker.tracker.judge.tonight import tonight
 
-    with history_of(database) as history:
-        findings = tonight(history, history.run(run_id), accepted_levels())
-        say("\n".join(finding_lines(findings, f"{out}/")))
-    _retain(database)
-    with history_of(database) as history:
-        _publish(history, out)
-    return any(finding.red for finding in findings)
-
-
-def _retain(database: str) -> None:
-    """Drop figures and maps that the retention rule no longer keeps, once they have been compared."""
-    from spook_tracker.tracker.store.database import session_on
-    from spook_tracker.tracker.store.history import History
-    from spook_tracker.tracker.store.retention import drop_old_figures
-
-    with session_on(database) as session:
-        drop_old_figures(session, History(session))
-
-
-def _publish(history: Any, out: Path) -> None:
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import accepted_levels
-    from spook_tracker.tracker.website.publish import publish as build
-
-    report = build(history, out, accepted_levels())
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 
 def _json(document: Any) -> str:
     import msgspec
 
-    from spook_tracker.tracker.document.outside import escaped
+    import spook_tracker.tracker.document.outside as outside
 
-    return escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
+    return outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
 
 
 def _write(file: Path, text: str) -> None:

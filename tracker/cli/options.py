@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import click
@@ -80,6 +81,19 @@ def workers_option(command: Command) -> Command:
     return command
 
 
+ACCEPTED = "accepted.toml"
+
+
+def accepted_option(command: Command) -> Command:
+    """--accepted FILE: levels that people have accepted."""
+    return click.option(
+        "--accepted",
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help=f"Accepted levels; default {ACCEPTED}.",
+    )(command)
+
+
 def example(*lines: str) -> str:
     """The example at the end of a command's help."""
     return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)
@@ -99,10 +113,10 @@ class OneLineErrors(click.Group):
             )
             complain(f"{error.format_message()} (see: {command} --help)")
             code = UNUSABLE
-        except (click.Abort, KeyboardInterrupt):
-            complain(
-                "interrupted; " + (_recorded[-1] if _recorded else "nothing of this command was recorded")
-            )
+        except (click.Abort, KeyboardInterrupt) as error:
+            kept = _recorded[-1] if _recorded else "nothing of this command was recorded"
+            ended = error.__cause__ or error  # click makes an Abort of every interruption
+            complain(str(ended) if getattr(ended, "recorded", False) else f"interrupted; {kept}")
             code = UNUSABLE
         except BrokenPipeError:
             sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - nobody reads any more
@@ -156,7 +170,7 @@ def terminated_is_interrupted() -> Iterator[None]:
 
 def complain(sentence: str) -> None:
     """One line on standard error, which repeats only so much of what it was given."""
-    from spook_tracker.tracker.document.outside import clean
+    import spook_tracker.tracker.document.outside as outside
 
-    line = clean(" ".join(sentence.split()))
+    line = outside.clean(" ".join(sentence.split()))
     click.echo("tracker: " + (line if len(line) <= MOST else f"{line[: MOST - 1]}…"), err=True)

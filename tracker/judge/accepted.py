@@ -43,15 +43,14 @@ class Accepted:
     why: str
     until: date | None = None
 
+    def names(self, key: str) -> bool:
+        """Whether the entry is about that series."""
+        return fnmatchcase(key, self.series)
+
     def takes(self, key: str, value: float, night: date) -> bool:
         """Whether that value of that series is accepted on that night."""
         in_time = self.until is None or night <= self.until
-        return (
-            in_time
-            and fnmatchcase(key, self.series)
-            and math.isfinite(value)
-            and self.low <= value <= self.high
-        )
+        return in_time and self.names(key) and math.isfinite(value) and self.low <= value <= self.high
 
     def __str__(self) -> str:
         until = f", until {self.until}" if self.until else ""

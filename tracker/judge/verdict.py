@@ -15,9 +15,6 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
-
-import msgspec
 
 from spook_tracker.tracker.document.run_document import (
     MapData,
@@ -26,20 +23,9 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     from_number,
 )
+from spook_tracker.tracker.judge.standing import honest
+from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
 
-Word = Literal[
-    "identical",
-    "same",
-    "changed",
-    "improved",
-    "fixed",
-    "new",
-    "regressed",
-    "missing",
-    "non_deterministic",
-    "not_comparable",
-]
-RED: frozenset[Word] = frozenset({"regressed", "missing", "non_deterministic"})
 RANK: dict[OutcomeClass, int] = {
     "value": 0,
     "out_of_limit": 1,
@@ -86,7 +72,7 @@ def judge(
         return _incomparable("the definition of the test changed")
     if not same_environment:
         return _incomparable("measured in another float environment")
-    before, after = _honest(before), _honest(after)
+    before, after = honest(before), honest(after)
     old, new = from_number(before.value), from_number(after.value)
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
     if same_bits(old, new) and before.outcome == after.outcome:
@@ -97,7 +83,7 @@ def judge(
         return Verdict(word="changed", sentence="the same value from another final state", ulps=0)
     if same_commit:
         return _unrepeatable(decades, ulps)
-    by_class = _by_class(definition, before, after)
+    by_class = _by_class(before, after)
     if by_class is not None:
         return by_class
     if not (math.isfinite(old) and math.isfinite(new)):
@@ -109,13 +95,6 @@ def judge(
     if after.set_point_held and not before.set_point_held and definition.set_point is not None:
         return Verdict(word="fixed", sentence="back at its set point", decades=decades, ulps=ulps)
     return _by_size(definition, old, new, decades, ulps)
-
-
-def _honest(sample: Sample) -> Sample:
-    """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
-    if RANK[sample.outcome] >= RANK["not_finite"] or math.isfinite(from_number(sample.value)):
-        return sample
-    return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
 
 
 def _incomparable(why: str) -> Verdict:
@@ -136,7 +115,7 @@ def _words(outcome: OutcomeClass) -> str:
     return outcome.replace("_", " ")
 
 
-def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Verdict | None:
+def _by_class(before: Sample, after: Sample) -> Verdict | None:
     old, new = RANK[before.outcome], RANK[after.outcome]
     if new > old:
         crossed = after.outcome == "out_of_limit"
@@ -144,7 +123,7 @@ def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Ve
         return Verdict(
             word="regressed",
             sentence=what + (f": {after.failure}" if after.failure else ""),
-            name=_crossed(definition) if crossed else _words(after.outcome),
+            name="limit crossed" if crossed else _words(after.outcome),
         )
     if new < old:
         word: Word = "fixed" if new == 0 else "improved"
@@ -152,10 +131,6 @@ def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Ve
     if before.outcome != after.outcome:
         return Verdict(word="changed", sentence=f"{_words(before.outcome)} became {_words(after.outcome)}")
     return None
-
-
-def _crossed(definition: SeriesDefinition) -> str:
-    return "wrong order" if definition.kind == "order" else "limit crossed"
 
 
 def _by_size(
@@ -185,12 +160,7 @@ def _by_size(
 
 
 def _called(definition: SeriesDefinition) -> str:
-    return {
-        "break_point": "less stable",
-        "order": "wrong order",
-        "ladder": "less accurate",
-        "time": "slower",
-    }.get(definition.kind, "worse")
+    return CALLED_WORSE.get(definition.kind, "worse")
 
 
 def badness(definition: SeriesDefinition, value: float) -> float | None:

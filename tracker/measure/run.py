@@ -19,6 +19,8 @@ from typing import Any, Literal
 
 import msgspec
 
+import spook_tracker.tracker.measure.trajectory as motion
+import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -28,6 +30,7 @@ from spook_tracker.tracker.document.run_document import (
     RunDocument,
     Sample,
     SeriesDefinition,
+    Trajectory,
 )
 from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.cards import engine_version, test_card
@@ -43,10 +46,9 @@ from spook_tracker.tracker.measure.question import (
     metric_series,
     study,
 )
-from spook_tracker.tracker.measure.workers import Limits, Lost, answers
 
 Trigger = Literal["manual", "nightly", "import", "test"]
-Part = Measured | FigureData | MapData
+Part = Measured | FigureData | MapData | Trajectory
 
 
 class RunError(TrackerError):
@@ -54,7 +56,7 @@ class RunError(TrackerError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class Questions:
     """Where the questions and the engine are found, by name."""
 
     catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
@@ -99,9 +101,12 @@ class Request:
     stability: bool = False
     trigger: Trigger = "manual"
     workers: int = 2  # processes, each watched; 0: in this one, where nothing can be ended
-    time_limit: float = Limits.seconds  # s for one piece of work
-    memory_limit: int = Limits.memory  # bytes for one piece of work
+    time_limit: float = crew.Limits.seconds  # s for one piece of work
+    memory_limit: int = crew.Limits.memory  # bytes for one piece of work
     repeats: int = 5  # of each timing
+
+
+Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
 
 
 @dataclass(frozen=True, order=True)
@@ -110,7 +115,7 @@ class Task:
 
     position: int
     test: str
-    kind: Literal["measure", "figure", "study", "ladder"]
+    kind: Kind
     index: tuple[int, ...]
 
 
@@ -143,12 +148,14 @@ class Interrupted(KeyboardInterrupt):
     """The run was interrupted. `document` holds the tests that were finished by then, as a partial run."""
 
     def __init__(self, document: RunDocument, asked: int) -> None:
-        super().__init__("interrupted")
+        done = f"{len(document.tests)} of {asked} tests were finished"
+        super().__init__(f"interrupted; {done} and are recorded as partial run {document.id}")
         self.document = document
         self.asked = asked  # number of tests
+        self.recorded = False  # until somebody does
 
 
-def run(source: Source, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
+def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
     """Everything asked for at the engine's present version on this machine.
 
     RunError if it cannot be started; Interrupted, with what was finished, if the user or the system ends it.
@@ -185,7 +192,7 @@ def _errors(tasks: Iterable[Task], parts: Mapping[int, tuple[Any, ...]]) -> Erro
 
 
 def _document(
-    source: Source,
+    source: Questions,
     request: Request,
     started: str,
     version: EngineVersion,
@@ -198,11 +205,14 @@ def _document(
     measured: list[tuple[SeriesDefinition, Sample]] = []
     figures: list[FigureData] = []
     maps: list[MapData] = []
+    trajectories: list[Trajectory] = []
     for part in (part for task in tasks for part in parts[task.position]):
         if isinstance(part, FigureData):
             figures.append(part)
         elif isinstance(part, MapData):
             maps.append(part)
+        elif isinstance(part, Trajectory):
+            trajectories.append(part)
         elif not isinstance(part, ladders.ErrorPoints):  # those are among the timed series
             measured.extend(part)
     measured += timed[0]
@@ -224,6 +234,7 @@ def _document(
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
         maps=tuple(maps),
+        trajectories=tuple(trajectories),
     )
 
 
@@ -231,10 +242,11 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
     """The pieces of work of every test, in the order in which a reader meets their results."""
     position = 0
     for name, test in tests.items():
-        wanted: list[tuple[Literal["measure", "figure", "study", "ladder"], tuple[int, ...]]] = []
+        wanted: list[tuple[Kind, tuple[int, ...]]] = []
         wanted += [("measure", (i,)) for i in range(len(test.measurements))]
         if request.figures:
             wanted += [("figure", (i,)) for i in range(len(test.figures))]
+            wanted += [("trajectory", (0,))]
         if request.stability:
             wanted += [("study", (i,)) for i in range(len(test.stability))]
         if request.sweep:
@@ -248,7 +260,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
-def perform(source: Source, task: Task) -> tuple[Any, ...]:
+def perform(source: Questions, task: Task) -> tuple[Any, ...]:
     """Do one piece of work in this process."""
     test, simulate = source.tests()[task.test], source.simulate()
     first = task.index[0]
@@ -256,6 +268,9 @@ def perform(source: Source, task: Task) -> tuple[Any, ...]:
         return (measure(task.test, test, test.measurements[first], simulate),)
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], simulate),)
+    if task.kind == "trajectory":
+        moved = motion.trajectory(task.test, test, simulate)
+        return () if moved is None else (moved,)
     if task.kind == "study":
         return (study(task.test, test, test.stability[first], simulate),)
     rungs = test.ladders[first]
@@ -263,16 +278,16 @@ def perform(source: Source, task: Task) -> tuple[Any, ...]:
 
 
 def _perform_all(
-    source: Source, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Request, watch: Watch
+    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Request, watch: Watch
 ) -> Iterator[tuple[Task, tuple[Any, ...]]]:
     """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer."""
     left = {name: sum(task.test == name for task in tasks) for name in tests}
     found: Iterator[tuple[Task, Any]] = ((task, perform(source, task)) for task in tasks)
     if request.workers:
-        limits = Limits(seconds=request.time_limit, memory=request.memory_limit)
-        found = answers(partial(perform, source), tasks, request.workers, limits)
+        limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
+        found = crew.answers(partial(perform, source), tasks, request.workers, limits)
     for done, (task, parts) in enumerate(found, start=1):
-        if isinstance(parts, Lost):
+        if isinstance(parts, crew.Lost):
             parts = _lost(task, tests[task.test], parts)
         left[task.test] -= 1
         bad = tuple(
@@ -286,7 +301,7 @@ Errors = Mapping[tuple[str, int, int], ladders.ErrorPoints]
 Timed = tuple[list[tuple[SeriesDefinition, Sample]], Mapping[str, Mapping[str, float]]]
 
 
-def perform_timing(source: Source, piece: tuple[tuple[str, ...], Errors, int]) -> Timed:
+def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int]) -> Timed:
     """Run times of every ladder, and what leaving stages out saves, in this process."""
     names, errors, repeats = piece
     tests, simulate = select(source.tests(), names), source.simulate()
@@ -294,15 +309,15 @@ def perform_timing(source: Source, piece: tuple[tuple[str, ...], Errors, int]) -
     return timed, ladders.saved_by_leaving_out(tests, simulate)
 
 
-def _timed(source: Source, request: Request, tests: Mapping[str, ScalarTest], errors: Errors) -> Timed:
+def _timed(source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors) -> Timed:
     """Run times, taken by one process while no other works; without them if that one is lost."""
     piece = (tuple(tests), errors, request.repeats)
     if not request.workers:
         return perform_timing(source, piece)
     seconds = request.time_limit * max(1, sum(len(test.ladders) for test in tests.values()))
-    limits = Limits(seconds=seconds, memory=request.memory_limit)
-    ((_, timed),) = answers(partial(perform_timing, source), [piece], 1, limits)
-    if isinstance(timed, Lost):
+    limits = crew.Limits(seconds=seconds, memory=request.memory_limit)
+    ((_, timed),) = crew.answers(partial(perform_timing, source), [piece], 1, limits)
+    if isinstance(timed, crew.Lost):
         lost = timed
 
         def gone(*arguments: Any, **options: Any) -> Any:
@@ -313,7 +328,7 @@ def _timed(source: Source, request: Request, tests: Mapping[str, ScalarTest], er
     return found
 
 
-def _lost(task: Task, test: ScalarTest, lost: Lost) -> tuple[Any, ...]:
+def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> tuple[Any, ...]:
     """What is recorded for a piece of work without an answer."""
 
     def gone(*arguments: Any, **options: Any) -> Any:
@@ -327,6 +342,8 @@ def _lost(task: Task, test: ScalarTest, lost: Lost) -> tuple[Any, ...]:
         return (tuple((s, judged_sample(s.key, m, outcome, Witness(gone))) for m, s in series),)
     if task.kind == "figure":
         return (draw(task.test, replace(test.figures[first], draw=gone), gone),)
+    if task.kind == "trajectory":
+        return ()
     if task.kind == "study":
         return (study(task.test, test, test.stability[first], gone, outcome),)
     rungs = replace(test.ladders[first], error=gone)
@@ -368,6 +385,6 @@ def ci_address(environment: Mapping[str, str]) -> str:
     return environment.get("CI_JOB_URL") or environment.get("BUILD_URL") or ""
 
 
-def present_version(source: Source) -> EngineVersion:
+def present_version(source: Questions) -> EngineVersion:
     """The engine that would be measured now."""
     return engine_version(source.module())

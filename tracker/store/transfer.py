@@ -14,8 +14,8 @@ from pathlib import Path
 import msgspec
 from sqlalchemy.orm import Session
 
+import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.document.errors import DocumentError
-from spook_tracker.tracker.document.outside import escaped
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
@@ -34,7 +34,7 @@ class Imported:
 def encoded(run: RunDocument) -> bytes:
     """The document as JSON, one line for each part, with a line feed at the end."""
     text = msgspec.json.format(msgspec.json.encode(checked(run)), indent=1).decode()
-    return escaped(text).encode() + b"\n"
+    return outside.escaped(text).encode() + b"\n"
 
 
 def write_document(run: RunDocument, path: Path) -> None:

@@ -23,10 +23,11 @@ from spook_tracker.tracker.website import data_files, feed
 from spook_tracker.tracker.website.comparisons import FILE, comparisons, read_known, stored
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
-from spook_tracker.tracker.website.nights import Book, Source, TestHistory, book
+from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
+from spook_tracker.tracker.website.replays import replay_files
 from spook_tracker.tracker.website.templates import environment
 
 __all__ = ["FolderError", "Report", "publish"]
@@ -37,8 +38,12 @@ ASSETS = {  # name in templates: file under site/static
     "site": "site.js",
     "compare": "compare.js",
     "plotly": "plotly-cartesian.min.js",
+    "three": "three-scene.min.js",
+    "view": "scene-view.js",
+    "player": "player.js",
+    "replay": "replay.js",
 }
-PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt")
+PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt", "three-LICENSE.txt")
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class Report:
         return self.written + self.skipped
 
 
-def publish(history: Source, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
+def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red.
@@ -66,16 +71,16 @@ def publish(history: Source, out: Path, accepted: Sequence[Accepted] = ()) -> Re
     names = {name: _hashed(ASSETS[name], content) for name, content in contents.items()}
     making = digest(*(path.read_bytes() for path in sorted([*templates.iterdir(), *_sources()])))
     made = environment(templates)
-    told = book(history)
+    told = book(history, accepted)
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
-        events = all_events(told, accepted) if told.nights else []
+        events = all_events(told) if told.nights else []
         levels = digest(making.encode(), repr(accepted).encode())
-        compared = comparisons(history, told, events, accepted, read_known(out, levels))
+        compared = comparisons(history, told, accepted, read_known(out, levels))
         for page in pages(told, events, compared):
             context = _context(page, names, told.nights[-1] if told.nights else None)
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
@@ -105,6 +110,8 @@ def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Cal
             partial(data_files.history_csv, told, test),
         )
         yield f"data/{slug(test.name)}.json", facts, partial(data_files.test_json, told, test)
+    for path, content in replay_files(told.tests):
+        yield path, content, partial(bytes, content)
     tables = {
         "tonight": data_files.newest(told, told.tests),
         "nights": data_files.nights(told),
@@ -118,8 +125,8 @@ def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Cal
         yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
     news = feed.atom(told, events, {test.name: address(test) for test in told.tests})
     yield "feed.xml", news, partial(bytes, news)
-    state, kept, gates = health(told, events)
-    words = feed.badge_words(kept, gates)
+    state, found = health(told)
+    words = feed.badge_words(found)
     yield "badge.svg", (state + words).encode(), partial(feed.badge_svg, state, words)
     yield "badge.json", (state + words).encode(), partial(feed.badge_json, state, words)
 
