@@ -7,13 +7,14 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
     accepted_option,
     database_option,
     example,
+    limit_option,
     recorded,
     source_options,
     terminated_is_interrupted,
@@ -70,6 +71,7 @@ def _print_versions() -> None:
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
 @workers_option
+@limit_option
 @source_options
 @database_option
 def run_command(
@@ -84,30 +86,42 @@ def run_command(
     workers: int,
     time_limit: float,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
-    """Run scalar tests (all, or those named), print the pass table and record one run."""
+    """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
     request = Request(
         tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
     )
-    document = _measure(request, engine, catalogue, None if no_record else database)
-    _print_run(document, everything)
-    if json_file:
-        _write(json_file, _json(document))
-    if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_run
+    names = engine.split(",")
+    red = False
+    for name in names:
+        document = _measure(request, name, limit, catalogue, None if no_record else database)
+        _print_run(document, everything)
+        if json_file:
+            _write(_of_engine(json_file, name, names), _json(document))
+        if junit_file:
+            from spook_tracker.tracker.cli.report_junit import junit_of_run
 
-        _write(junit_file, junit_of_run(document))
-    _exit_red_if(document)
+            _write(_of_engine(junit_file, name, names), junit_of_run(document))
+        red = red or _red(document)
+    if red:
+        click.get_current_context().exit(RED)
+
+
+def _of_engine(file: Path, name: str, names: list[str]) -> Path:
+    """One file each where several engines were asked: run.json, run-mujoco.json."""
+    return file if name == names[0] else file.with_stem(f"{file.stem}-{name.replace(':', '-')}")
 
 
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
 @workers_option
+@limit_option
 @click.option(
     "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
 )
@@ -126,6 +140,7 @@ def nightly(
     json_file: Path | None,
     junit_file: Path | None,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
@@ -133,6 +148,12 @@ def nightly(
     from spook_tracker.tracker.cli.console import say, watching
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import nightly as night
+    from spook_tracker.tracker.measure.run import Request
+
+    first, *others = engine.split(",")
+    for other in others:
+        asked = Request(sweep=not quick, workers=workers, trigger="nightly")
+        _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:
         if isinstance(news, list):
@@ -153,13 +174,16 @@ def nightly(
             watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
             tell=tell,
             catalogue=catalogue,
-            engine=engine,
+            engine=first,
+            limit=limit,
             figures=True,
             sweep=not quick,
             stability=not quick,
             workers=workers,
             time_limit=time_limit,
         )
+    for sentence in report.notes:
+        say(f"note: {sentence}")
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -167,6 +191,15 @@ def nightly(
     _say_published(report.published, out)
     if report.red:
         click.get_current_context().exit(RED)
+
+
+@main.command(epilog=example("tracker engines"))
+def engines() -> None:
+    """The engines that can be asked, in which configurations, and what is missing for the others."""
+    import spook_tracker.tracker.cli.report_engines as report
+    from spook_tracker.tracker.cli.console import say
+
+    say("\n".join(report.engine_lines()))
 
 
 @main.command(epilog=example("tracker publish --out public"))
@@ -215,16 +248,16 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
     main.add_command(command)
 
 
-def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
+def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
     from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
-    source = Questions(catalogue=catalogue, engine=engine)
+    source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
     if database is None:
         with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
@@ -251,11 +284,10 @@ def _print_run(document: Any, everything: bool) -> None:
     say(pass_table(document, everything))
 
 
-def _exit_red_if(document: Any) -> None:
+def _red(document: Any) -> bool:
     from spook_tracker.tracker.cli.report_table import red
 
-    if red(document):
-        click.get_current_context().exit(RED)
+    return bool(red(document))
 
 
 def _say_published(report: Any, out: Path) -> None:

@@ -41,10 +41,10 @@ def source_options(command: Command) -> Command:
     for option in (
         click.option(
             "--engine",
-            metavar="MODULE",
+            metavar="NAME[,NAME]",
             envvar="TRACKER_ENGINE",
-            default="spook_tracker.engine",
-            help="Another engine behind the same simulate(); also TRACKER_ENGINE.",
+            default="spook",
+            help="spook, mujoco, … (see: tracker engines) or module:NAME; also TRACKER_ENGINE.",
         ),
         click.option(
             "--catalogue",
@@ -56,6 +56,16 @@ def source_options(command: Command) -> Command:
     ):
         command = option(command)
     return command
+
+
+def limit_option(command: Command) -> Command:
+    """--limit SECONDS, so that a slow engine does not hold up a night."""
+    return click.option(
+        "--limit",
+        metavar="SECONDS",
+        type=click.FloatRange(min=0.0, min_open=True),
+        help="Wall time one simulation may take; by default 10 s for another engine.",
+    )(command)
 
 
 def workers_option(command: Command) -> Command:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -94,6 +95,12 @@ def ask(question: Callable[[], Any]) -> Outcome:
         return Outcome(None, status if status != "completed" else "crashed", sentence(str(failure)))
     except NoAnswer as lost:
         return Outcome(None, lost.outcome, str(lost))
+    except NotSupported as lack:
+        return Outcome(None, "not_supported", sentence(str(lack)))
+    except ZeroDivisionError:
+        return Outcome(
+            None, "not_finite", "the measurement divided by zero: a force or a length it needs was none"
+        )
     except SystemExit:
         return Outcome(None, "crashed", "the test tried to end the tracker")
     except RecursionError:

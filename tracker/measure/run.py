@@ -19,8 +19,10 @@ from typing import Any, Literal
 
 import msgspec
 
+import spook_tracker.tracker.measure.others as others
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
+from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -49,6 +51,7 @@ from spook_tracker.tracker.measure.question import (
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
+PEER_TIME_LIMIT = 10.0  # s of wall time per simulation of an engine that is only shown
 
 
 class RunError(TrackerError):
@@ -60,7 +63,8 @@ class Questions:
     """Where the questions and the engine are found, by name."""
 
     catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
-    engine: str = "spook_tracker.engine"  # a module with simulate, explain and build_info
+    engine: str = "spook"  # as `engine.find` knows it
+    limit: float | None = None  # s of wall time for one simulation; None leaves it to the test
 
     def tests(self) -> Mapping[str, ScalarTest]:
         module, _, attribute = self.catalogue.partition(":")
@@ -72,15 +76,16 @@ class Questions:
             raise RunError(
                 f"there is no catalogue {self.catalogue!r} ({error}); name one as module:NAME"
             ) from None
-        return found
+        engine = self.module()
+        configurations = getattr(engine, "configurations", ())
+        return others.asked_of(found, configurations, engine.gating) if configurations else found
 
     def module(self) -> Any:
+        """The engine: simulate, build_info, and its configurations if it is not ours."""
         try:
-            return importlib.import_module(self.engine)
-        except ImportError as error:
-            raise RunError(
-                f"engine {self.engine!r} cannot be imported ({error}); build it with: pip install -e ."
-            ) from None
+            return find(self.engine)
+        except EngineMissing as error:
+            raise RunError(str(error)) from None
 
     def simulate(self) -> Simulate:
         module = self.module()
@@ -88,7 +93,16 @@ class Questions:
             simulate: Simulate = module.simulate
         except AttributeError:
             raise RunError(f"engine {self.engine!r} has no function simulate; it is not an engine") from None
-        return simulate
+        limit = self.limit
+        if limit is None and hasattr(module, "configurations"):
+            limit = PEER_TIME_LIMIT
+        return simulate if limit is None else partial(_limited, simulate, limit)
+
+
+def _limited(simulate: Simulate, limit: float, scene: Any, **options: Any) -> Any:
+    """Simulate for at most `limit` seconds of wall time."""
+    options["time_limit"] = min(limit, options.get("time_limit") or limit)
+    return simulate(scene, **options)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,7 +320,8 @@ def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int]
     names, errors, repeats = piece
     tests, simulate = select(source.tests(), names), source.simulate()
     timed = ladders.timed_series(tests, errors, simulate, repeats)
-    return timed, ladders.saved_by_leaving_out(tests, simulate)
+    stages_can_be_forced = not hasattr(source.module(), "configurations")  # ours only
+    return timed, ladders.saved_by_leaving_out(tests, simulate) if stages_can_be_forced else {}
 
 
 def _timed(source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors) -> Timed:
