@@ -7,14 +7,17 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
     accepted_option,
     database_option,
     example,
+    limit_option,
+    recorded,
     source_options,
+    terminated_is_interrupted,
     workers_option,
 )
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
@@ -68,6 +71,7 @@ def _print_versions() -> None:
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
 @workers_option
+@limit_option
 @source_options
 @database_option
 def run_command(
@@ -80,29 +84,44 @@ def run_command(
     json_file: Path | None,
     junit_file: Path | None,
     workers: int,
+    time_limit: float,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
-    """Run scalar tests (all, or those named), print the pass table and record one run."""
+    """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
-    request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
-    document = _measure(request, engine, catalogue, None if no_record else database)
-    _print_run(document, everything)
-    if json_file:
-        _write(json_file, _json(document))
-    if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_run
+    request = Request(
+        tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
+    )
+    names = engine.split(",")
+    red = False
+    for name in names:
+        document = _measure(request, name, limit, catalogue, None if no_record else database)
+        _print_run(document, everything)
+        if json_file:
+            _write(_of_engine(json_file, name, names), _json(document))
+        if junit_file:
+            from spook_tracker.tracker.cli.report_junit import junit_of_run
 
-        _write(junit_file, junit_of_run(document))
-    _exit_red_if(document)
+            _write(_of_engine(junit_file, name, names), junit_of_run(document))
+        red = red or _red(document)
+    if red:
+        click.get_current_context().exit(RED)
+
+
+def _of_engine(file: Path, name: str, names: list[str]) -> Path:
+    """One file each where several engines were asked: run.json, run-mujoco.json."""
+    return file if name == names[0] else file.with_stem(f"{file.stem}-{name.replace(':', '-')}")
 
 
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
 @workers_option
+@limit_option
 @click.option(
     "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
 )
@@ -116,10 +135,12 @@ def nightly(
     out: Path,
     quick: bool,
     workers: int,
+    time_limit: float,
     accepted: Path | None,
     json_file: Path | None,
     junit_file: Path | None,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
@@ -127,6 +148,12 @@ def nightly(
     from spook_tracker.tracker.cli.console import say, watching
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import nightly as night
+    from spook_tracker.tracker.measure.run import Request
+
+    first, *others = engine.split(",")
+    for other in others:
+        asked = Request(sweep=not quick, workers=workers, trigger="nightly")
+        _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:
         if isinstance(news, list):
@@ -134,11 +161,12 @@ def nightly(
 
             say("\n".join(finding_lines(news, f"{out}/")))
             return
+        recorded(news.id)
         _print_run(news, everything=False)
         if json_file:
             _write(json_file, _json(news))
 
-    with watching("measuring") as step:
+    with watching("measuring") as step, terminated_is_interrupted():
         report = night(
             database,
             out,
@@ -146,12 +174,16 @@ def nightly(
             watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
             tell=tell,
             catalogue=catalogue,
-            engine=engine,
+            engine=first,
+            limit=limit,
             figures=True,
             sweep=not quick,
             stability=not quick,
             workers=workers,
+            time_limit=time_limit,
         )
+    for sentence in report.notes:
+        say(f"note: {sentence}")
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -159,6 +191,15 @@ def nightly(
     _say_published(report.published, out)
     if report.red:
         click.get_current_context().exit(RED)
+
+
+@main.command(epilog=example("tracker engines"))
+def engines() -> None:
+    """The engines that can be asked, in which configurations, and what is missing for the others."""
+    import spook_tracker.tracker.cli.report_engines as report
+    from spook_tracker.tracker.cli.console import say
+
+    say("\n".join(report.engine_lines()))
 
 
 @main.command(epilog=example("tracker publish --out public"))
@@ -207,26 +248,32 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
     main.add_command(command)
 
 
-def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
+def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Questions, run
+    from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
-    source = Questions(catalogue=catalogue, engine=engine)
+    source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
     if database is None:
-        with watching("measuring") as step:
+        with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record
 
     with session_on(database) as session:
-        with watching("measuring") as step:
-            document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        try:
+            with watching("measuring") as step, terminated_is_interrupted():
+                document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        except Interrupted as ended:
+            record(session, ended.document)
+            ended.recorded = True
+            raise
         record(session, document)
+    recorded(document.id)
     return document
 
 
@@ -237,11 +284,10 @@ def _print_run(document: Any, everything: bool) -> None:
     say(pass_table(document, everything))
 
 
-def _exit_red_if(document: Any) -> None:
+def _red(document: Any) -> bool:
     from spook_tracker.tracker.cli.report_table import red
 
-    if red(document):
-        click.get_current_context().exit(RED)
+    return bool(red(document))
 
 
 def _say_published(report: Any, out: Path) -> None:
@@ -253,7 +299,9 @@ def _say_published(report: Any, out: Path) -> None:
 def _json(document: Any) -> str:
     import msgspec
 
-    return msgspec.json.format(msgspec.json.encode(document), indent=1).decode() + "\n"
+    import spook_tracker.tracker.document.outside as outside
+
+    return outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
 
 
 def _write(file: Path, text: str) -> None:

@@ -15,7 +15,9 @@ import msgspec
 
 SCHEMA_VERSION = 1
 
-OutcomeClass = Literal["value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing"]
+OutcomeClass = Literal[
+    "value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing", "not_supported"
+]
 Text = Annotated[str, msgspec.Meta(max_length=65_536)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 Number = float | Literal["nan", "inf", "-inf"]
@@ -60,7 +62,7 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     unit: Text
     role: Literal["gate", "companion", "reported"]
     better: Literal["smaller_magnitude", "larger", "smaller", "inside"]
-    kind: Literal["scalar", "ladder", "order", "time", "break_point"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point", "work"]
     time_step: float | None  # s
     parameters: dict[str, float]
     limit: float | tuple[float, float] | None
@@ -256,6 +258,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
     trajectories: tuple[Trajectory, ...] = ()
+    partial: bool = False  # interrupted: only what was finished by then
 
 
 class Run(Protocol):

@@ -35,7 +35,16 @@ NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_name)s",
     "ck": "ck_%(table_name)s_%(constraint_name)s",
 }
-OUTCOMES = ("value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing")
+OUTCOMES = (
+    "value",
+    "out_of_limit",
+    "not_finite",
+    "diverged",
+    "timed_out",
+    "crashed",
+    "missing",
+    "not_supported",
+)
 SPECIALS = ("nan", "inf", "-inf", "-0.0")  # float64 values that not every database keeps
 
 
@@ -222,6 +231,7 @@ class Run(Base):
     test_cards_id: Mapped[int] = _reference("test_cards.id", "wording of the tests")
     series_list_id: Mapped[int] = _reference("series_list.id", "definitions used")
     gates: Mapped[int] = mapped_column(BigInteger, comment="number of gate samples")
+    partial: Mapped[bool] = mapped_column(comment="interrupted: only what was finished by then")
     gates_passed: Mapped[int] = mapped_column(
         BigInteger, comment="gate samples inside their limit that night"
     )
@@ -247,7 +257,7 @@ class Sample(Base):
     value: Mapped[float | None] = mapped_column(Double, comment="the float64; NULL if it is not finite")
     special: Mapped[str | None] = _text("nan, inf, -inf or -0.0 where the value is one of these")
     outcome: Mapped[str] = _text(
-        "class: value, out_of_limit, not_finite, diverged, timed_out, crashed, missing"
+        "class: value, out_of_limit, not_finite, diverged, timed_out, crashed, missing, not_supported"
     )
     passed: Mapped[bool] = mapped_column(comment="inside the limit of that night")
     set_point_held: Mapped[bool] = mapped_column(comment="inside the band theory expects")

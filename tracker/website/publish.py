@@ -23,6 +23,7 @@ from spook_tracker.tracker.website import data_files, feed
 from spook_tracker.tracker.website.comparisons import FILE, comparisons, read_known, stored
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
+from spook_tracker.tracker.website.live_module import module_script
 from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_rows import Page, address
@@ -42,6 +43,8 @@ ASSETS = {  # name in templates: file under site/static
     "view": "scene-view.js",
     "player": "player.js",
     "replay": "replay.js",
+    "live_engine": "live-engine.js",
+    "live": "live.js",
 }
 PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt", "three-LICENSE.txt")
 
@@ -75,13 +78,17 @@ def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> R
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
+        module = ""
+        if (engine := module_script(static)) is not None:
+            module = f"assets/{_hashed('live-module.js', engine)}"
+            folder.add(module, digest(engine), partial(bytes, engine))
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
         events = all_events(told) if told.nights else []
         levels = digest(making.encode(), repr(accepted).encode())
         compared = comparisons(history, told, accepted, read_known(out, levels))
-        for page in pages(told, events, compared):
+        for page in pages(told, events, compared, module):
             context = _context(page, names, told.nights[-1] if told.nights else None)
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
 
@@ -149,6 +156,7 @@ def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:
         "navigation": NAVIGATION,
         "assets": assets,
         "plotly": page.plotly,
+        "module": "",  # the live page has one
         "night": night,
         **page.context,
     }
