@@ -11,6 +11,7 @@ import pytest
 
 from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.series_history import commit_of
+from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import MISSING, arrive, browser, look, programs, wait_for
 from tests.synthetic_history import SEVEN, history
@@ -161,7 +162,11 @@ def test_compare_shows_the_verdicts_of_the_command(driver: Any, site: Path, nigh
         sides = [
             (
                 run,
-                ComparedRun(side=side_of(run), samples=nights.samples(run.id), maps=nights.maps(run.id)),
+                ComparedRun(
+                    side=side_of(run),
+                    samples=with_work(nights.samples(run.id), run.engine),
+                    maps=nights.maps(run.id),
+                ),
             )
             for run in (runs[before], runs[after])
         ]

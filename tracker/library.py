@@ -52,10 +52,15 @@ def record(document: RunDocument, database: str) -> bool:
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
     """What changed between two versions, each named as on the command line."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
+    from spook_tracker.tracker.judge.work import with_work
 
     old, new = history.resolve(before), history.resolve(after)
     earlier, later = (
-        ComparedRun(side=side_of(run), samples=history.samples(run.id), maps=history.maps(run.id))
+        ComparedRun(
+            side=side_of(run),
+            samples=with_work(history.samples(run.id), run.engine),
+            maps=history.maps(run.id),
+        )
         for run in (old, new)
     )
     return compare_in(history, (old, earlier), (new, later), accepted)
@@ -111,6 +116,7 @@ class NightlyReport:
     document: RunDocument
     findings: list[Finding]
     published: Any
+    notes: tuple[str, ...] = ()  # entries of accepted.toml that do nothing
 
     @property
     def red(self) -> bool:
@@ -130,20 +136,30 @@ def nightly(
     """Measure everything, record it, judge it against the history, publish the website.
 
     The database is opened first: no night is measured in vain. `tell` is called with the run document and
-    with the findings as soon as they are there. `asked` as for `run`.
+    with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded as far as
+    it came (Interrupted says which run), neither judged nor published.
     """
+    from spook_tracker.tracker.judge.accepted import unused
+    from spook_tracker.tracker.judge.series_history import night_of
+    from spook_tracker.tracker.measure.run import Interrupted
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
 
     with session_on(database) as session:
-        document = run(watch=watch, trigger="nightly", **asked)
+        try:
+            document = run(watch=watch, trigger="nightly", **asked)
+        except Interrupted as ended:
+            ended.recorded = store(session, ended.document)
+            raise
         store(session, document)
         tell(document)
         history = History(session)
         findings = judge(history, document.id, accepted)
         tell(findings)
+        names = {finding.series for finding in findings} | set(history.series_keys())
+        notes = unused(accepted, names, night_of(history.run(document.id)))
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
         published = publish(history, out, accepted)
-    return NightlyReport(document=document, findings=findings, published=published)
+    return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

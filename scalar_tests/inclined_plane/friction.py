@@ -156,6 +156,7 @@ TEST = ScalarTest(
                     better="inside",
                     limit=(FRICTION - 1e-4, FRICTION + 1e-4),
                     limit_source="thesis, section 4.2; it would catch a coefficient 0.02 % too small",
+                    every_engine=True,
                     set_point=(FRICTION - 1e-9, FRICTION + 1e-9),
                     set_point_source="Coulomb's law to the solver's tolerance",
                     reference=FRICTION,

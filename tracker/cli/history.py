@@ -65,11 +65,18 @@ def compare(
 
     levels = accepted_levels(accepted)
     with history_of(database) as history:
+        if form == "table" and {before, after} <= {run.engine.name for run in history.runs()}:
+            import spook_tracker.tracker.cli.rank as ranking
+
+            say("\n".join(ranking.table_lines(history, (before, after))))  # two engines: nobody regressed
+            return
         document = compared(history, before, after, levels)
     if form == "json":
         import msgspec
 
-        click.echo(msgspec.json.format(msgspec.json.encode(document), indent=1).decode())
+        import spook_tracker.tracker.document.outside as outside
+
+        click.echo(outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()))
     elif form == "junit":
         from spook_tracker.tracker.cli.report_junit import junit_of_comparison
 
@@ -92,6 +99,39 @@ def _exit_as(document: Any, fail_on: str) -> None:
     if fail_on == "change" and code == 0 and document.verdict != "identical":
         code = RED
     click.get_current_context().exit(code)
+
+
+@click.command("judge", epilog=example("tracker judge latest", "tracker judge 0f3c --junit judged.xml"))
+@click.argument("run", metavar="RUN")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
+@click.option(
+    "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
+)
+@accepted_option
+@database_option
+def judge_command(
+    run: str, as_json: bool, junit_file: Path | None, accepted: Path | None, database: str
+) -> None:
+    """Judge a recorded or imported run against everything measured before it.
+
+    RUN is named as for compare. What is red ends with exit code 1.
+    """
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
+    from spook_tracker.tracker.library import judge
+
+    with history_of(database) as history:
+        findings = judge(history, run, accepted_levels(accepted))
+    if junit_file:
+        from spook_tracker.tracker.cli.report_junit import junit_of_night
+
+        junit_file.write_text(junit_of_night(findings), encoding="utf-8")
+    if as_json:
+        click.echo(findings_json(findings))
+    else:
+        say("\n".join(finding_lines(findings)))
+    if any(finding.red for finding in findings):
+        click.get_current_context().exit(RED)
 
 
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))

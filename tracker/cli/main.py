@@ -7,7 +7,9 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+import spook_tracker.tracker.cli.rank as ranking
+import spook_tracker.tracker.cli.releases as releases
+from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
@@ -15,7 +17,9 @@ from spook_tracker.tracker.cli.options import (
     database_option,
     example,
     limit_option,
+    recorded,
     source_options,
+    terminated_is_interrupted,
     workers_option,
 )
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
@@ -82,6 +86,7 @@ def run_command(
     json_file: Path | None,
     junit_file: Path | None,
     workers: int,
+    time_limit: float,
     engine: str,
     limit: float | None,
     catalogue: str,
@@ -90,7 +95,9 @@ def run_command(
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
-    request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
+    request = Request(
+        tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
+    )
     names = engine.split(",")
     red = False
     for name in names:
@@ -130,6 +137,7 @@ def nightly(
     out: Path,
     quick: bool,
     workers: int,
+    time_limit: float,
     accepted: Path | None,
     json_file: Path | None,
     junit_file: Path | None,
@@ -155,11 +163,12 @@ def nightly(
 
             say("\n".join(finding_lines(news, f"{out}/")))
             return
+        recorded(news.id)
         _print_run(news, everything=False)
         if json_file:
             _write(json_file, _json(news))
 
-    with watching("measuring") as step:
+    with watching("measuring") as step, terminated_is_interrupted():
         report = night(
             database,
             out,
@@ -173,7 +182,10 @@ def nightly(
             sweep=not quick,
             stability=not quick,
             workers=workers,
+            time_limit=time_limit,
         )
+    for sentence in report.notes:
+        say(f"note: {sentence}")
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -238,26 +250,45 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (
+    releases.backfill,
+    ranking.rank,
+    compare,
+    judge_command,
+    trend,
+    list_tests,
+    show,
+    explain,
+    export,
+    import_files,
+    db,
+    schema,
+):
     main.add_command(command)
 
 
 def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Questions, run
+    from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
     source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
     if database is None:
-        with watching("measuring") as step:
+        with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record
 
     with session_on(database) as session:
-        with watching("measuring") as step:
-            document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        try:
+            with watching("measuring") as step, terminated_is_interrupted():
+                document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        except Interrupted as ended:
+            record(session, ended.document)
+            ended.recorded = True
+            raise
         record(session, document)
+    recorded(document.id)
     return document
 
 
@@ -283,7 +314,9 @@ def _say_published(report: Any, out: Path) -> None:
 def _json(document: Any) -> str:
     import msgspec
 
-    return msgspec.json.format(msgspec.json.encode(document), indent=1).decode() + "\n"
+    import spook_tracker.tracker.document.outside as outside
+
+    return outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
 
 
 def _write(file: Path, text: str) -> None:

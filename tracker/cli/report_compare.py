@@ -250,3 +250,25 @@ def _finding_line(finding: Finding, site: str) -> str:
         parts.append(("" if finding.news else "still red: ") + finding.blame)
     parts.append(f"see {site}{page_of(finding.test)}")
     return clean("; ".join(parts))
+
+
+def findings_json(findings: Sequence[Finding]) -> str:
+    """What tonight came to, the worst first, as JSON: a list with an object for each series."""
+    import msgspec
+
+    told = [
+        {
+            "series": finding.series,
+            "test": finding.test,
+            "word": finding.verdict.word,
+            "name": finding.name if finding.red else "",
+            "red": finding.red,
+            "news": finding.red and finding.news,
+            "sentence": finding.verdict.sentence,
+            "value": finding.judged.night.sample.value if finding.judged else None,
+            "first_bad": finding.first_bad,
+            "last_good": finding.last_good,
+        }
+        for finding in findings
+    ]
+    return msgspec.json.format(msgspec.json.encode(told), indent=1).decode()

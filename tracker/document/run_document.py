@@ -62,7 +62,7 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     unit: Text
     role: Literal["gate", "companion", "reported"]
     better: Literal["smaller_magnitude", "larger", "smaller", "inside"]
-    kind: Literal["scalar", "ladder", "order", "time", "break_point"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point", "work"]
     time_step: float | None  # s
     parameters: dict[str, float]
     limit: float | tuple[float, float] | None
@@ -258,6 +258,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
     trajectories: tuple[Trajectory, ...] = ()
+    partial: bool = False  # interrupted: only what was finished by then
 
 
 class Run(Protocol):

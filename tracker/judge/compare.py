@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal
 
@@ -18,21 +18,15 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.lane import Records, histories, line_of
-from spook_tracker.tracker.judge.noise import Usual, judge_time, to_be_confirmed
-from spook_tracker.tracker.judge.series_history import Told, commit_of, judge_all, red_class
+from spook_tracker.tracker.judge.noise import Usual, judge_time, only_followed, to_be_confirmed
+from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off, judge_all, red_class
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class
+from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
-FAMILY = {
-    "scalar": "values",
-    "ladder": "sweep",
-    "order": "sweep",
-    "time": "sweep",
-    "break_point": "stability",
-}
 TIMES = ("time", "run_time")
 DOUBLED = 0.3  # decades: a time read off one session that doubled is worth a line, though it proves nothing
 
@@ -44,6 +38,7 @@ class ComparedRun:
     side: Side
     samples: Samples
     maps: Sequence[MapData] = ()
+    whole: bool = False  # the whole catalogue was asked: what is not there was removed
 
     @property
     def night(self) -> date:
@@ -147,6 +142,7 @@ def compare_in(
     line = line_of(runs, newest)
     timed = {key for key, (d, s) in later.samples.items() if d.kind == "time" or s.timing is not None}
     told = judge_all(histories(records, line, timed)) if timed and len(line) > 1 else {}
+    later = replace(later, whole=getattr(new, "trigger", "") == "nightly")
     document = compare(earlier, later, accepted, known(told, old.id, new.id))
     reds = {change.series for change in document.changes if change.red} - told.keys()
     if not reds:
@@ -169,16 +165,20 @@ def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regress
 
 def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> list[Change]:
     old_run, new_run = before.side, after.side
-    measured = {(definition.test, FAMILY[definition.kind]) for definition, _ in after.samples.values()}
+    measured = {(definition.test, FAMILIES[definition.kind]) for definition, _ in after.samples.values()}
     changes = []
     for key in before.samples.keys() | after.samples.keys():
         old, new = before.samples.get(key), after.samples.get(key)
+        if (old is None or new is None) and (old or new)[0].kind == "work":  # type: ignore[index]
+            continue  # a sum of what is told by itself
         if old is None and new is not None:
             verdict = Verdict(word="new", sentence="measured for the first time")
             changes.append(_change(key, new[0], None, new[1], verdict))
         elif new is None and old is not None:
-            asked = (old[0].test, FAMILY[old[0].kind]) in measured
-            changes.append(_gone(key, old, asked))
+            family = FAMILIES[old[0].kind]
+            asked = (old[0].test, family) in measured
+            removed = after.whole and old[0].role == "gate" and any(f == family for _, f in measured)
+            changes.append(_gone(key, old, asked, removed))
         elif old is not None and new is not None:
             if why := _another_question(old[0], new[0]):
                 verdict = Verdict(word="not_comparable", sentence=why)
@@ -186,6 +186,7 @@ def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> 
                 same_machine = before.side.machine == after.side.machine
                 verdict = _time_scalar(old, new, same_machine, history.usual.get(key))
                 verdict = to_be_confirmed(verdict) if key in history.suspected else verdict
+                verdict = only_followed(verdict) if is_read_off(new[0]) else verdict
             else:
                 verdict = judge(
                     new[0],
@@ -205,12 +206,15 @@ def same_commit(before: Side, after: Side) -> bool:
     return clean and (before.engine, before.git_hash) == (after.engine, after.git_hash)
 
 
-def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool) -> Change:
+def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool, removed: bool) -> Change:
     """A value that is not there: a gap where the test was run, silence where it was not asked."""
     definition, sample = old
     if asked and definition.kind != "time":
         verdict = Verdict(word="missing", sentence="no longer measured by this test", name="missing")
         return _change(key, definition, sample, None, verdict)
+    if removed:
+        words = "the whole catalogue was asked, and this gate is not in it any more"
+        return _change(key, definition, sample, None, Verdict(word="removed", sentence=words, name="removed"))
     change = _change(key, definition, sample, None, Verdict(word="same", sentence="not measured in this run"))
     return msgspec.structs.replace(change, word="not_measured")
 

@@ -34,7 +34,7 @@ class Change(Struct, frozen=True, kw_only=True):
     metric: Name
     configuration: Name
     role: Literal["gate", "companion", "reported"]
-    kind: Literal["scalar", "ladder", "order", "time", "break_point", "map", "run_time"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point", "work", "map", "run_time"]
     unit: Text
     word: Word
     red: bool

@@ -22,10 +22,9 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.document.wording import instant
+from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings
-
-Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 
 
 class Records(Protocol):
@@ -38,7 +37,7 @@ class Records(Protocol):
 
 
 def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
-    """The runs of its engine that come before a run in commit order, and the run itself.
+    """The runs of its engine that come before a run in commit order and on its own branch, and the run itself.
 
     A build with local changes or without a commit has no place in that order: it stands in nobody's history,
     unless none of the engine's runs has a place; then time orders them.
@@ -47,7 +46,36 @@ def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
     place = next(i for i, other in enumerate(of_engine) if other.id == run.id)
     versioned = any(_placed(other) for other in of_engine)
     before = [other for other in of_engine[:place] if _placed(other) or not versioned]
+    if run.engine.git_hash:
+        aside = elsewhere(before, run)
+        before = [other for other in before if other.engine.git_hash not in aside]
     return [*before, of_engine[place]]
+
+
+def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
+    """Commits among these runs that lie on another branch than a run's commit, as far as parents tell.
+
+    From both commits back along measured parents: a commit is elsewhere if both ways meet and it is on one
+    of them only. Where a way breaks off at a commit nobody measured, the order of commits has to do.
+    """
+    parents = {other.engine.git_hash: other.engine.parents for other in (*runs, run)}
+
+    def back(commit: str) -> set[str]:
+        seen: set[str] = set()
+        ahead = [commit]
+        while ahead:
+            here = ahead.pop()
+            if here in parents and here not in seen:
+                seen.add(here)
+                ahead.extend(parents[here])
+        return seen
+
+    mine = back(run.engine.git_hash)
+    return {
+        commit
+        for commit in parents
+        if commit not in mine and run.engine.git_hash not in (way := back(commit)) and mine & way
+    }
 
 
 def lines(runs: Sequence[Any]) -> list[list[Any]]:
@@ -93,7 +121,76 @@ def histories(
                 points.append(Point(place[run.id], evidence[1] if evidence else sample, version))
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
-    return found | run_times(found)
+    found = with_missing(found, runs[-RECENT:], recent)
+    tests = None if keys is None else {key.partition("/")[0] for key in keys}
+    return found | run_times(found) | work(runs[-RECENT:], recent, tests)
+
+
+def work(
+    runs: Sequence[Run], measured: Mapping[str, Samples], tests: set[str] | None
+) -> dict[str, SeriesHistory]:
+    """The histories of exact work of these tests (all if None): tracker/judge/work.py."""
+    points: dict[str, list[Point]] = {}
+    newest: dict[str, SeriesDefinition] = {}
+    for run in runs:
+        counted = {
+            key: pair
+            for key, pair in measured.get(run.id, {}).items()
+            if tests is None or key.partition("/")[0] in tests
+        }
+        for key, (definition, sample) in with_work(counted, run.engine).items():
+            if definition.kind == "work":
+                newest[key] = definition
+                points.setdefault(key, []).append(Point(run, sample, definition.test_version))
+    return {key: SeriesHistory(newest[key], tuple(found)) for key, found in points.items()}
+
+
+def with_missing(
+    found: Mapping[str, SeriesHistory], runs: Sequence[Run], measured: Mapping[str, Samples]
+) -> dict[str, SeriesHistory]:
+    """The histories with a point for every value that was asked for and not answered.
+
+    A run asks for every value of the tests it measures, of the families (values, sweep, stability) it measures;
+    a nightly asks for the whole catalogue, so that a gate whose test is gone is removed, not forgotten. What is
+    read off the clock is not missed: a machine may be too busy for it.
+    """
+    place = {run.id: i for i, run in enumerate(runs)}
+    asked = [_asked(measured.get(run.id, {})) for run in runs]
+    whole = [getattr(run, "trigger", "") == "nightly" for run in runs]
+    told = {}
+    for key, series in found.items():
+        definition = series.definition
+        if definition.kind in ("time", "work"):
+            told[key] = series
+            continue
+        points = list(series.points)
+        answered = {point.run.id for point in points}
+        first = place.get(points[0].run.id, -1)
+        for i in range(first + 1, len(runs)):
+            if runs[i].id in answered or runs[i].engine.name != points[0].run.engine.name:
+                continue
+            family = FAMILIES[definition.kind]
+            gone = definition.test not in asked[i].get(family, ())
+            if gone and not (whole[i] and definition.role == "gate" and asked[i].get(family)):
+                continue
+            why = "removed from the catalogue" if gone else "asked for and not answered"
+            lost = Sample(
+                series=key, value="nan", outcome="missing", passed=False, set_point_held=False, failure=why
+            )
+            points.append(Point(runs[i], lost, definition.test_version))
+        if len(points) > len(series.points):
+            order = {point.run.id: i for i, point in enumerate(series.points)}
+            points.sort(key=lambda p: (place.get(p.run.id, -1), order.get(p.run.id, -1)))
+        told[key] = SeriesHistory(definition, tuple(points))
+    return told
+
+
+def _asked(samples: Samples) -> dict[str, set[str]]:
+    """The tests a run measured, by family."""
+    asked: dict[str, set[str]] = {}
+    for definition, _ in samples.values():
+        asked.setdefault(FAMILIES[definition.kind], set()).add(definition.test)
+    return asked
 
 
 def run_times(found: Mapping[str, SeriesHistory]) -> dict[str, SeriesHistory]:

@@ -113,6 +113,17 @@ def to_be_confirmed(verdict: Verdict) -> Verdict:
     )
 
 
+def only_followed(verdict: Verdict) -> Verdict:
+    """A time read off a ladder is not red: the ladder's errors and its run time are judged themselves.
+
+    Between two rungs a little noise of time moves it by the order times as much, or by a whole rung.
+    """
+    if not verdict.red:
+        return verdict
+    words = f"{verdict.sentence}; the ladder's errors and its run time decide"
+    return replace(verdict, word="changed", name="", sentence=words)
+
+
 def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Verdict:
     """One value against what was usual: red if it stands clear of the noise."""
     level, threshold = usual

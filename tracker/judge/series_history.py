@@ -18,7 +18,7 @@ from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.noise import Usual, judge_noisy
+from spook_tracker.tracker.judge.noise import Usual, judge_noisy, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class, State
@@ -111,6 +111,11 @@ def is_noisy(definition: SeriesDefinition) -> bool:
     return definition.kind == "time"
 
 
+def is_read_off(definition: SeriesDefinition) -> bool:
+    """Whether a time is read off a ladder: time to an error, error in a time."""
+    return definition.metric.endswith((":time-to-error", ":error-in-time"))
+
+
 def _judge_values(
     key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> Iterator[Judged]:
@@ -120,7 +125,11 @@ def _judge_values(
     red: Judged | None = None  # the night before, if it was red
     calm: Class | None = None  # what the night before stood for, if it can be repeated without a look
     gone: set[float] = set()  # bad values that had been mended
+    lent: tuple[Point, Accepted] | None = None  # the level before one that is accepted until a day
     for night in history:
+        if lent is not None and lent[1].over(night_of(night.run)):
+            level, lent, calm = lent[0], None, None  # what was lent is due: the old level counts again
+            release = settled = level
         if calm is not None and level is not None and _repeats(level, night):
             yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
             level = night
@@ -142,7 +151,8 @@ def _judge_values(
                 words = f"{verdict.sentence}; this value came and went before"
                 verdict = replace(verdict, name="flip-flop", sentence=words)
         bad = verdict.red or broken
-        taken = acceptance(accepted, key, night.value, night_of(night.run)) if bad else None
+        gone_for_good = night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
+        taken = acceptance(accepted, key, night.value, night_of(night.run), gone_for_good) if bad else None
         if bad and taken is None:
             worse = red is None or _worsened(definition, red.night, night)
             good = (
@@ -175,7 +185,11 @@ def _judge_values(
             against=against,
             accepted=str(taken) if bad else "",
         )
-        level, red, calm = night, None, None if bad else own
+        if taken is not None and taken.until is not None and level is not night:
+            lent = lent or (level, taken)
+        elif bad or verdict.word in ("improved", "fixed"):
+            lent = None
+        level, red, calm = night, None, None if bad or lent else own
         if bad or verdict.word in ("improved", "fixed"):
             release = settled = night
         if is_release(night.run):
@@ -295,6 +309,10 @@ def _judge_times(
             accepted=[level is not None for level in taken],
         )
         for i, noisy in enumerate(verdicts):
+            if noisy.state in ("detected", "suspected") and is_read_off(definition):
+                noisy = replace(
+                    noisy, verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
+                )
             own = standing(definition, lane[i].sample)
             stands: Class = "accepted" if noisy.state == "accepted" else own
             first = lane[noisy.first_bad] if noisy.first_bad is not None else None

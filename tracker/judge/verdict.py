@@ -36,6 +36,7 @@ RANK: dict[OutcomeClass, int] = {
     "missing": 4,
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
+LAST_BITS = 16  # doubles apart: a limit crossed by so few is a matter of rounding, and is said to be
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
 ROUNDING = {"ladder": 1e-10}  # of the reference or of 1: what is rounding where no limit gives a scale
 ROUNDING_ELSE = 1e-12
@@ -78,14 +79,17 @@ def judge(
     old, new = from_number(before.value), from_number(after.value)
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
     if same_bits(old, new) and before.outcome == after.outcome:
-        if before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash):
+        same_state = before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash)
+        if same_state or definition.kind == "work":
             return Verdict(word="identical", sentence="the same bits", ulps=0)
         if same_commit:
             return _unrepeatable(decades, 0)
         return Verdict(word="changed", sentence="the same value from another final state", ulps=0)
     if same_commit:
         return _unrepeatable(decades, ulps)
-    by_class = _by_class(before, after)
+    if definition.kind == "work" and before.state_hash != after.state_hash:
+        return Verdict(word="changed", sentence=_distance(decades, None, "other work for other answers"))
+    by_class = _by_class(before, after, decades, ulps)
     if by_class is not None:
         return by_class
     if not (math.isfinite(old) and math.isfinite(new)):
@@ -126,15 +130,25 @@ def _words(outcome: OutcomeClass) -> str:
     return outcome.replace("_", " ")
 
 
-def _by_class(before: Sample, after: Sample) -> Verdict | None:
+def _by_class(before: Sample, after: Sample, decades: float | None, ulps: int | None) -> Verdict | None:
     old, new = RANK[before.outcome], RANK[after.outcome]
+    if after.outcome == "missing" and new > old:
+        gone: Word = "removed" if after.failure.startswith("removed") else "missing"
+        return Verdict(word=gone, sentence=after.failure or "asked for and not answered", name=gone)
     if new > old:
         crossed = after.outcome == "out_of_limit"
-        what = "crossed its limit" if crossed else f"{_words(before.outcome)} became {_words(after.outcome)}"
+        far = "" if ulps is None or ulps > LAST_BITS else f" by {ulps} ULP: the last bits decide"
+        what = (
+            f"crossed its limit{far}"
+            if crossed
+            else f"{_words(before.outcome)} became {_words(after.outcome)}"
+        )
         return Verdict(
             word="regressed",
             sentence=what + (f": {after.failure}" if after.failure else ""),
             name="limit crossed" if crossed else _words(after.outcome),
+            decades=decades,
+            ulps=ulps,
         )
     if new < old:
         word: Word = "fixed" if new == 0 else "improved"

@@ -72,6 +72,7 @@ CALLED_WORSE = {  # what a growth of badness is called, by the kind of series
     "ladder": "less accurate",
     "order": "further from its order",
     "time": "slower",
+    "work": "more work",
 }
 STATES: dict[State, str] = {
     "green": "",

@@ -29,6 +29,7 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare, known, sid
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.series_history import is_release
 from spook_tracker.tracker.judge.vocabulary import QUIET, spaced
+from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.nights import Book, Night, Records
 
 NEWEST = 10  # versions to choose from
@@ -71,8 +72,9 @@ def comparisons(
         if night.id not in sides:
             sides[night.id] = ComparedRun(
                 side=side_of(night),
-                samples=history.samples(night.id),
+                samples=with_work(history.samples(night.id), night.engine),
                 maps=history.maps(night.id),
+                whole=night.trigger == "nightly",
             )
         return sides[night.id]
 

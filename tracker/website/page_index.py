@@ -25,7 +25,8 @@ def tonight(book: Book) -> list[Trend]:
 
 def counted(book: Book) -> Count:
     """Limits and set points of the newest night."""
-    return count((t.definition, t.told.nights[-1].night.sample) for t in tonight(book))
+    samples = ((t.definition, t.told.nights[-1].night.sample) for t in tonight(book))
+    return count((definition, sample) for definition, sample in samples if sample.outcome != "missing")
 
 
 def health(book: Book) -> tuple[Class, Count]:
@@ -76,7 +77,8 @@ def counts_by_night(book: Book) -> list[Count]:
         for trend in test.trends:
             if expected(trend.definition):
                 for night, judged in zip(trend.nights, trend.told.nights, strict=True):
-                    pairs[night].append((trend.definition, judged.night.sample))
+                    if judged.night.sample.outcome != "missing":
+                        pairs[night].append((trend.definition, judged.night.sample))
     return [count(of_night) for of_night in pairs]
 
 
