@@ -77,7 +77,7 @@ def bounce_errors(
 
 
 def _measure_bounces(simulate: Simulate) -> dict[str, float]:
-    values = {}
+    values: dict[str, float] = {}
     for name, friction in (("sliding", 0.2), ("gripping", 5.0)):
         along, rebound, spin = bounce_errors(simulate, friction)
         values |= {f"{name}_speed_error": along, f"{name}_rebound_error": rebound, f"{name}_spin_error": spin}
