@@ -24,6 +24,8 @@ help:
 nightly: install
 	$(BIN)/tracker nightly --db $(DB) --out $(OUT)
 
+# Each worker has a core of its own: linear algebra with threads beside them only waits for them.
+test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	$(BIN)/pytest -q -n auto --dist loadfile
 
