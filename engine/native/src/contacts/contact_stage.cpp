@@ -194,9 +194,12 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
 
 void ContactStage::mark_held(const MixedSystem& system) {
     held_.assign(system.mass.size(), 0);
-    for (const RowBlock& block : system.rows)
+    for (const RowBlock& block : system.rows) {
+        const bool contact = block.lower[0] == 0.0 && block.upper[0] == unbounded;
+        if (contact && block.multiplier[0] == 0.0) continue;  // it did not push: not a bit may change
         for (const int body : {block.first, block.second})
             if (body >= 0) held_[body] = 1;
+    }
 }
 
 /// Velocities of all bodies after a solve; those without rows fly freely.
