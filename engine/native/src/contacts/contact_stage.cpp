@@ -228,11 +228,11 @@ bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
 void ContactStage::correct_events(const MixedSystem& system) {
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         const int u = unknown_[b];
-        if (u < 0 || event_time_[b] < 0.0 || !held_[u]) continue;
+        if (u < 0 || event_time_[b] < 0.0) continue;
+        const Vec6 after = held_[u] ? system.velocity[u] : sum(velocity_[b], kick_[b]);
         if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
         for (int i = 0; i < 3; ++i)
-            correction_[u][i] +=
-                event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
+            correction_[u][i] += event_time_[b] / options_.time_step * (predicted_[b][i] - after[i]);
     }
 }
 
