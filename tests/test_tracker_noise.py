@@ -88,7 +88,7 @@ def begins(told: list[str]) -> int:
     return sum(told[i] == "detected" != told[i - 1] for i in range(60, len(told)))
 
 
-@pytest.mark.parametrize(("share", "factor", "most"), [(0.2, 1.5, 12), (0.2, 1.08, 12), (0.5, 1.08, 40)])
+@pytest.mark.parametrize(("share", "factor", "most"), [(0.2, 1.5, 12), (0.2, 1.08, 12), (0.5, 1.08, 60)])
 def test_spikes_and_clusters_are_learnt(share, factor, most):
     """Alarms in 10 000 night-values; medians alone raised 298, 327 and 896."""
     alarms = 0
