@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+import spook_tracker.tracker.cli.rank as ranking
+import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -253,7 +255,20 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (
+    releases.backfill,
+    ranking.rank,
+    compare,
+    judge_command,
+    trend,
+    list_tests,
+    show,
+    explain,
+    export,
+    import_files,
+    db,
+    schema,
+):
     main.add_command(command)
 
 
