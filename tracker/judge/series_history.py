@@ -138,8 +138,8 @@ def _judge_values(
             continue
         own = standing(definition, night.sample)
         if own == "none":  # the engine cannot be asked this: nothing became of the level that holds
-            word = Verdict(word="not_comparable", sentence="not supported by this engine")
-            yield Judged(night=night, verdict=word, state="green", stands=own)
+            unasked = Verdict(word="not_comparable", sentence="not supported by this engine")
+            yield Judged(night=night, verdict=unasked, state="green", stands=own)
             calm = None
             continue
         broken = own in ("fail", "watch")
