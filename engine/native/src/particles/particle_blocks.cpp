@@ -69,7 +69,7 @@ void ParticleSystem::analyse_blocks() {
     ldlt_.analyse(sizes, edges, is_constraint);
     saddle_rhs_.assign(static_cast<std::size_t>(ldlt_.unknowns()), 0.0);
     saddle_ = saddle_rhs_;
-    saddle_left_ = saddle_rhs_;
+    redundant_.prepare(ldlt_);
 }
 
 void ParticleSystem::factor_blocks() {
@@ -87,13 +87,7 @@ void ParticleSystem::factor_blocks() {
     }
     std::fill(saddle_rhs_.begin(), saddle_rhs_.end(), 0.0);
     if (stiff_strings_) stiffen_strings();
-    factor_saddle();
-}
-
-void ParticleSystem::factor_saddle() {
-    const std::uint64_t floored = ldlt_.counters().floored_pivots;
-    solvable_ = ldlt_.factor(scene_.method.floor);
-    redundant_ = ldlt_.counters().floored_pivots != floored;
+    redundant_.factor(ldlt_, scene_.method.floor);
 }
 
 /// Adds K̃ + D̃ to M and −K̃ kick − D̃ (v + kick) to the right side.
@@ -130,41 +124,17 @@ void ParticleSystem::stiffen_strings() {
 void ParticleSystem::substitute_blocks() {
     for (std::size_t k = 0; k < row_.size(); ++k)
         saddle_rhs_[ldlt_.offset(row_blocks_[k].row)] = link_[k].rhs;
-    if (redundant_ || share_ > 0.0) solve_redundant();
-    else ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
+    const bool doubtful = redundant_.solve(ldlt_, scene_.method.floor, saddle_rhs_.data(), saddle_.data(),
+                                           scene_.method.refinements,
+                                           [this](std::span<const double> left) { return rows_hold(left); });
+    if (doubtful && !composed_) find_contradiction();  // a composition starts with lengths that agree
     for (std::size_t k = 0; k < row_.size(); ++k)
-        link_[k].lambda =
-            solvable_ ? -saddle_[ldlt_.offset(row_blocks_[k].row)] : std::numeric_limits<double>::quiet_NaN();
-}
-
-/// With a slight softness of all rows in the factor, refinement from zero tends to the impulses of least norm; fast,
-/// unless rows are nearly dependent as well. Then, and for good, the factor with floors does it.
-void ParticleSystem::solve_redundant() {
-    const int refinements = std::max(2, scene_.method.refinements);
-    if (share_ == 0.0) {
-        share_ = 1e-7 * ldlt_.largest_constraint_scale();
-        ldlt_.shift_constraints(share_);
-        factor_saddle();
-    }
-    if (share_ > 0.0) {
-        ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), refinements);
-        for (int round = 0; round < 6; ++round) {
-            if (saddle_is_solved()) return;
-            ldlt_.solve(saddle_left_.data());
-            for (std::size_t i = 0; i < saddle_.size(); ++i) saddle_[i] += saddle_left_[i];
-        }
-        if (saddle_is_solved()) return;
-        share_ = -1.0;
-        ldlt_.shift_constraints(0.0);
-        factor_saddle();
-    }
-    ldlt_.solve_refined(saddle_rhs_.data(), saddle_.data(), scene_.method.refinements);
-    if (redundant_ && !composed_) find_contradiction();  // a composition starts with lengths that agree
+        link_[k].lambda = redundant_.finite() ? -saddle_[ldlt_.offset(row_blocks_[k].row)]
+                                              : std::numeric_limits<double>::quiet_NaN();
 }
 
 /// Whether every row holds to rounding: of the speeds in the system, and of a length in a step.
-bool ParticleSystem::saddle_is_solved() {
-    ldlt_.residual(saddle_rhs_.data(), saddle_.data(), saddle_left_.data());
+bool ParticleSystem::rows_hold(std::span<const double> residuals) const {
     double speed = 0.0, left = 0.0, resolution = 0.0;
     for (std::size_t node = 0; node < v_.size(); ++node) {
         if (block_of_node_[node] < 0) continue;
@@ -172,7 +142,7 @@ bool ParticleSystem::saddle_is_solved() {
         speed = std::max({speed, norm(v_[node]), norm(kick_[node]), norm(change)});
     }
     for (std::size_t k = 0; k < row_.size(); ++k) {
-        const double residual = std::fabs(saddle_left_[ldlt_.offset(row_blocks_[k].row)]);
+        const double residual = std::fabs(residuals[ldlt_.offset(row_blocks_[k].row)]);
         if (!(residual <= left)) left = residual;
         speed = std::max(speed, std::fabs(link_[k].rhs));
         resolution = std::max(resolution, row_[k].violation_gain * row_[k].rest);
@@ -184,7 +154,7 @@ bool ParticleSystem::saddle_is_solved() {
 /// violation: a few times (h v)²/l. Rows that cannot hold together keep a residual of the size of the speeds they ask
 /// for, and larger than that.
 void ParticleSystem::find_contradiction() {
-    ldlt_.residual(saddle_rhs_.data(), saddle_.data(), saddle_left_.data());
+    const std::vector<double>& residuals = redundant_.residual(ldlt_, saddle_rhs_.data(), saddle_.data());
     double speed = 0.0, largest = 0.0, curved = 0.0;
     std::size_t worst = 0;
     for (const Vec3& kick : kick_) speed = std::max(speed, norm(kick));
@@ -193,7 +163,7 @@ void ParticleSystem::find_contradiction() {
         const Vec3 moved = h_ * (v_[row_[k].b] - v_[row_[k].a]);
         const double unseen = 1e-9 * row_[k].rest + 10.0 * curvature(link_[k].u, link_[k].length, moved);
         curved = std::max(curved, row_[k].violation_gain * unseen);
-        const double residual = std::fabs(saddle_left_[ldlt_.offset(row_blocks_[k].row)]);
+        const double residual = std::fabs(residuals[ldlt_.offset(row_blocks_[k].row)]);
         if (residual <= largest) continue;
         largest = residual;
         worst = k;

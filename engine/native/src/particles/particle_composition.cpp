@@ -190,7 +190,7 @@ double ParticleSystem::lengthen_paths(double tau, bool fresh) noexcept {
                 inverse = 1.0 / (diagonal - link.lower * upper);
                 upper = k + 1 < end ? -w_[row.b] * dot(scaled, link_[k + 1].u) : 0.0;
                 link.pivot_inverse = inverse;
-                link.length = upper;
+                upper_[k] = upper;
             }
             link.rhs = y = -0.5 * residual - link.lower * y;
         }
@@ -206,7 +206,7 @@ void ParticleSystem::shorten_paths() noexcept {
         const int first = path_first_[path], end = path_first_[path + 1];
         for (int k = end - 1; k >= first; --k) {
             Link& link = link_[k];
-            change = (link.rhs - link.length * change) * link.pivot_inverse;
+            change = (link.rhs - upper_[k] * change) * link.pivot_inverse;
             link.lambda += change;
             const Vec3 in = change * link.u;
             v_[row_[k].b] += w_[row_[k].b] * (in - out);
@@ -256,17 +256,17 @@ double ParticleSystem::lengthen_blocks(double tau, bool fresh) {
 }
 
 void ParticleSystem::shorten_blocks() {
-    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].length = link_[k].lambda;
+    for (std::size_t k = 0; k < row_.size(); ++k) impulse_[k] = link_[k].lambda;
     substitute_blocks();
     push(v_);
-    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].lambda += link_[k].length;
+    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].lambda += impulse_[k];
 }
 
 /// The matrix with Sig = 0 at the directions link_.u.
 void ParticleSystem::factor_rigid_blocks() {
     factor_blocks();
     for (std::size_t k = 0; k < row_.size(); ++k) *ldlt_.diagonal(row_blocks_[k].row) = -0.0;
-    factor_saddle();
+    redundant_.factor(ldlt_, scene_.method.floor);
 }
 
 /// λ such that G M⁻¹ Gᵀ λ = rhs, rigidly.

@@ -67,6 +67,8 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene, StageList stages)
         row.diagonal = row.stiff + row.softness;
     }
     if (composed_) {
+        upper_.resize(row_.size());
+        impulse_.resize(row_.size());
         history_.resize(3 * row_.size() * composition_stages(scene.method.composition).size());
         for (int depth = 0; depth < MOST_HALVINGS; ++depth) {
             step_x_[depth].reserve(x_.size());
@@ -140,8 +142,7 @@ void ParticleSystem::reset(StageClock* clock) {
     newton_iterations_ = 0;
     residual_ = 0.0;
     contradicted_ = -1;
-    share_ = 0.0;
-    ldlt_.shift_constraints(0.0);
+    redundant_.reset(ldlt_);
     operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
     for (int body = 0; body < bodies(); ++body) {
         x_[node_of_body_[body]] = scene_.bodies[body].position;

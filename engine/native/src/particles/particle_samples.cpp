@@ -54,7 +54,7 @@ void ParticleSystem::save() {
     saved_.halved_steps = halved_steps_;
     saved_.history = history_;
     saved_.residual = residual_;
-    saved_.share = share_;
+    saved_.share = redundant_.share();
 }
 
 void ParticleSystem::restore() {
@@ -71,8 +71,7 @@ void ParticleSystem::restore() {
     history_ = saved_.history;
     residual_ = saved_.residual;
     contradicted_ = -1;
-    share_ = saved_.share;
-    ldlt_.shift_constraints(std::max(0.0, share_));
+    redundant_.restore(ldlt_, saved_.share);
 }
 
 void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
@@ -148,11 +147,7 @@ double ParticleSystem::potential_energy() const noexcept {
         for (const CentralField& field : fields_)
             energy -= mass(body) * field.strength / norm(position(body) - field.centre);
     }
-    for (const SpringNodes& s : springs_) {
-        const Vec3 d = x_[s.b] - x_[s.a];
-        const double stretch = s.spring.rest_length > 0.0 ? norm(d) - s.spring.rest_length : norm(d);
-        energy += 0.5 * s.spring.stiffness * stretch * stretch;
-    }
+    for (const SpringNodes& s : springs_) energy += spook::energy(s.spring, x_[s.b] - x_[s.a]);
     return energy;
 }
 

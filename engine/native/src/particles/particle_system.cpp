@@ -79,14 +79,7 @@ void ParticleSystem::apply_central_gravity() noexcept {
 
 void ParticleSystem::apply_springs() noexcept {
     for (const SpringNodes& s : springs_) {
-        const Vec3 d = x_[s.b] - x_[s.a];
-        Vec3 pull = s.spring.stiffness * d;  // on a, towards b
-        if (s.spring.rest_length > 0.0 || s.spring.viscosity > 0.0) {
-            const double length = norm(d);
-            const Vec3 u = length > 0.0 ? (1.0 / length) * d : Vec3{};
-            const double rate = s.spring.viscosity * dot(u, v_[s.b] - v_[s.a]);
-            pull += (rate - s.spring.stiffness * s.spring.rest_length) * u;
-        }
+        const Vec3 pull = spook::pull(s.spring, x_[s.b] - x_[s.a], v_[s.b] - v_[s.a]);
         kick_[s.a] += (h_ * w_[s.a]) * pull;
         kick_[s.b] -= (h_ * w_[s.b]) * pull;
     }

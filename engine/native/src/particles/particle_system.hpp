@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "linear/block_ldlt.hpp"
+#include "linear/redundant_rows.hpp"
 #include "linear/regularisation.hpp"
 #include "particles/particle_scene.hpp"
 #include "particles/path_order.hpp"
@@ -112,9 +114,7 @@ private:
     void factor_blocks();
     void stiffen_strings();
     void substitute_blocks();
-    void factor_saddle();
-    void solve_redundant();
-    bool saddle_is_solved();
+    bool rows_hold(std::span<const double> residuals) const;
     void find_contradiction();
 
     // particle_composition.cpp: symmetric compositions of higher order
@@ -168,11 +168,9 @@ private:
     BlockLdlt ldlt_;
     std::vector<int> block_of_node_;
     std::vector<RowBlocks> row_blocks_;
-    std::vector<double> saddle_rhs_, saddle_, saddle_left_;
+    std::vector<double> saddle_rhs_, saddle_;
     std::int64_t operations_at_start_ = 0;
-    bool solvable_ = true;    // false: the factor met a value that is not finite, so nothing it gives is used
-    bool redundant_ = false;  // the last factor has floors: some row says what others say
-    double share_ = 0.0;     // how redundant rows share their load: a softness in the factor; −1: they do not
+    RedundantRows redundant_;
     int contradicted_ = -1;  // a body held by rows that cannot hold together
     double residual_ = 0.0;
     std::int64_t sweeps_ = 0;
@@ -184,7 +182,9 @@ private:
     std::int64_t newton_iterations_ = 0, halved_steps_ = 0;
     static constexpr int MOST_HALVINGS = 12;
     std::vector<Vec3> step_x_[MOST_HALVINGS], step_v_[MOST_HALVINGS];  // where each step began
-    std::vector<double> history_;                                      // stages × three steps × rows, N
+    std::vector<double> upper_;    // super-diagonal of the Newton matrix of paths, per row
+    std::vector<double> impulse_;  // of rows before an iteration, N s
+    std::vector<double> history_;  // stages × three steps × rows, N
 
     struct Snapshot {
         std::vector<Vec3> x, v;
