@@ -210,6 +210,10 @@ class Example:
     time_step: float  # s
     method: Method = PLAIN
     observe: Mapping[str, Observable] = field(default_factory=dict)
+    duration: float = 8.0  # s, how long the page's replay is
+    exact: Callable[[float], Mapping[str, tuple[float, float, float]]] | None = (
+        None  # places [m] of bodies at a time [s], by a closed form, for the replay's ghost
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,6 +33,13 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "hanging_chain": "hanging_chain.question",
     "spinning_top": "spinning_top",
     "motor": "motor",
+    "double_pendulum": "double_pendulum",
+    # the multibody benchmark library
+    "simple_pendulum": "multibody.simple_pendulum",
+    "four_bars": "multibody.four_bars",
+    "squeezer": "multibody.squeezer",
+    "bricard": "multibody.bricard",
+    "governor": "multibody.governor",
 }
 
 CATALOGUE: dict[str, ScalarTest] = {

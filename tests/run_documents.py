@@ -5,8 +5,12 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
+import numpy as np
+
+import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.tracker.document.run_document import (
     Curve,
+    DrawnSolid,
     EngineVersion,
     FigureData,
     Machine,
@@ -17,6 +21,7 @@ from spook_tracker.tracker.document.run_document import (
     StageChoice,
     TestCard,
     Timing,
+    Trajectory,
 )
 
 KEY = "pendulum/plain/length_deviation/h=0.0166667"
@@ -152,6 +157,23 @@ def stability_map(name: str = "tau-eps", **changes: Any) -> MapData:
     return MapData(**fields | changes)
 
 
+def trajectory(name: str = "example", **changes: Any) -> Trajectory:
+    fields = {
+        "test": "pendulum",
+        "name": name,
+        "time_step": 0.01,
+        "step": 0.02,
+        "count": 3,
+        "bodies": 1,
+        "solids": (DrawnSolid(kind="particle", position=(0.0, 0.0, 1.0)),),
+        "body_of_solid": (0,),
+        "channels": (
+            motion.channel("position", "m", np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [np.nan, 0.0, 0.0]])),
+        ),
+    }
+    return Trajectory(**fields | changes)
+
+
 def run(**changes: Any) -> RunDocument:
     """A complete document with a new id; `changes` replaces whole fields."""
     number = next(_numbers)
@@ -171,6 +193,7 @@ def run(**changes: Any) -> RunDocument:
         "samples": (sample(),),
         "figures": (figure(),),
         "maps": (stability_map(),),
+        "trajectories": (trajectory(),),
     }
     return RunDocument(**fields | changes)
 

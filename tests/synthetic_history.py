@@ -26,6 +26,7 @@ from spook_tracker.tracker.document.run_document import (
     StageChoice,
     TestCard,
     Timing,
+    Trajectory,
     from_number,
     to_number,
 )
@@ -321,6 +322,9 @@ class DocumentHistory:
 
     def maps(self, run_id: str) -> tuple[MapData, ...]:
         return self.documents[run_id].maps
+
+    def trajectories(self, run_id: str) -> tuple[Trajectory, ...]:
+        return self.documents[run_id].trajectories
 
 
 def history(nights: int = 24, *, broken: int = 10**9, hostile: bool = False) -> DocumentHistory:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests import double_pendulum
 from spook_tracker.scalar_tests.beam import scene as beam
 from spook_tracker.scalar_tests.case import Measurement, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -239,3 +240,11 @@ def test_the_gate_of_the_beam_catches_the_compliance_it_says() -> None:
 
     assert "would catch" in gate.limit_source
     assert gate.limit == pytest.approx(sag, rel=0.01)
+
+
+def test_the_double_pendulum_may_be_half_a_step_off() -> None:
+    times = np.arange(0.0, double_pendulum.DURATION, 1e-4)
+    rates = np.gradient(double_pendulum.exact(tuple(times.tolist())), times, axis=0)
+    gate = CATALOGUE["double_pendulum"].measurements[0].metrics[0]
+
+    assert gate.limit == pytest.approx(0.5 * double_pendulum.TIME_STEP * np.abs(rates).max(), rel=2e-3)

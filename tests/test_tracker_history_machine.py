@@ -99,7 +99,12 @@ class Storage(RuleBasedStateMachine):
         drop_old_figures(self.session, self.history())
         for run_id in self.expected:
             stored = self.history().document(run_id)
-            kept = msgspec.structs.replace(self.expected[run_id], figures=stored.figures, maps=stored.maps)
+            kept = msgspec.structs.replace(
+                self.expected[run_id],
+                figures=stored.figures,
+                maps=stored.maps,
+                trajectories=stored.trajectories,
+            )
             assert stored == kept
             assert set(stored.figures) <= set(self.expected[run_id].figures)
             self.expected[run_id] = kept

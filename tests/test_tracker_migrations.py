@@ -198,7 +198,7 @@ def test_no_key_of_a_large_table_lacks_the_time():
     metadata = models.Base.metadata
     large = {name for name, table in metadata.tables.items() if "run_key" in table.columns}
 
-    assert large == {"sample", "evidence", "timing", "figure", "stability_map"}
+    assert large == {"sample", "evidence", "timing", "figure", "stability_map", "trajectory"}
     for name in large:
         table = metadata.tables[name]
         assert next(iter(table.primary_key.columns)).name == "started_at"

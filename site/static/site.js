@@ -53,7 +53,9 @@ function dressLayout(layout, title) {
   const ink = colour("--ink-2");
   const axis = (given) => ({
     gridcolor: grid, linecolor: colour("--line"), zerolinecolor: colour("--line"), tickcolor: colour("--line"),
-    automargin: true, exponentformat: "power", ...given, title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
+    automargin: true, exponentformat: "power", ...given,
+    ...(given && given.range ? { range: [...given.range] } : {}),  // the library writes into what it is given
+    title: { ...(given || {}).title, font: { color: colour("--ink"), size: 13 }, standoff: 8 },
   });
   const shapes = (layout.shapes || []).map((shape) => {
     if (shape.meta === "ring") {

@@ -173,6 +173,50 @@ class SceneDrawing(Struct, frozen=True, kw_only=True):
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s²
 
 
+class TrackedLink(Struct, frozen=True, kw_only=True):
+    """A link whose ends move with bodies: their index, or −1 for the world, and the place in their axes."""
+
+    kind: Literal["distance", "spring", "joint"]
+    bodies: tuple[int, int]
+    anchors: tuple[tuple[float, float, float], tuple[float, float, float]]  # m
+    row: int = -1  # its column of the violation; −1: none
+
+
+class Channel(Struct, frozen=True, kw_only=True):
+    """One quantity over the samples of a trajectory, in sixteen bits a number: low + step × code.
+
+    `data` is deflated: differences from sample to sample modulo 65536, the low bytes of all before the high
+    ones. Code 65535 is no value. The largest error of quantising is step / 2.
+    """
+
+    name: Name
+    unit: Text
+    width: int  # numbers per sample
+    low: float
+    step: float
+    data: bytes
+
+
+class Trajectory(Struct, frozen=True, kw_only=True):
+    """How a scene moved in this run, as a page replays it."""
+
+    test: Name
+    name: Name
+    time_step: float  # s, of the simulation
+    step: float  # s between samples
+    count: int
+    bodies: int
+    solids: tuple[DrawnSolid, ...]
+    body_of_solid: tuple[int, ...]
+    links: tuple[TrackedLink, ...] = ()
+    attractors: tuple[tuple[float, float, float], ...] = ()  # m
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s²
+    rows: int = 0  # columns of the violation
+    exact: Text = ""  # what the positions to compare with are
+    failure: Text = ""  # why the motion ends before its time
+    channels: tuple[Channel, ...] = ()
+
+
 class TestCard(Struct, frozen=True, kw_only=True):
     """What a page says about a test, as it was worded in this run."""
 
@@ -210,6 +254,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     samples: tuple[Sample, ...]
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
+    trajectories: tuple[Trajectory, ...] = ()
 
 
 def to_number(value: float) -> Number:

@@ -21,6 +21,7 @@ from datetime import UTC, datetime
 from multiprocessing import get_context
 from typing import Any, Literal
 
+import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -30,6 +31,7 @@ from spook_tracker.tracker.document.run_document import (
     RunDocument,
     Sample,
     SeriesDefinition,
+    Trajectory,
 )
 from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.cards import engine_version, test_card
@@ -46,7 +48,7 @@ from spook_tracker.tracker.measure.question import (
 )
 
 Trigger = Literal["manual", "nightly", "import", "test"]
-Part = Measured | FigureData | MapData
+Part = Measured | FigureData | MapData | Trajectory
 CRASH = "the engine's process died while answering"
 
 
@@ -103,13 +105,16 @@ class Request:
     repeats: int = 5  # of each timing
 
 
+Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
+
+
 @dataclass(frozen=True, order=True)
 class Task:
     """One piece of work: the index says which measurement, figure, study or ladder configuration."""
 
     position: int
     test: str
-    kind: Literal["measure", "figure", "study", "ladder"]
+    kind: Kind
     index: tuple[int, ...]
 
 
@@ -149,6 +154,7 @@ def run(source: Source, request: Request, watch: Watch = lambda progress: None) 
     measured: list[tuple[SeriesDefinition, Sample]] = []
     figures: list[FigureData] = []
     maps: list[MapData] = []
+    trajectories: list[Trajectory] = []
     errors: dict[tuple[str, int, int], ladders.ErrorPoints] = {}
     for task in tasks:
         for part in parts[task.position]:
@@ -156,6 +162,8 @@ def run(source: Source, request: Request, watch: Watch = lambda progress: None) 
                 figures.append(part)
             elif isinstance(part, MapData):
                 maps.append(part)
+            elif isinstance(part, Trajectory):
+                trajectories.append(part)
             elif isinstance(part, ladders.ErrorPoints):
                 errors[(task.test, task.index[0], task.index[1])] = part
             else:
@@ -181,6 +189,7 @@ def run(source: Source, request: Request, watch: Watch = lambda progress: None) 
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
         maps=tuple(maps),
+        trajectories=tuple(trajectories),
     )
 
 
@@ -188,10 +197,11 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
     """The pieces of work of every test, in the order in which a reader meets their results."""
     position = 0
     for name, test in tests.items():
-        wanted: list[tuple[Literal["measure", "figure", "study", "ladder"], tuple[int, ...]]] = []
+        wanted: list[tuple[Kind, tuple[int, ...]]] = []
         wanted += [("measure", (i,)) for i in range(len(test.measurements))]
         if request.figures:
             wanted += [("figure", (i,)) for i in range(len(test.figures))]
+            wanted += [("trajectory", (0,))]
         if request.stability:
             wanted += [("study", (i,)) for i in range(len(test.stability))]
         if request.sweep:
@@ -213,6 +223,9 @@ def perform(source: Source, task: Task) -> tuple[Any, ...]:
         return (measure(task.test, test, test.measurements[first], simulate),)
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], simulate),)
+    if task.kind == "trajectory":
+        moved = motion.trajectory(task.test, test, simulate)
+        return () if moved is None else (moved,)
     if task.kind == "study":
         return (study(task.test, test, test.stability[first], simulate),)
     rungs = test.ladders[first]
@@ -293,6 +306,8 @@ def _crashed(task: Task, test: ScalarTest) -> tuple[Any, ...]:
         return (tuple(lost),)
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], _dead),)
+    if task.kind == "trajectory":
+        return ()
     if task.kind == "study":
         return (study(task.test, test, test.stability[first], _dead),)
     rungs = test.ladders[first]

@@ -24,12 +24,7 @@ def drawing(scene: Scene) -> SceneDrawing:
     """The scene at its start; a very large one is drawn in part."""
     solids: list[DrawnSolid] = []
     for body in scene.bodies[:MOST_SOLIDS]:
-        if isinstance(body, Particle):
-            solids.append(DrawnSolid(kind="particle", position=body.position, velocity=body.velocity))
-        elif isinstance(body, RigidBody) and body.shape is not None:
-            solids += _solids(body.shape, body.position, body.orientation, body)
-        elif isinstance(body, RigidBody):
-            solids.append(_of_inertia(body))
+        solids += solids_of(body)
     places = {body.name: body.position for body in scene.bodies}
     turns = {body.name: getattr(body, "orientation", UPRIGHT) for body in scene.bodies}
     links: list[DrawnLink] = []
@@ -49,6 +44,15 @@ def drawing(scene: Scene) -> SceneDrawing:
         attractors=tuple(force.centre for force in scene.forces if isinstance(force, CentralGravity)),
         gravity=scene.gravity,
     )
+
+
+def solids_of(body: Particle | RigidBody) -> list[DrawnSolid]:
+    """What is seen of one body: several solids of a compound, one of any other."""
+    if isinstance(body, Particle):
+        return [DrawnSolid(kind="particle", position=body.position, velocity=body.velocity)]
+    if body.shape is None:
+        return [_of_inertia(body)]
+    return _solids(body.shape, body.position, body.orientation, body)
 
 
 def _solids(shape: Shape, position: Vector, orientation: Quaternion, body: RigidBody) -> list[DrawnSolid]:

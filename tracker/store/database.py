@@ -170,7 +170,8 @@ def _refuse_strange(connection: Connection, revision: str | None) -> None:
             f"{name} has schema revision {revision[:40]}, this tracker knows up to {head()}; "
             "update the tracker"
         )
-    if revision is None and (strange := inspect(connection).get_table_names()):
+    tables = set(inspect(connection).get_table_names()) - {"alembic_version"}  # empty: all the way down
+    if revision is None and (strange := sorted(tables)):
         raise DatabaseError(
             f"{name} holds something else (a table {strange[0][:40]!r}); choose another database"
         )

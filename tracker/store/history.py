@@ -121,6 +121,10 @@ class History:
         """The stability maps of a run; empty once the retention rule has dropped them."""
         return self._bodies(models.StabilityMap, run_id, document.MapData)
 
+    def trajectories(self, run_id: str) -> tuple[document.Trajectory, ...]:
+        """The motions recorded in a run; empty once the retention rule has dropped them."""
+        return self._bodies(models.Trajectory, run_id, document.Trajectory)
+
     def cards(self, run_id: str) -> tuple[document.TestCard, ...]:
         """What the run says about its tests."""
         cards = select(models.TestCards.body).join(models.Run).where(models.Run.key == self.run(run_id).key)
@@ -158,6 +162,7 @@ class History:
             samples=tuple(samples),
             figures=self.figures(run_id),
             maps=self.maps(run_id),
+            trajectories=self.trajectories(run_id),
         )
 
     def _read_runs(self) -> tuple[RunInfo, ...]:

@@ -1,8 +1,8 @@
 """The tables. Every column says what it holds (`comment`); migrations/ holds the same schema as revisions.
 
 Small tables (engine_version, machine, test_cards, series, definition, series_list, run) are referred to; the
-large ones (sample, evidence, timing, figure, stability_map) refer to `run` and are referred to by nobody. The
-time column leads the key of every large table, so that it can become a hypertable, a partitioned or a
+large ones (sample, evidence, timing, figure, stability_map, trajectory) refer to `run` and are referred to by
+nobody. The time column leads the key of every large table, so that it can become a hypertable, a partitioned or a
 distributed table as it stands. Ids are made by the application from the content (`identity`): two databases
 that hold the same thing hold it under the same id, and shards merge without renumbering.
 """
@@ -312,3 +312,19 @@ class StabilityMap(Base):
     test: Mapped[str] = _text("scalar test")
     name: Mapped[str] = _text("slug of the map")
     body: Mapped[bytes] = mapped_column(LargeBinary, comment="zlib of the JSON of the map")
+
+
+class Trajectory(Base):
+    """How a test's scene moved. Dropped by a rule of its own: the newest few nights and the released versions."""
+
+    __tablename__ = "trajectory"
+    __table_args__ = ({"comment": "the motion of a scene in one run, for the replay"},)
+
+    started_at: Mapped[datetime] = _started_at()
+    run_key: Mapped[int] = _reference("run.key", "the run", primary_key=True)
+    position: Mapped[int] = mapped_column(
+        BigInteger, primary_key=True, comment="place in the document, from 0"
+    )
+    test: Mapped[str] = _text("scalar test")
+    name: Mapped[str] = _text("slug of the trajectory")
+    body: Mapped[bytes] = mapped_column(LargeBinary, comment="zlib of the JSON of the trajectory")

@@ -107,6 +107,7 @@ def _store(session: Session, run: RunDocument) -> bool:
     _append(session, models.Timing, timings)
     _append(session, models.Figure, _bodies(place, run.figures))
     _append(session, models.StabilityMap, _bodies(place, run.maps))
+    _append(session, models.Trajectory, _bodies(place, run.trajectories))
     return True
 
 

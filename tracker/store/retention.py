@@ -1,13 +1,15 @@
-"""Figures and stability maps are bulky and redrawn every night: old ones are dropped, values never.
+"""Figures, stability maps and motions are bulky and made every night: old ones are dropped, values never.
 
 Kept are, for each engine, each figure and map as the newest run drew it (clean and dirty builds apart), and
 as the newest run of each released version drew it. Released is a version without a development part
-("1.2.0"), or one whose commit has a tag.
+("1.2.0"), or one whose commit has a tag. Of motions the newest eight are kept, so that a reader can lay the
+night a change came in over the one before.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection
 
 from sqlalchemy import delete, select
@@ -18,6 +20,7 @@ from spook_tracker.tracker.store.database import in_words
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.versions import RunInfo
 
+MOTIONS = 8
 RELEASE = re.compile(r"v?\d+(\.\d+)*((a|b|rc|\.post)\d+)?")
 
 
@@ -28,13 +31,13 @@ def released(run: RunInfo, tagged: Collection[str]) -> bool:
 
 
 def drop_old_figures(session: Session, history: History) -> int:
-    """Apply the rule and commit. Returns the number of figures and maps dropped."""
+    """Apply the rule and commit. Returns the number of figures, maps and motions dropped."""
     tagged = set(git.tags(history.repository).values())
     dropped = 0
     with in_words(session):
-        for model in (models.Figure, models.StabilityMap):
+        for model, most in ((models.Figure, 1), (models.StabilityMap, 1), (models.Trajectory, MOTIONS)):
             columns = (model.run_key, model.started_at, model.position, model.test, model.name)
-            kept: set[tuple[str, str, str, str]] = set()
+            kept: Counter[tuple[str, str, str, str]] = Counter()
             by_run: dict[int, list[tuple[int, str, str]]] = {}
             for run_key, _, position, test, name in session.execute(select(*columns)):
                 by_run.setdefault(run_key, []).append((position, test, name))
@@ -45,9 +48,9 @@ def drop_old_figures(session: Session, history: History) -> int:
                     versions.append(f"released {run.engine.version}")
                 for position, test, name in by_run.get(run.key, ()):
                     places = {(run.engine.name, version, test, name) for version in versions}
-                    if places <= kept:
+                    if all(kept[place] >= (most if place[1].startswith("newest") else 1) for place in places):
                         superfluous.append((run, position))
-                    kept |= places
+                    kept.update(places)
             for run, position in superfluous:
                 session.execute(
                     delete(model).where(

@@ -20,6 +20,7 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
     TestCard,
+    Trajectory,
     from_number,
 )
 from spook_tracker.tracker.document.wording import instant, version
@@ -87,6 +88,7 @@ class TestHistory:
     card: TestCard
     trends: list[Trend]
     figures: tuple[FigureData, ...] = ()
+    motions: tuple[tuple[Night, Trajectory], ...] = ()  # newest first
     maps: tuple[MapData, ...] = ()
     earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
 
@@ -150,6 +152,7 @@ class Source(Protocol):
     def cards(self, run_id: str) -> Sequence[TestCard]: ...
     def figures(self, run_id: str) -> Sequence[FigureData]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
+    def trajectories(self, run_id: str) -> Sequence[Trajectory]: ...
 
 
 def book(history: Source) -> Book:
@@ -213,6 +216,7 @@ def _chapter(
     _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
     figures: dict[str, list[FigureData]] = {}
+    motions: dict[str, list[tuple[Night, Trajectory]]] = {}
     maps: dict[MapKey, MapData] = {}
     earlier_maps: dict[MapKey, MapData] = {}
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
@@ -222,6 +226,8 @@ def _chapter(
         for figure in history.figures(night.id):
             if figure.test not in figures_found:
                 figures.setdefault(figure.test, []).append(figure)
+        for motion in history.trajectories(night.id):
+            motions.setdefault(motion.test, []).append((night, motion))
         for stability_map in history.maps(night.id):
             place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
             (earlier_maps if place_of_map in maps else maps).setdefault(place_of_map, stability_map)
@@ -238,6 +244,7 @@ def _chapter(
             card=card,
             trends=by_test.get(test, []),
             figures=tuple(figures.get(test, ())),
+            motions=tuple(motions.get(test, ())),
             maps=tuple(m for m in maps.values() if m.test == test),
             earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
         )

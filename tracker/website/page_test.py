@@ -16,6 +16,7 @@ from spook_tracker.tracker.website.diagrams import (
 from spook_tracker.tracker.website.events import Event, of_test
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.website.replays import replay
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.stage_times import stage_times
 
@@ -41,6 +42,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "card": test.card,
         "slug": slug(test.name),
         "stage_times": stage_times(test),
+        "replay": replay(test),
         "scenery": scenery(test.card.scene) if test.card.scene else None,
         "state": test.state,
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),

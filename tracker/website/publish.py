@@ -27,6 +27,7 @@ from spook_tracker.tracker.website.nights import Book, Source, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
+from spook_tracker.tracker.website.replays import replay_files
 from spook_tracker.tracker.website.templates import environment
 
 __all__ = ["FolderError", "Report", "publish"]
@@ -37,8 +38,12 @@ ASSETS = {  # name in templates: file under site/static
     "site": "site.js",
     "compare": "compare.js",
     "plotly": "plotly-cartesian.min.js",
+    "three": "three-scene.min.js",
+    "view": "scene-view.js",
+    "player": "player.js",
+    "replay": "replay.js",
 }
-PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt")
+PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt", "three-LICENSE.txt")
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,8 @@ def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Cal
             partial(data_files.history_csv, told, test),
         )
         yield f"data/{slug(test.name)}.json", facts, partial(data_files.test_json, told, test)
+    for path, content in replay_files(told.tests):
+        yield path, content, partial(bytes, content)
     tables = {
         "tonight": data_files.newest(told, told.tests),
         "nights": data_files.nights(told),

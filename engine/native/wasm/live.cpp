@@ -3,9 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "elementary.hpp"
-#include "particle_program.hpp"
-#include "rigid_program.hpp"
+#include "linear/elementary.hpp"
+#include "particles/particle_program.hpp"
+#include "rigid/rigid_program.hpp"
 
 namespace {
 

@@ -2,8 +2,6 @@
 // caller's to resolve, as engine/particle_program.py and engine/rigid_program.py do it for Python.
 #pragma once
 
-#include <cstdint>
-
 extern "C" {
 
 /// Forget everything and begin a scene of particles (0) or with rigid bodies (1).

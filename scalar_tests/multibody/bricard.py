@@ -1,0 +1,201 @@
+"""Library problem A04: does Bricard's mechanism move, although counting its constraints says it cannot?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    Energy,
+    Hinge,
+    MaximumAbsolute,
+    Method,
+    Orientation,
+    Position,
+    Result,
+    Scene,
+    Trace,
+)
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Example,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.multibody.library import (
+    FIRST_ORDER,
+    GRAVITY,
+    HIGH,
+    LOW,
+    error_metric,
+    ladders,
+    library_error,
+    rod,
+    turned,
+)
+
+POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float)  # m
+AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)) * 2
+MASS, THICK = 1.0, 0.1  # kg, m
+ACROSS, ALONG = MASS * (1.0 + THICK**2) / 12.0, MASS * THICK**2 / 6.0  # kg m²
+COMPLIANCE = 1e-8  # m/N and rad/(N m), the engine's default
+EXACT = {  # s: P3 in m
+    0.5: (0.968283679, -1.224625159, 0.750146609),
+    1.0: (0.510501461, -1.649167599, 0.140123115),
+    2.5: (-1.000000000, -1.000016815, 0.999983185),
+    10.0: (0.999999964, -1.000269013, 0.999730951),
+}
+AFTER_ONE_SECOND = 0.02  # m
+
+
+def scene(time_step: float, compliance: float = COMPLIANCE) -> Scene:
+    """Five rods of 1 m in a closed loop of six hinges, from rest; gravity along −y."""
+    rods = []
+    for k in range(5):
+        inertia = [ACROSS] * 3
+        inertia[int(np.argmax(np.abs(POINTS[k + 1] - POINTS[k])))] = ALONG
+        rods.append(rod(f"rod {k + 1}", POINTS[k], POINTS[k + 1], MASS, (inertia[0], inertia[1], inertia[2])))
+    ends = [(WORLD, "rod 1"), *((f"rod {k}", f"rod {k + 1}") for k in range(1, 5)), (WORLD, "rod 5")]
+    hinges = tuple(
+        Hinge(
+            name=f"P{k}",
+            between=between,
+            at=(float(at[0]), float(at[1]), float(at[2])),
+            axis=axis,
+            compliance=compliance,
+            damping=time_step,
+        )
+        for k, (between, at, axis) in enumerate(zip(ends, POINTS, AXES, strict=True))
+    )
+    return Scene(bodies=tuple(rods), constraints=hinges, gravity=(0.0, -GRAVITY, 0.0), contacts=False)
+
+
+def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+    """The library's error of P3 at the four times, the largest change of energy, P3 after 1 s."""
+    place, energy = _third(simulate, time_step, 10.0, COMPLIANCE, method)
+    times = [round(time / time_step) for time in EXACT]
+    return {
+        "library_error": library_error(place[times], list(EXACT.values())),
+        "energy_deviation": energy / (5.0 * MASS * GRAVITY),
+    }
+
+
+def _third(
+    simulate: Simulate, time_step: float, duration: float, compliance: float, method: Method = PLAIN
+) -> tuple[np.ndarray, float]:
+    """P3 [m] at every sample and the largest |E − E₀| [J]."""
+    result = simulate(
+        scene(time_step, compliance),
+        time_step=time_step,
+        duration=duration,
+        method=method,
+        observe={
+            "centre": Trace(quantity=Position("rod 3")),
+            "turn": Trace(quantity=Orientation("rod 3")),
+            "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
+        },
+    )
+    return result["centre"] + turned(result["turn"], (0.0, 0.0, 0.5)), float(result["energy"])
+
+
+def coarse(simulate: Simulate) -> dict[str, float]:
+    """At h = 1/240 s."""
+    return answers(simulate, 1 / 240)
+
+
+def fine(simulate: Simulate) -> dict[str, float]:
+    """At h = 1/4000 s."""
+    return answers(simulate, 1 / 4000)
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Of P3 at four times in 10 s."""
+    return answers(simulate, time_step, method)["library_error"]
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same 10 s with nothing observed."""
+    return simulate(scene(time_step), time_step=time_step, duration=10.0, method=method)
+
+
+def stiffest(simulate: Simulate) -> BreakPoint:
+    """Smallest compliance with which P3 is right after 1 s, h = 1/240 s."""
+
+    def holds(compliance: float) -> bool:
+        place, _ = _third(simulate, 1 / 240, 1.0, compliance)
+        return float(np.linalg.norm(place[-1] - EXACT[1.0])) <= AFTER_ONE_SECOND
+
+    return break_point(holds, 1e-7, 1e-14, resolution=0.05, walk=8)
+
+
+ENERGY = Metric(
+    name="energy_deviation",
+    description="largest |E − E₀| over the weight of all rods times 1 m",
+    unit="1",
+    role="reported",
+    reference=0.0,
+    relative_tolerance=1e-5,
+)
+OUTPUTS = "P3 at 0.5, 1, 2.5 and 10 s"
+
+TEST = ScalarTest(
+    title="Multibody library A04: Bricard's mechanism",
+    question="Does Bricard's mechanism move as it should, although counting its constraints says it cannot?",
+    why="Six hinges take 30 freedoms from 30, and yet it moves: one constraint repeats the others as long as the shape "
+    "is exact. A step that leaves curvature out makes them contradict each other, and the mechanism may lock.",
+    model="Five rods of 1 kg and 1 × 0.1 × 0.1 m in a loop closed by the ground, hinges about y, z, x, y, z, x; from rest.",
+    parameters=(
+        ("time step", "1/4000 and 1/240 s; ladder 1/120 to 1/8000 s"),
+        ("rods", "1 kg, 1 m, 9.81 m/s² along −y"),
+        ("hinges", "compliance 1e-8, damping one time step"),
+        ("duration", "10 s"),
+    ),
+    theory=("One freedom, 30 rows of rank 29; P3 swings from (1, −1, 1) to (−1, −1, 1) and back.",),
+    reference="P3 at four times, to nine digits, from a tight integration of the one freedom.",
+    conclusion="Green: redundant rows share their load and let the mechanism go. Red: it locks or drifts.",
+    source="Library for computational benchmarking of multibody dynamics, problem A04",
+    measurements=(
+        Measurement(
+            configuration="plain",
+            time_step=1 / 240,
+            metrics=(error_metric("companion", LOW, OUTPUTS), ENERGY),
+            measure=coarse,
+            note="the SPOOK step as it stands",
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=1 / 4000,
+            metrics=(error_metric("gate", HIGH, OUTPUTS), ENERGY),
+            measure=fine,
+            note="the SPOOK step as it stands",
+        ),
+    ),
+    example=lambda: Example(scene=scene(1 / 240), time_step=1 / 240),
+    ladders=ladders(
+        "P3 at four times",
+        {
+            "low": ((1 / 120, 1 / 240, 1 / 480, 1 / 1000), (FIRST_ORDER,)),
+            "high": ((1 / 500, 1 / 1000, 1 / 2000, 1 / 4000, 1 / 8000), (FIRST_ORDER,)),
+        },
+        ladder_error,
+        ladder_run,
+    ),
+    stability=(
+        StabilityStudy(
+            name="smallest-compliance",
+            title="Smallest compliance with which the mechanism moves at h = 1/240 s",
+            configuration="plain",
+            definition="P3 within 0.02 m of its place after 1 s",
+            study=stiffest,
+            unit="m/N",
+            better="smaller",
+            expected_source="none: the rows contradict each other by the curvature that linearised rows leave out, and "
+            "no closed form says what compliance forgives it in a loop of six hinges",
+        ),
+    ),
+)

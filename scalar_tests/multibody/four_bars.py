@@ -1,0 +1,196 @@
+"""Library problem A02: do forty four-bar linkages, pushed over at once, keep together through their singular place?"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    Energy,
+    Hinge,
+    MaximumAbsolute,
+    Method,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+)
+from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.multibody.library import (
+    GRAVITY,
+    LOW,
+    PLAIN_CONFIGURATION,
+    error_metric,
+    ladders,
+    library_error,
+    tightly,
+)
+
+LENGTH, MASS, PUSH = 1.0, 1.0, 1.0  # m, kg, m/s
+THIN = 1e-3  # kg m², about a rod's own axis: nothing turns about it
+ACROSS = MASS * LENGTH**2 / 12.0  # kg m²
+COMPLIANCE = 1e-13  # m/N and rad/(N m): 1e-11 yields more than the high class allows
+EVERY = 0.05  # s: 20 outputs a second
+MANY, FEW = 40, 2
+
+
+def scene(count: int, time_step: float) -> Scene:
+    """`count` + 1 upright rods on hinges in the ground and `count` level ones on top, moving at PUSH along x."""
+    sides = [
+        RigidBody(
+            name=f"side {k}",
+            mass=MASS,
+            inertia=(ACROSS, THIN, ACROSS),
+            position=(k * LENGTH, 0.5 * LENGTH, 0.0),
+            velocity=(0.5 * PUSH, 0.0, 0.0),
+            angular_velocity=(0.0, 0.0, -PUSH / LENGTH),
+        )
+        for k in range(count + 1)
+    ]
+    tops = [
+        RigidBody(
+            name=f"top {k}",
+            mass=MASS,
+            inertia=(THIN, ACROSS, ACROSS),
+            position=((k + 0.5) * LENGTH, LENGTH, 0.0),
+            velocity=(PUSH, 0.0, 0.0),
+        )
+        for k in range(count)
+    ]
+
+    def hinge(name: str, first: str, second: str, x: float, y: float) -> Hinge:
+        return Hinge(
+            name=name, between=(first, second), at=(x, y, 0.0), compliance=COMPLIANCE, damping=time_step
+        )
+
+    hinges = [hinge(f"foot {k}", WORLD, f"side {k}", k * LENGTH, 0.0) for k in range(count + 1)]
+    for k in range(count):
+        hinges.append(hinge(f"left {k}", f"side {k}", f"top {k}", k * LENGTH, LENGTH))
+        hinges.append(hinge(f"right {k}", f"side {k + 1}", f"top {k}", (k + 1) * LENGTH, LENGTH))
+    return Scene(
+        bodies=(*sides, *tops), constraints=tuple(hinges), gravity=(0.0, -GRAVITY, 0.0), contacts=False
+    )
+
+
+def _falls_over(count: int) -> float:
+    """c of θ̈ = c (g/l) sin θ, θ from upright: weights over inertias of all rods."""
+    return ((3 * count + 1) / 2.0) / ((4 * count + 1) / 3.0)
+
+
+def _few(_: float, state: np.ndarray) -> np.ndarray:
+    return np.array([state[1], _falls_over(FEW) * GRAVITY / LENGTH * math.sin(state[0])])
+
+
+def _many(_: float, state: np.ndarray) -> np.ndarray:
+    return np.array([state[1], _falls_over(MANY) * GRAVITY / LENGTH * math.sin(state[0])])
+
+
+def exact(count: int, times: Any) -> np.ndarray:
+    """(time, 2): the upper left corner B0 [m], from the one equation that parallel rods leave."""
+    theta = tightly({FEW: _few, MANY: _many}[count], (0.0, PUSH / LENGTH), tuple(map(float, times)))[0]
+    return LENGTH * np.stack([np.sin(theta), np.cos(theta)], axis=1)
+
+
+def answers(
+    simulate: Simulate, count: int, time_step: float, duration: float, method: Method
+) -> dict[str, float]:
+    """The library's error of B0 and the largest change of energy over m g l of all rods."""
+    every = round(EVERY / time_step)
+    result = simulate(
+        scene(count, time_step),
+        time_step=time_step,
+        duration=duration,
+        method=method,
+        observe={
+            "side": Trace(quantity=Position("side 0"), first=every, every=every),
+            "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
+        },
+    )
+    corner = 2.0 * result["side"][:, :2]
+    return {
+        "library_error": library_error(corner, exact(count, result.sample_times["side"])),
+        "energy_deviation": float(result["energy"]) / ((3 * count + 1) / 2.0 * MASS * GRAVITY * LENGTH),
+    }
+
+
+def many(simulate: Simulate) -> dict[str, float]:
+    """The library's own case: 40 linkages, 20 s."""
+    return answers(simulate, MANY, 1e-3, 20.0, PLAIN)
+
+
+def few(simulate: Simulate) -> dict[str, float]:
+    """Two linkages, 10 s, coarser."""
+    return answers(simulate, FEW, 1e-3, 10.0, PLAIN)
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Of two linkages over 10 s."""
+    return answers(simulate, FEW, time_step, 10.0, method)["library_error"]
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(scene(FEW, time_step), time_step=time_step, duration=10.0, method=method)
+
+
+ENERGY = Metric(
+    name="energy_deviation",
+    description="largest |E − E₀| over the energy between upright and level, (3 N + 1)/2 m g l",
+    unit="1",
+    role="reported",
+    reference=0.0,
+    relative_tolerance=1e-5,
+)
+
+TEST = ScalarTest(
+    title="Multibody library A02: N four-bar linkages",
+    question="Do forty four-bar linkages in a row, pushed over at once, stay one motion?",
+    why="Level, all rods lie on one line: one freedom becomes 41, and an engine may fall into any of them.",
+    model="81 uniform rods of 1 kg and 1 m: 41 upright on the ground, 40 level between their tops, moving at 1 m/s.",
+    parameters=(
+        ("time step", "1e-3 s; ladder 1/60 to 1/4000 s for N = 2 over 10 s"),
+        ("rods", "1 kg, 1 m, 9.81 m/s²"),
+        ("hinges", "compliance 1e-13, damping one time step"),
+        ("duration", "20 s, 400 outputs; N = 2: 10 s, 200 outputs"),
+    ),
+    theory=(
+        "Parallel rods leave one equation: θ̈ = c (g/l) sin θ, c = ((3 N + 1)/2)/((4 N + 1)/3), θ̇(0) = 1.",
+        "N = 40: revolution 1.96560192870465 s; N = 2: 1.94251492260708 s.",
+    ),
+    reference="That equation by DOP853 at 1e-12; the library's error measure.",
+    conclusion="Green: redundant and singular linkages are solved as one. Red: they fold, lock or lose their energy.",
+    source="Library for computational benchmarking of multibody dynamics, problem A02",
+    measurements=(
+        Measurement(
+            configuration="plain",
+            time_step=1e-3,
+            parameters={"N": MANY},
+            metrics=(error_metric("gate", LOW, "400 outputs of (x, y) of B0 in 20 s"), ENERGY),
+            measure=many,
+            note="the SPOOK step as it stands",
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=1e-3,
+            parameters={"N": FEW},
+            metrics=(error_metric("companion", LOW, "200 outputs of (x, y) of B0 in 10 s"), ENERGY),
+            measure=few,
+            note="the SPOOK step as it stands",
+        ),
+    ),
+    example=lambda: Example(scene=scene(FEW, 1e-3), time_step=1e-3),
+    ladders=ladders(
+        "B0 of two linkages over 10 s",
+        {
+            "low": ((1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 1000), (PLAIN_CONFIGURATION,)),
+            "high": ((1 / 480, 1 / 1000, 1 / 2000, 1 / 4000), (PLAIN_CONFIGURATION,)),
+        },
+        ladder_error,
+        ladder_run,
+    ),
+)

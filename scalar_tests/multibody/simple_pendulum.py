@@ -1,0 +1,106 @@
+"""Library problem A01: is a pendulum still where it belongs after 2000 s?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spook_tracker.engine import Method, Position, Result, Trace
+from spook_tracker.scalar_tests.case import Configuration, Example, Measurement, ScalarTest, Simulate
+from spook_tracker.scalar_tests.multibody.library import HIGH, LOW, error_metric, ladders, library_error
+from spook_tracker.scalar_tests.pendulum.scene import angle, scene
+
+DURATION, EVERY = 2000.0, 0.5  # s: 4000 outputs
+LADDER_DURATION = 100.0  # s
+HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+OUTPUTS = "4000 outputs of (x, y) in 2000 s"
+ORDER_4, ORDER_8 = Method(composition="order4"), Method(composition="order8")
+
+
+def path_error(simulate: Simulate, time_step: float, method: Method, duration: float = DURATION) -> float:
+    """The library's error of (x, y) over all outputs."""
+    every = round(EVERY / time_step)
+    place = {"bob": Trace(quantity=Position("bob"), first=every, every=every)}
+    result = simulate(scene(time_step), time_step=time_step, duration=duration, method=method, observe=place)
+    theta = angle(result.sample_times["bob"])
+    return library_error(result["bob"][:, [0, 2]], np.stack([np.sin(theta), -np.cos(theta)], axis=1))
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """The same over the first 100 s."""
+    return path_error(simulate, time_step, method, LADDER_DURATION)
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same 100 s with nothing observed."""
+    return simulate(scene(time_step), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
+def order_4(simulate: Simulate) -> dict[str, float]:
+    """Order 4, coarse."""
+    return {"library_error": path_error(simulate, 1 / 40, ORDER_4)}
+
+
+def order_8(simulate: Simulate) -> dict[str, float]:
+    """Order 8, for the high class."""
+    return {"library_error": path_error(simulate, 1 / 20, ORDER_8)}
+
+
+TEST = ScalarTest(
+    title="Multibody library A01: simple pendulum",
+    question="Is a pendulum still where it belongs after 2000 s?",
+    why="The first problem of the multibody library: 845 swings, where every error of the period adds up.",
+    model="A bob of 1 kg on a rod of 1 m starts level with its pivot, at rest.",
+    parameters=(
+        ("time step", "1/20 and 1/40 s; ladder 1/10 to 1/640 s over 100 s"),
+        ("bob", "1 kg, 1 m, 9.81 m/s²"),
+        ("duration", "2000 s, an output every 0.5 s"),
+    ),
+    theory=("sin(θ/2) = √½ cd(√(g/l) t | ½), period 2.36784194757624 s.",),
+    reference="Jacobi's elliptic functions; the library's error measure.",
+    conclusion="Green: the period is right to 1e-6. Red: it is not, however well the length is kept.",
+    source="Library for computational benchmarking of multibody dynamics, problem A01",
+    measurements=(
+        Measurement(
+            configuration="order 8",
+            time_step=1 / 20,
+            metrics=(error_metric("gate", HIGH, OUTPUTS),),
+            measure=order_8,
+            note="symmetric composition of order 8",
+        ),
+        Measurement(
+            configuration="order 4",
+            time_step=1 / 40,
+            metrics=(error_metric("companion", LOW, OUTPUTS),),
+            measure=order_4,
+            note="symmetric composition of order 4",
+        ),
+    ),
+    example=lambda: Example(scene=scene(1 / 20), time_step=1 / 20, method=ORDER_8),
+    ladders=ladders(
+        "position over 100 s",
+        {
+            "low": (
+                (1 / 10, 1 / 20, 1 / 40, 1 / 80, 1 / 160, 1 / 640),
+                (
+                    Configuration(
+                        name="half-step, curved twice", method=HALF_STEP_CURVED, expected_order=None
+                    ),
+                    Configuration(
+                        name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 160, 1 / 20)
+                    ),
+                ),
+            ),
+            "high": (
+                (1 / 10, 1 / 20, 1 / 40, 1 / 80, 1 / 160),
+                (
+                    Configuration(
+                        name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 160, 1 / 20)
+                    ),
+                    Configuration(name="order 8", method=ORDER_8, expected_order=None),
+                ),
+            ),
+        },
+        ladder_error,
+        ladder_run,
+    ),
+)

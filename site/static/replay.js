@@ -1,0 +1,96 @@
+// Recorded motion of a night: loads a trajectory when its figure is seen, decodes it, hands it to the player.
+"use strict";
+
+const recordings = new Map();  // by key, as the files of replay/ hand them over
+
+// Called by each file of replay/.
+function recorded(key, data) { recordings.set(key, data); }
+
+// Sixteen-bit differences over samples, the low bytes of all before the high ones, deflated. 65535 is no value.
+async function unpacked(channel, count) {
+  const packed = Uint8Array.from(atob(channel.data), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const n = bytes.length / 2, width = n / count, out = new Float32Array(n);
+  const last = new Uint16Array(width);
+  for (let i = 0; i < n; i += 1) {
+    const column = i % width;
+    last[column] += bytes[i] | (bytes[n + i] << 8);
+    out[i] = last[column] === 65535 ? NaN : channel.low + last[column] * channel.step;
+  }
+  return out;
+}
+
+async function movieOf(data) {
+  const channels = {};
+  for (const channel of data.channels) { channels[channel.name] = await unpacked(channel, data.count); }
+  return {
+    step: data.step, count: data.count, bodies: data.bodies, solids: data.solids, links: data.links, rows: data.rows,
+    gravity: data.gravity, attractors: data.attractors, position: channels.position,
+    orientation: channels.orientation || null, violation: channels.violation || null, contact: channels.contact_force || null,
+    energy: channels.energy || null, penetration: channels.penetration || null,
+    ghost: channels.exact_position
+      ? { name: data.exact, position: channels.exact_position, orientation: channels.exact_orientation || null } : null,
+  };
+}
+
+async function movieFrom(source) {
+  if (!recordings.has(source.key)) { await script(source.address); }
+  return movieOf(recordings.get(source.key));
+}
+
+function sameScene(one, other) { return one.bodies === other.bodies && one.count === other.count && one.step === other.step; }
+
+// The first sample at which two nights are further apart than their stored digits can say.
+function firstDifference(one, other) {
+  const away = apart(one.position, other.position, one.bodies, one.count);
+  let reach = 0;
+  one.position.forEach((v) => { reach = Math.max(reach, Math.abs(v) || 0); });
+  return away.findIndex((d) => !(d <= 1e-4 * reach));
+}
+
+async function startReplay(box) {
+  const sources = JSON.parse(box.querySelector(".replay-sources").textContent);
+  const say = (words) => { box.querySelector(".replay-note").textContent = words; };
+  try {
+    await threeFrom(box.dataset.three);
+    for (const source of sources) { source.address = box.dataset.root + source.address; }
+    const tonight = await movieFrom(sources[0]);
+    const player = new Player(box, tonight, "t");
+    box.classList.add("moving");
+    box.player = player;
+    if (sources.length < 2) { return; }
+    const other = player.select([["", tonight.ghost ? tonight.ghost.name : "nothing"], ...sources.slice(1).map((s) => [s.key, s.label])], "", async (key) => {
+      state.set("against", key);
+      await against(key);
+    });
+    const first = make("button", { type: "button", class: "button", hidden: true }, "First difference");
+    first.addEventListener("click", () => { player.pause(); player.seek(Number(first.dataset.sample)); player.remember(); });
+    async function against(key) {
+      const source = sources.find((s) => s.key === key);
+      if (!source) { first.hidden = true; player.use(tonight, true); player.view.load(tonight, true); return; }
+      const night = await movieFrom(source);
+      if (!sameScene(tonight, night)) { say(`${source.label} was recorded with other steps or bodies, so it cannot be laid over tonight.`); return; }
+      say("");
+      const at = firstDifference(tonight, night);
+      first.hidden = false;
+      first.disabled = at < 0;
+      first.textContent = at < 0 ? "No difference" : "First difference";
+      first.dataset.sample = String(at);
+      player.use({ ...tonight, ghost: { name: source.label, position: night.position, orientation: night.orientation, energy: night.energy } }, true);
+    }
+    player.tools.prepend(make("label", {}, "against ", other), first);
+    if (state.get("against")) { other.value = state.get("against"); await against(other.value); }
+  } catch (error) {
+    say(`The replay needs WebGL, which this browser does not offer (${error.message}). The picture shows the start.`);
+  }
+}
+
+(function replays() {
+  const watch = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (entry.isIntersecting) { watch.unobserve(entry.target); startReplay(entry.target); }
+    }
+  }, { rootMargin: "200px 0px" });
+  document.querySelectorAll("figure.replay").forEach((box) => watch.observe(box));
+})();

@@ -1,0 +1,332 @@
+// A scene in three dimensions, moving: what the replay of a recorded night and the live engine share.
+// A movie is { step [s], count, bodies, solids, links, gravity, attractors, position, orientation, ... } with
+// flat arrays over samples; see replay.js, which decodes one, and live.js, which computes one.
+"use strict";
+
+const WORLD_BODY = -1;
+const MOST_ARROWS = 400;
+
+// --- arithmetic on flat arrays: no object is made while a scene moves ---
+function turnInto(out, q, x, y, z) {
+  const [w, a, b, c] = q;
+  const tx = 2 * (b * z - c * y), ty = 2 * (c * x - a * z), tz = 2 * (a * y - b * x);
+  out[0] = x + w * tx + b * tz - c * ty;
+  out[1] = y + w * ty + c * tx - a * tz;
+  out[2] = z + w * tz + a * ty - b * tx;
+}
+
+function product(p, q) {
+  const [a, b, c, d] = p, [w, x, y, z] = q;
+  return [a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w];
+}
+
+// Column-major matrix of a unit quaternion, scaled and placed, written at `at`.
+function placeInto(out, at, p, q, sx, sy, sz) {
+  const [w, x, y, z] = q;
+  out[at] = sx * (1 - 2 * (y * y + z * z)); out[at + 1] = sx * 2 * (x * y + w * z); out[at + 2] = sx * 2 * (x * z - w * y); out[at + 3] = 0;
+  out[at + 4] = sy * 2 * (x * y - w * z); out[at + 5] = sy * (1 - 2 * (x * x + z * z)); out[at + 6] = sy * 2 * (y * z + w * x); out[at + 7] = 0;
+  out[at + 8] = sz * 2 * (x * z + w * y); out[at + 9] = sz * 2 * (y * z - w * x); out[at + 10] = sz * (1 - 2 * (x * x + y * y)); out[at + 11] = 0;
+  out[at + 12] = p[0]; out[at + 13] = p[1]; out[at + 14] = p[2]; out[at + 15] = 1;
+}
+
+// The shortest turn of the z-axis onto a direction of the given length.
+function aim(dx, dy, dz, length) {
+  const w = 1 + dz / length;
+  if (w < 1e-9) { return [0, 1, 0, 0]; }
+  const n = Math.hypot(w, dx / length, dy / length);
+  return [w / n, -dy / length / n, dx / length / n, 0];
+}
+
+// --- where bodies are at a sample, which may lie between two ---
+class Poses {
+  constructor(movie, position, orientation) {
+    Object.assign(this, { movie, position, orientation, p: [0, 0, 0], q: [1, 0, 0, 0] });
+  }
+
+  at(body, sample) {
+    if (body === WORLD_BODY) { this.p = [0, 0, 0]; this.q = [1, 0, 0, 0]; return; }
+    const n = this.movie.bodies, low = Math.floor(sample), high = Math.min(low + 1, this.movie.count - 1), share = sample - low;
+    const i = 3 * (low * n + body), j = 3 * (high * n + body), v = this.position;
+    for (let k = 0; k < 3; k += 1) { this.p[k] = v[i + k] + (share ? share * (v[j + k] - v[i + k]) : 0); }
+    if (!this.orientation) { this.q[0] = 1; this.q[1] = this.q[2] = this.q[3] = 0; return; }
+    const a = 4 * (low * n + body), b = 4 * (high * n + body), o = this.orientation;
+    let dot = 0, size = 0;
+    for (let k = 0; k < 4; k += 1) { dot += o[a + k] * o[b + k]; }
+    for (let k = 0; k < 4; k += 1) {
+      this.q[k] = (1 - share) * o[a + k] + share * (dot < 0 ? -1 : 1) * o[b + k];
+      size += this.q[k] * this.q[k];
+    }
+    size = Math.sqrt(size) || 1;
+    for (let k = 0; k < 4; k += 1) { this.q[k] /= size; }
+  }
+}
+
+function extentOf(movie) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  const see = (x, y, z, r) => [x, y, z].forEach((v, k) => {
+    if (Math.abs(v) < 1e6) { low[k] = Math.min(low[k], v - r); high[k] = Math.max(high[k], v + r); }
+  });
+  const reach = new Float64Array(movie.bodies), drawn = new Uint8Array(movie.bodies);
+  for (const solid of movie.solids) {
+    if (solid.kind === "plane") { continue; }
+    const r = solid.kind === "box" ? Math.hypot(...solid.size) / 2 : solid.kind === "capsule" ? solid.size[0] + solid.size[1] / 2 : solid.size[0] || 0;
+    if (solid.body === WORLD_BODY) { see(...solid.position, r); } else { reach[solid.body] = Math.max(reach[solid.body], r); drawn[solid.body] = 1; }
+  }
+  const stride = Math.max(1, Math.floor(movie.count * movie.bodies / 60000));
+  for (let sample = 0; sample < movie.count; sample += stride) {
+    for (let body = 0; body < movie.bodies; body += 1) {
+      if (!drawn[body]) { continue; }
+      const i = 3 * (sample * movie.bodies + body);
+      see(movie.position[i], movie.position[i + 1], movie.position[i + 2], reach[body]);
+    }
+  }
+  for (const link of movie.links) {
+    link.bodies.forEach((body, end) => { if (body === WORLD_BODY) { see(...link.anchors[end], 0); } });
+  }
+  for (const centre of movie.attractors) { see(...centre, 0); }
+  return low[0] <= high[0] ? { low, high } : { low: [-1, -1, -1], high: [1, 1, 1] };
+}
+
+class SceneView {
+  // `host` is an empty element; throws where the browser has no WebGL.
+  constructor(host, movie) {
+    this.host = host;
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
+    this.canvas = this.renderer.domElement;
+    host.append(this.canvas);
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 1000);
+    this.camera.up.set(0, 0, 1);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8899aa, 1.7));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
+    sun.position.set(0.4, -0.7, 1);
+    this.scene.add(sun);
+    this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+    this.controls.enableZoom = false;  // the wheel scrolls the page
+    this.controls.addEventListener("change", () => this.draw());
+    this.watch = new ResizeObserver(() => this.resize());
+    this.watch.observe(host);
+    this.shown = { ghost: true, forces: true };
+    this.sample = 0;
+    this.load(movie);
+  }
+
+  // Another movie in the same view; the camera stays unless the scene has another extent.
+  load(movie, keepCamera = false) {
+    this.movie = movie;
+    this.poses = new Poses(movie, movie.position, movie.orientation);
+    this.ghost = movie.ghost ? new Poses(movie, movie.ghost.position, movie.ghost.orientation) : null;
+    if (this.world) { this.scene.remove(this.world); this.world.traverse((part) => { part.geometry?.dispose(); part.material?.dispose(); part.dispose?.(); }); }
+    this.world = new THREE.Group();
+    this.scene.add(this.world);
+    const { low, high } = extentOf(movie);
+    this.middle = low.map((v, k) => (v + high[k]) / 2);
+    this.size = Math.max(...high.map((v, k) => v - low[k])) || 1;
+    this.dot = 0.018 * this.size;
+    this.build();
+    if (!keepCamera) { this.home(low, high); }
+    this.resize();
+    this.paint();
+  }
+
+  home(low, high) {
+    const extent = high.map((v, k) => v - low[k]);
+    const flat = extent[2] < 0.2 * Math.max(extent[0], extent[1]) && !this.movie.gravity.some(Boolean);
+    const turn = (extent[0] < 0.5 * extent[1] ? Math.PI / 2 : 0) + 0.35, above = flat ? 0.95 : 0.26;
+    const radius = Math.hypot(...extent) / 2 || this.size;
+    this.fit = { extent, direction: [Math.sin(turn) * Math.cos(above), -Math.cos(turn) * Math.cos(above), Math.sin(above)] };
+    this.controls.target.set(...this.middle);
+    this.camera.near = radius / 100;
+    this.camera.far = radius * 60;
+    this.frame();
+  }
+
+  frame() {
+    // Far enough away that every corner of the scene's box is seen.
+    const [dx, dy, dz] = this.fit.direction, tangent = Math.tan((this.camera.fov * Math.PI) / 360) * 0.92;
+    const flat = Math.hypot(dx, dy), right = [-dy / flat, dx / flat, 0], up = [-dz * right[1], dz * right[0], flat];
+    let far = 0.05 * this.size;
+    for (let corner = 0; corner < 8; corner += 1) {
+      const c = this.fit.extent.map((e, k) => ((corner >> k) & 1 ? 0.5 : -0.5) * e + (e === 0 ? 0.02 * this.size : 0));
+      const along = (v) => c[0] * v[0] + c[1] * v[1] + c[2] * v[2], near = along(this.fit.direction) + this.dot;
+      far = Math.max(far, (Math.abs(along(right)) + 2 * this.dot) / (tangent * this.camera.aspect) + near, (Math.abs(along(up)) + 2 * this.dot) / tangent + near);
+    }
+    this.camera.position.set(...this.middle.map((v, k) => v + far * this.fit.direction[k]));
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+  }
+
+  mesh(geometry, count, options = {}) {
+    const material = new THREE.MeshLambertMaterial(options);
+    const mesh = new THREE.InstancedMesh(geometry, material, Math.max(1, count));
+    mesh.count = count;
+    mesh.frustumCulled = false;
+    mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
+    this.world.add(mesh);
+    return mesh;
+  }
+
+  build() {
+    const kinds = new Map();
+    const start = new Poses(this.movie, this.movie.position, this.movie.orientation);
+    for (const solid of this.movie.solids) {
+      if (solid.kind === "plane") { this.floor(solid); continue; }
+      const key = (solid.kind === "particle" ? "sphere" : solid.kind === "capsule" ? `capsule ${solid.size}` : solid.kind) + (solid.fixed ? " fixed" : "");
+      if (!kinds.has(key)) { kinds.set(key, []); }
+      // The solid in the axes of its body: a compound has several that move as one.
+      start.at(solid.body, 0);
+      const away = [start.q[0], -start.q[1], -start.q[2], -start.q[3]], offset = [0, 0, 0];
+      turnInto(offset, away, ...solid.position.map((v, k) => v - start.p[k]));
+      const turn = product(away, solid.orientation), r = solid.size[0];
+      const scale = solid.kind === "particle" ? [this.dot, this.dot, this.dot] : solid.kind === "sphere" ? [r, r, r] : solid.kind === "box" ? solid.size : [1, 1, 1];
+      kinds.get(key).push({ body: solid.body, offset, turn, scale });
+    }
+    this.solids = [];
+    for (const [key, items] of kinds) {
+      const detail = items.length > 800 ? [10, 6] : [28, 18];
+      const shape = key.split(" ")[0], fixed = key.endsWith("fixed");
+      const geometry = () => shape === "sphere" ? new THREE.SphereGeometry(1, ...detail) : shape === "box" ? new THREE.BoxGeometry(1, 1, 1) :
+        new THREE.CapsuleGeometry(...key.split(" ")[1].split(",").map(Number), 6, 16).rotateX(Math.PI / 2);
+      this.solids.push({ mesh: this.mesh(geometry(), items.length), items, poses: this.poses, colour: fixed ? "--ink-3" : "--c0" });
+      if (this.ghost && !fixed) {
+        const mesh = this.mesh(geometry(), items.length, { transparent: true, opacity: 0.36, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 });
+        this.solids.push({ mesh, items, poses: this.ghost, colour: "--c1", ghost: true });
+      }
+    }
+    const rods = this.movie.links.filter((link) => link.kind !== "joint"), joints = this.movie.links.filter((link) => link.kind === "joint");
+    const rod = new THREE.CylinderGeometry(1, 1, 1, 8).rotateX(Math.PI / 2);
+    this.rods = rods.length ? { mesh: this.mesh(rod, rods.length), links: rods } : null;
+    this.joints = joints.length && joints.length <= 60 ? { mesh: this.mesh(new THREE.SphereGeometry(1, 12, 8), joints.length, { depthTest: false }), links: joints } : null;
+    for (const part of [this.rods, this.joints]) {
+      if (part) { part.mesh.setColorAt(0, new THREE.Color(1, 1, 1)); part.mesh.renderOrder = part === this.joints ? 3 : 0; }
+    }
+    if (this.movie.contact) {
+      const tip = new THREE.ConeGeometry(1, 1, 12).rotateX(Math.PI / 2);
+      this.arrows = { shaft: this.mesh(rod.clone(), MOST_ARROWS), tip: this.mesh(tip, MOST_ARROWS), largest: this.movie.contact.reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0) };
+    } else { this.arrows = null; }
+    for (const centre of this.movie.attractors) {
+      const star = new THREE.Mesh(new THREE.SphereGeometry(2 * this.dot, 24, 16), new THREE.MeshLambertMaterial());
+      star.position.set(...centre);
+      star.userData.colour = "--watch-fill";
+      this.world.add(star);
+    }
+    this.violationScale = (this.movie.violation || []).reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0);
+  }
+
+  floor(solid) {
+    const normal = [0, 0, 0];
+    turnInto(normal, solid.orientation, ...solid.size);
+    const away = normal.reduce((sum, n, k) => sum + n * (this.middle[k] - solid.position[k]), 0);
+    const geometry = new THREE.PlaneGeometry(1.7 * this.size, 1.7 * this.size, 16, 16);
+    const mesh = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.55 }));
+    const grid = new THREE.LineSegments(this.gridLines(1.7 * this.size), new THREE.LineBasicMaterial());
+    const q = aim(...normal, 1), lift = -1e-3 * this.size;
+    for (const [part, up] of [[mesh, lift], [grid, 0.5 * lift]]) {
+      part.position.set(...this.middle.map((v, k) => v - (away - up) * normal[k]));
+      part.quaternion.set(q[1], q[2], q[3], q[0]);
+      this.world.add(part);
+    }
+    mesh.userData.colour = "--line-soft";
+    grid.userData.colour = "--line";
+  }
+
+  gridLines(width) {
+    const places = [], n = 12;
+    for (let i = 0; i <= n; i += 1) {
+      const at = width * (i / n - 0.5), end = width / 2;
+      places.push(at, -end, 0, at, end, 0, -end, at, 0, end, at, 0);
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(places), 3));
+    return geometry;
+  }
+
+  // Colours of the page's theme.
+  paint() {
+    const style = getComputedStyle(document.documentElement), colour = (name) => new THREE.Color(style.getPropertyValue(name).trim());
+    for (const part of this.solids) { part.mesh.material.color = colour(part.colour); }
+    this.world.traverse((part) => { if (part.userData.colour) { part.material.color = colour(part.userData.colour); } });
+    if (this.arrows) { this.arrows.shaft.material.color = this.arrows.tip.material.color = colour("--c3"); }
+    this.kept = colour("--pass-fill");
+    this.broken = colour("--fail-fill");
+    this.elastic = colour("--c4");
+    this.show(this.sample);
+  }
+
+  show(sample) {
+    this.sample = Math.max(0, Math.min(this.movie.count - 1, sample));
+    const place = [0, 0, 0];
+    for (const part of this.solids) {
+      part.mesh.visible = !part.ghost || this.shown.ghost;
+      if (!part.mesh.visible) { continue; }
+      const out = part.mesh.instanceMatrix.array, poses = part.poses;
+      part.items.forEach((item, i) => {
+        poses.at(item.body, this.sample);
+        turnInto(place, poses.q, ...item.offset);
+        for (let k = 0; k < 3; k += 1) { place[k] += poses.p[k]; }
+        const turn = item.turn[0] === 1 ? poses.q : product(poses.q, item.turn);
+        placeInto(out, 16 * i, place, turn, item.scale[0], item.scale[1], item.scale[2]);
+      });
+      part.mesh.instanceMatrix.needsUpdate = true;
+    }
+    if (this.rods) { this.showLinks(this.rods, 0.34 * this.dot); }
+    if (this.joints) { this.showLinks(this.joints, 0.55 * this.dot); }
+    if (this.arrows) { this.showForces(); }
+    this.draw();
+  }
+
+  endOf(link, end, out) {
+    this.poses.at(link.bodies[end], this.sample);
+    turnInto(out, this.poses.q, ...link.anchors[end]);
+    for (let k = 0; k < 3; k += 1) { out[k] += this.poses.p[k]; }
+  }
+
+  showLinks(part, width) {
+    const a = [0, 0, 0], b = [0, 0, 0], out = part.mesh.instanceMatrix.array, colour = new THREE.Color();
+    const nearest = Math.round(this.sample), rows = this.movie.rows || 0;
+    part.links.forEach((link, i) => {
+      this.endOf(link, 0, a);
+      this.endOf(link, 1, b);
+      const d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]], length = Math.hypot(...d);
+      const joint = link.kind === "joint" || length === 0;
+      placeInto(out, 16 * i, [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2], joint ? [1, 0, 0, 0] : aim(...d, length), width, width, joint ? width : length);
+      if (link.kind === "spring") { colour.copy(this.elastic); } else {
+        const g = link.row >= 0 && this.violationScale > 0 ? Math.abs(this.movie.violation[nearest * rows + link.row]) / this.violationScale : 0;
+        colour.lerpColors(this.kept, this.broken, Math.min(1, g || 0));
+      }
+      part.mesh.setColorAt(i, colour);
+    });
+    part.mesh.instanceMatrix.needsUpdate = true;
+    part.mesh.instanceColor.needsUpdate = true;
+  }
+
+  showForces() {
+    const { shaft, tip, largest } = this.arrows, nearest = Math.round(this.sample), n = this.movie.bodies;
+    const longest = 0.3 * this.size, width = 0.22 * this.dot;
+    let used = 0;
+    for (let body = 0; this.shown.forces && largest > 0 && body < n && used < MOST_ARROWS; body += 1) {
+      const i = 3 * (nearest * n + body), d = [0, 1, 2].map((k) => (this.movie.contact[i + k] * longest) / largest), length = Math.hypot(...d);
+      if (!(length > 0.01 * longest)) { continue; }
+      this.poses.at(body, this.sample);
+      const q = aim(...d, length), head = Math.min(length, 6 * width);
+      placeInto(shaft.instanceMatrix.array, 16 * used, this.poses.p.map((v, k) => v + d[k] / 2), q, width, width, length);
+      placeInto(tip.instanceMatrix.array, 16 * used, this.poses.p.map((v, k) => v + d[k] * (1 + head / length / 2)), q, 2.6 * width, 2.6 * width, head);
+      used += 1;
+    }
+    for (const mesh of [shaft, tip]) { mesh.count = used; mesh.instanceMatrix.needsUpdate = true; }
+  }
+
+  resize() {
+    const wide = this.host.clientWidth, high = this.host.clientHeight;
+    if (!wide || !high) { return; }
+    const before = this.camera.aspect;
+    this.renderer.setSize(wide, high, false);
+    this.camera.aspect = wide / high;
+    this.camera.updateProjectionMatrix();
+    if (Math.abs(before - this.camera.aspect) > 0.05) { this.frame(); }
+    this.draw();
+  }
+
+  draw() { this.renderer.render(this.scene, this.camera); }
+}

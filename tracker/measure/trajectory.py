@@ -1,0 +1,254 @@
+"""How a test's scene moves, recorded for the replay: quantised, bounded in size, beside its exact motion.
+
+The exact motion is the test's closed form where it has one, else the same engine with a sixteenth of the time
+step, and the page says which.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.forces import CentralGravity, Spring
+from spook_tracker.engine.joints import Distance, Joint
+from spook_tracker.engine.observe import (
+    ContactForce,
+    Energy,
+    Observable,
+    Orientation,
+    Penetration,
+    Position,
+    Quantity,
+    Trace,
+    Violation,
+)
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
+from spook_tracker.scalar_tests.case import Example, ScalarTest, Simulate
+from spook_tracker.tracker.document.quaternions import UPRIGHT, Vector, turned
+from spook_tracker.tracker.document.run_document import Channel, TrackedLink, Trajectory
+from spook_tracker.tracker.measure.question import ask
+from spook_tracker.tracker.measure.scene_drawing import MOST_SOLIDS, solids_of
+
+SAMPLES = 241  # of a trajectory at most; between them the page interpolates
+MOST_STEPS = 60_000
+MOST_BYTES = 120_000  # of one trajectory, compressed; halving the samples gets it there
+MOST_ROWS, MOST_CONTACTS = 120, 120  # constraints and bodies whose violations and forces are traced
+TIME_LIMIT = 20.0  # s of wall time; what is there until then is shown
+FINER = 16
+CODES = 65_534  # 65535 is no value
+Array = npt.NDArray[np.float64]
+
+
+def trajectory(name: str, test: ScalarTest, simulate: Simulate) -> Trajectory | None:
+    """The motion of the test's example scene; None where it cannot be simulated or there is nothing to see."""
+    return ask(lambda: _recorded(name, test.example(), simulate)).value  # type: ignore[no-any-return]
+
+
+def _recorded(name: str, example: Example, simulate: Simulate) -> Trajectory | None:
+    scene = example.scene
+    bodies = scene.bodies[:MOST_SOLIDS]
+    steps = min(MOST_STEPS, max(1, round(example.duration / example.time_step)))
+    every = max(1, math.ceil(steps / (SAMPLES - 1)))
+    result = _run(simulate, example, scene, steps - steps % every, every, 1)
+    positions = np.asarray(result.partial["position"])
+    if len(positions) < 2:
+        return None
+    seen = dict(result.partial)
+    exact = "" if not result.completed else _exact(example, simulate, seen, every)
+    while True:
+        channels = _channels(seen, scene, len(bodies))
+        if sum(len(channel.data) for channel in channels) <= MOST_BYTES or len(seen["position"]) < 8:
+            break
+        seen = {key: values[::2] for key, values in seen.items()}
+        every *= 2
+    solids = [solids_of(body) for body in bodies]
+    links = _links(scene)
+    return Trajectory(
+        test=name,
+        name="example",
+        time_step=example.time_step,
+        step=every * example.time_step,
+        count=len(seen["position"]),
+        bodies=len(bodies),
+        solids=tuple(solid for of_body in solids for solid in of_body),
+        body_of_solid=tuple(i for i, of_body in enumerate(solids) for _ in of_body),
+        links=tuple(links),
+        attractors=tuple(force.centre for force in scene.forces if isinstance(force, CentralGravity)),
+        gravity=scene.gravity,
+        rows=min(len(scene.constraints), MOST_ROWS),
+        exact=exact,
+        failure=result.failure,
+        channels=tuple(channels),
+    )
+
+
+def _run(simulate: Simulate, example: Example, scene: Scene, steps: int, every: int, finer: int) -> Result:
+    """The scene with everything a replay shows traced, at a time step `finer` times smaller."""
+    quantities: dict[str, Quantity] = {"position": Position()}
+    if any(isinstance(body, RigidBody) for body in scene.bodies):
+        quantities["orientation"] = Orientation()
+    if finer == 1:
+        quantities["energy"] = Energy()
+        for i, constraint in enumerate(scene.constraints[:MOST_ROWS]):
+            quantities[f"violation {i}"] = Violation(constraint.name)
+        if scene.contacts:
+            touching = [
+                b for b in scene.bodies[:MOST_SOLIDS] if isinstance(b, RigidBody) and b.shape is not None
+            ]
+            if touching:
+                quantities["penetration"] = Penetration()
+            moving = [b.name for b in touching if b.motion == "dynamic"]
+            for body in moving[:MOST_CONTACTS]:
+                quantities[f"force {body}"] = ContactForce(body)
+    observe: dict[str, Observable] = {
+        key: Trace(quantity=quantity, every=every * finer) for key, quantity in quantities.items()
+    }
+    return simulate(
+        scene,
+        time_step=example.time_step / finer,
+        steps=steps * finer,
+        method=example.method,
+        observe=observe,
+        time_limit=TIME_LIMIT,
+    )
+
+
+def _exact(example: Example, simulate: Simulate, seen: dict[str, Any], every: int) -> str:
+    """Add the motion to compare with, and say what it is; an empty sentence if there is none."""
+    count = len(seen["position"])
+    if example.exact is not None:
+        names = [body.name for body in example.scene.bodies[:MOST_SOLIDS]]
+        places = np.array(seen["position"])[:, : len(names)].copy()
+        for i in range(count):
+            for body, place in example.exact(i * every * example.time_step).items():
+                places[i, names.index(body)] = place
+        seen["exact_position"] = places
+        return "the exact solution"
+    steps = (count - 1) * every
+    finer = ask(lambda: _run(simulate, example, example.scene, steps, every, FINER)).value
+    if finer is None or not finer.completed or len(finer.partial["position"]) != count:
+        return ""
+    seen["exact_position"] = finer.partial["position"]
+    if "orientation" in seen:
+        seen["exact_orientation"] = finer.partial["orientation"]
+    return f"a time step of h/{FINER}"
+
+
+def _channels(seen: Mapping[str, Any], scene: Scene, bodies: int) -> list[Channel]:
+    count = len(seen["position"])
+
+    def of_bodies(key: str) -> Array:
+        values: Array = np.asarray(seen[key], dtype=np.float64)[:, :bodies]
+        return values.reshape(count, -1)
+
+    found = [channel("position", "m", of_bodies("position"))]
+    for key in ("orientation", "exact_orientation"):
+        if key in seen:
+            found.append(channel(key, "1", of_bodies(key)))
+    if "exact_position" in seen:
+        found.append(channel("exact_position", "m", of_bodies("exact_position")))
+    found += [
+        channel(key, unit, np.asarray(seen[key], dtype=np.float64).reshape(count, 1))
+        for key, unit in (("energy", "J"), ("penetration", "m"))
+        if key in seen
+    ]
+    rows = min(len(scene.constraints), MOST_ROWS)
+    if rows:
+        each = [
+            np.abs(np.asarray(seen[f"violation {i}"]).reshape(count, -1)).max(axis=1) for i in range(rows)
+        ]
+        found.append(channel("violation", "m or rad", np.stack(each, axis=1)))
+    forces = {key.removeprefix("force "): values for key, values in seen.items() if key.startswith("force ")}
+    if any(np.any(values) for values in forces.values()):
+        table = np.zeros((count, bodies, 3))
+        for i, body in enumerate(scene.bodies[:bodies]):
+            if body.name in forces:
+                table[:, i] = forces[body.name]
+        found.append(channel("contact_force", "N", table.reshape(count, -1)))
+    return found
+
+
+def channel(name: str, unit: str, values: Array) -> Channel:
+    """Values of shape (samples, width) in sixteen bits each."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+    step = (high - low) / CODES or 1.0
+    if not math.isfinite(step):  # a motion that exploded: what is off the scale is no value
+        low, step = -1e300, 2e300 / CODES
+    with np.errstate(invalid="ignore", over="ignore"):
+        places = np.rint((values - low) / step)
+    codes = np.where(np.isfinite(places) & (places >= 0) & (places <= CODES), places, CODES + 1).astype(
+        np.uint16
+    )
+    changes = np.diff(codes, axis=0, prepend=np.zeros((1, codes.shape[1]), np.uint16)).astype("<u2").ravel()
+    planes = np.concatenate([(changes & 255).astype(np.uint8), (changes >> 8).astype(np.uint8)])
+    return Channel(
+        name=name,
+        unit=unit,
+        width=values.shape[1],
+        low=low,
+        step=step,
+        data=zlib.compress(planes.tobytes(), 9),
+    )
+
+
+def values_of(channel: Channel, count: int) -> Array:
+    """The numbers of a channel, shape (count, width), within step / 2 of what was recorded; NaN where none."""
+    planes = np.frombuffer(zlib.decompress(channel.data), dtype=np.uint8).astype(np.uint16)
+    half = len(planes) // 2
+    changes = (planes[:half] | (planes[half:] << 8)).reshape(count, channel.width)
+    codes = np.cumsum(changes, axis=0, dtype=np.uint16)
+    out: Array = np.where(codes == CODES + 1, np.nan, channel.low + channel.step * codes.astype(np.float64))
+    return out
+
+
+def _links(scene: Scene) -> Sequence[TrackedLink]:
+    """Constraints and springs whose ends are among the bodies that are drawn."""
+    bodies = {body.name: i for i, body in enumerate(scene.bodies[:MOST_SOLIDS])}
+    bodies[WORLD] = -1
+    found: list[TrackedLink] = []
+
+    def add(kind: Any, ends: Sequence[tuple[int, Vector]], row: int) -> None:
+        (one, here), (other, there) = ends
+        found.append(TrackedLink(kind=kind, bodies=(one, other), anchors=(here, there), row=row))
+
+    ties = [*enumerate(scene.constraints), *((MOST_ROWS, force) for force in scene.forces)]
+    for number, tie in ties:
+        row = number if number < MOST_ROWS else -1
+        if isinstance(tie, Distance | Spring):
+            if any(isinstance(end, str) and end not in bodies for end in tie.between):
+                continue
+            anchors = getattr(tie, "anchors", ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+            ends = [
+                (bodies[end], anchor) if isinstance(end, str) else (-1, (end[0], end[1], end[2]))
+                for end, anchor in zip(tie.between, anchors, strict=True)
+            ]
+            add("spring" if isinstance(tie, Spring) else "distance", ends, row)
+        elif isinstance(tie, Joint) and all(name in bodies for name in tie.between):
+            place = _inverse_of(scene, tie)
+            add("joint", [(bodies[name], place(name)) for name in tie.between], row)
+    return found
+
+
+def _inverse_of(scene: Scene, joint: Joint) -> Callable[[str], Vector]:
+    """Where the joint is, in the axes of one of its bodies; midway between them if it has no place of its own."""
+    at = {body.name: body for body in scene.bodies}
+    ends = [at[name].position for name in joint.between if name in at]
+    middle = joint.at or tuple(sum(p[k] for p in ends) / len(ends) for k in range(3))
+
+    def place(name: str) -> Vector:
+        if name not in at:
+            return (middle[0], middle[1], middle[2])
+        body = at[name]
+        w, x, y, z = getattr(body, "orientation", UPRIGHT)
+        p = body.position
+        return turned((w, -x, -y, -z), (middle[0] - p[0], middle[1] - p[1], middle[2] - p[2]))
+
+    return place
