@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help nightly test check bench mutants package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help wasm three-scene nightly test check bench mutants package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -15,6 +15,7 @@ help:
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
 	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
+	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
 	@echo "make site      publish the website again from what is recorded"
 	@echo "make serve     look at the website on this machine"
 	@echo "make clean     remove what was built (the database stays)"
@@ -47,6 +48,21 @@ mutants: develop
 
 bench: develop
 	$(BIN)/python bench/run.py
+
+# Where clang-19 and its WebAssembly libraries are; .ci/install-system gets them on Debian.
+wasm: develop
+	$(BIN)/cmake -S engine/native -B build/wasm -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
+	    -DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/engine/native/wasm/toolchain.cmake -DCMAKE_BUILD_TYPE=Release \
+	    -DCMAKE_CXX_FLAGS_RELEASE="-O2 -DNDEBUG" -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
+	$(BIN)/cmake --build build/wasm --target live
+	cp build/wasm/live.wasm site/static/live.wasm
+
+# The vendored part of three.js again; needs npm and a network.
+three-scene:
+	mkdir -p build/three && cp site/vendor/three-scene.js build/three/
+	cd build/three && npm install --no-save three@0.187.0 esbuild && npx esbuild three-scene.js --bundle --minify \
+	    --format=iife --global-name=THREE --legal-comments=none \
+	    --banner:js="/* three.js 0.187.0, MIT licence: three-LICENSE.txt */" --outfile=$(CURDIR)/site/static/three-scene.min.js
 
 site: install
 	$(BIN)/tracker publish --db $(DB) --out $(OUT)

@@ -14,9 +14,13 @@ Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), bo
 def number(owner: str, field: str, value: object) -> float:
     """A finite float, or a SceneError naming owner and field."""
     try:
+        if isinstance(value, bool | str | bytes):  # float() takes them, and "1" or True is a slip
+            raise TypeError
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise SceneError(f"{owner}: {field} must be a number, not {value!r}") from None
+    except OverflowError:
+        raise SceneError(f"{owner}: {field} is a number too large for arithmetic") from None
     if not math.isfinite(result):
         raise SceneError(f"{owner}: {field} must be finite, not {result}")
     return result

@@ -23,8 +23,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.check import Vector, vector
+from spook_tracker.engine.errors import MethodError, SceneError
+
+
+def _point(field: str, value: object) -> Vector:
+    try:
+        return vector("observe", field, value)
+    except SceneError as error:
+        raise MethodError(str(error)) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +93,9 @@ class Momentum(Quantity):
 class AngularMomentum(Quantity):
     about: Vector = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "about", _point("about", self.about))
+
 
 @dataclass(frozen=True, slots=True)
 class ContactForce(Quantity):
@@ -123,6 +133,9 @@ class Observable:
     def __post_init__(self) -> None:
         if not isinstance(self.quantity, Quantity):
             raise MethodError(f"observe: {self.quantity!r} is not a quantity")
+        for bound in (self.first, self.last):
+            if bound is not None and (isinstance(bound, bool) or not isinstance(bound, int)):
+                raise MethodError(f"observe: samples are counted by whole numbers, not {bound!r}")
         if self.first < 0 or (self.last is not None and self.last < self.first):
             raise MethodError(f"observe: samples {self.first} to {self.last} are not a range")
 
@@ -135,7 +148,7 @@ class Trace(Observable):
 
     def __post_init__(self) -> None:
         Observable.__post_init__(self)
-        if self.every < 1:
+        if isinstance(self.every, bool) or not isinstance(self.every, int) or self.every < 1:
             raise MethodError(f"observe: every must be a whole number from 1, not {self.every!r}")
 
 

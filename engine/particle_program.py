@@ -17,10 +17,9 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.smooth import ORDERS, check_smooth
 
-_ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}
 _ORIGIN = (0.0, 0.0, 0.0)
-_RIGID = 1e-7  # m/N, the softest row a composition takes for rigid
 
 
 def compile_particles(
@@ -30,39 +29,13 @@ def compile_particles(
     if method.string_stiffness and method.solver == "iterative":
         raise MethodError("method: string_stiffness needs the direct solver")
     if method.composition != "none":
-        _check_smooth(scene, method)
+        check_smooth(scene, method)
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     quantities, shapes = requests(scene, observe)
     native = _core.ParticleProgram(
         **_pack(scene, time_step, method, bodies), quantities=quantities, observations=observations(observe)
     )
     return Program(native, time_step=time_step, bodies=tuple(bodies), observe=observe, shapes=shapes)
-
-
-def _check_smooth(scene: Scene, method: Method) -> None:
-    """Compositions go back and forth in time and hold rows rigidly: refuse what that cannot do."""
-    if method.solver == "iterative" or method.string_stiffness:
-        raise MethodError("method: a composition needs the direct solver, without string stiffness")
-    for force in scene.forces:
-        if isinstance(force, Spring) and force.viscosity > 0.0:
-            raise MethodError(
-                f"method: a composition goes back in time, where the viscosity of spring {force.name!r} explodes"
-            )
-    positions = {body.name: body.position for body in scene.bodies}
-    for row in scene.constraints:
-        assert isinstance(row, Distance)
-        if row.compliance > _RIGID:
-            raise MethodError(
-                f"method: a composition holds rows rigidly, but {row.name!r} has a compliance of "
-                f"{row.compliance:g} m/N; make it {_RIGID:g} at most, or a Spring"
-            )
-        first, second = (positions[end] if isinstance(end, str) else end for end in row.between)
-        length = math.dist(first, second)
-        if row.rest_length is not None and abs(length - row.rest_length) > 1e-9 * row.rest_length:
-            raise MethodError(
-                f"method: a composition holds rows rigidly, but {row.name!r} starts {length:g} m long instead of "
-                f"its rest length of {row.rest_length:g} m"
-            )
 
 
 def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, int]) -> dict[str, Any]:
@@ -122,7 +95,7 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
             "residual_tolerance": method.residual_tolerance,
             "refinements": method.refinements,
             "floor": method.floor,
-            "composition": _ORDERS[method.composition],
+            "composition": ORDERS[method.composition],
         },
     }
 

@@ -79,6 +79,8 @@ def observations(observe: Mapping[str, Observable]) -> list[_core.Observation]:
 
 def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
     """The different quantities asked for, in order of first use."""
+    if not isinstance(observe, Mapping):
+        raise MethodError(f"observe must map names to a Trace, Final, Maximum, ..., not {observe!r}")
     quantities: list[Any] = []
     for name, what in observe.items():
         if not isinstance(what, Observable):

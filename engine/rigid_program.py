@@ -40,6 +40,7 @@ from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.engine.smooth import ORDERS, check_rigid
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
 _JOINTS: dict[type[Constraint], str] = {
@@ -67,7 +68,11 @@ def compile_rigid(
         **pack(scene, time_step, method), quantities=quantities, observations=observations(observe)
     )
     names = [body.name for body in scene.bodies]
-    return Program(native, time_step=time_step, bodies=names, observe=observe, shapes=shapes)
+    program = Program(native, time_step=time_step, bodies=names, observe=observe, shapes=shapes)
+    check_rigid(
+        scene, method, touching="impact" in {stage.stage for stage in program.explain() if stage.kept}
+    )
+    return program
 
 
 def normals(axis: Vector) -> tuple[Vector, Vector]:
@@ -128,6 +133,10 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "friction": method.friction,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
+            "composition": ORDERS[method.composition],
+            "half_step_velocities": method.half_step_velocities,
+            "corrections": method.corrections,
+            "correction_cap": method.correction_cap,
             "force_collision": "collision" in method.force_stages,
             "force_rotation": "rotation" in method.force_stages,
         },
@@ -137,12 +146,7 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
 def lacking(method: Method) -> str | None:
     """The first option that scenes with rigid bodies do not have and that is not at its default; None if all is
     well."""
-    for field, plain in (
-        ("corrections", 0),
-        ("half_step_velocities", False),
-        ("string_stiffness", False),
-        ("composition", "none"),
-    ):
+    for field, plain in (("string_stiffness", False),):
         if getattr(method, field) != plain:
             return field
     return None

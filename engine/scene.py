@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.engine import check
@@ -38,8 +38,11 @@ class Scene:
     no_contact: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        for field in ("bodies", "constraints", "forces"):
-            object.__setattr__(self, field, tuple(getattr(self, field)))
+        for field in ("bodies", "constraints", "forces", "no_contact"):
+            given = getattr(self, field)
+            if not isinstance(given, Iterable) or isinstance(given, str):
+                raise SceneError(f"scene: {field} must be a sequence, not {given!r}")
+            object.__setattr__(self, field, tuple(given))
         if not self.bodies:
             raise SceneError("a scene needs at least one body")
         for body in self.bodies:
@@ -110,7 +113,7 @@ class Scene:
 
     @staticmethod
     def _pair(pair: tuple[str, str], known: dict[str, Body]) -> tuple[str, str]:
-        if isinstance(pair, str) or len(pair) != 2:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
             raise SceneError(f"no_contact: {pair!r} is not a pair of names")
         for name in pair:
             if name not in known:
@@ -146,8 +149,10 @@ class Scene:
             return body.position
         return _placed(body, anchor)
 
-    def length(self, constraint: Distance) -> float:
-        """Distance [m] at the start between the two ends."""
+    def length(self, constraint: Distance, known: Mapping[str, Body] | None = None) -> float:
+        """Distance [m] at the start between the two ends; `known`, bodies by name, saves looking them up."""
+        if known is not None:
+            return self._length(constraint, known)
         return math.dist(self.anchor(constraint, 0), self.anchor(constraint, 1))
 
     def _length(self, constraint: Distance, known: Mapping[str, Body]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import SupportsFloat
 
 from spook_tracker.engine.compiler import NOTHING, compile
 from spook_tracker.engine.errors import MethodError
@@ -33,6 +34,8 @@ def simulate(
     if (duration is None) == (steps is None):
         raise MethodError("give either a duration or a number of steps")
     if duration is not None:
+        if isinstance(duration, bool | str) or not isinstance(duration, SupportsFloat):
+            raise MethodError(f"duration must be a number of seconds, not {duration!r}")
         if not (math.isfinite(duration) and duration >= 0.0):
             raise MethodError(f"duration must be finite and not negative, not {duration!r}")
         steps = round(duration / time_step)

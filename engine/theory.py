@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -51,45 +52,24 @@ def one_row_oscillates(mass: float, compliance: float, damping: float, time_step
     return 1.0 / (1.0 + mass * row.softness) < (1.0 + 4.0 * theta) / (1.0 + theta) ** 2
 
 
-def one_row_decay(mass: float, compliance: float, damping: float, time_step: float) -> float:
-    """Factor per step of the slowest mode of one row: its largest eigenvalue magnitude, 1."""
-    return float(np.abs(np.linalg.eigvals(one_row_matrix(mass, compliance, damping, time_step))).max())
+def undamped_row_phase(squared_frequency: float, time_step: float) -> float:
+    """Phase [rad] the undamped row (tau = 0) turns per step for the true w² [1/s²]: 2 atan(h w/2)."""
+    return 2.0 * math.atan(0.5 * time_step * math.sqrt(squared_frequency))
 
 
-def undamped_row_frequency(angular_frequency: float, time_step: float) -> float:
-    """Angular frequency [rad/s] the undamped row (tau = 0) shows for the true w [rad/s]: (2/h) atan(h w/2)."""
-    return 2.0 / time_step * math.atan(0.5 * time_step * angular_frequency)
+def undamped_row_invariant(x: Array, v: Array, squared_frequency: float, time_step: float) -> Array:
+    """v² + w² (x − h v/2)² [m²/s²] of each state, constant along the undamped row's discrete motion."""
+    return np.asarray(v**2 + squared_frequency * (x - 0.5 * time_step * v) ** 2)
 
 
-def undamped_row_invariant(x: float, v: float, angular_frequency: float, time_step: float) -> float:
-    """v² + w² (x − h v/2)² [m²/s²], constant along the undamped row's discrete motion."""
-    return v**2 + angular_frequency**2 * (x - 0.5 * time_step * v) ** 2
-
-
-def plain_spring_invariant(x: float, v: float, angular_frequency: float, time_step: float) -> float:
+def plain_spring_invariant(x: Array, v: Array, squared_frequency: float, time_step: float) -> Array:
     """v² − h w² x v + w² x² [m²/s²], constant along symplectic Euler; stable if and only if h w < 2."""
-    w2 = angular_frequency**2
-    return v**2 - time_step * w2 * x * v + w2 * x**2
+    return np.asarray(v**2 - squared_frequency * time_step * x * v + squared_frequency * x**2)
 
 
-def free_fall_error(gravity: float, time: float, time_step: float) -> float:
+def free_fall_error(gravity: float, time: Any, time_step: float) -> Any:
     """How much too far [m] a body has fallen from rest after `time` [s]: ½ g t h; zero with half-step velocities."""
     return 0.5 * gravity * time * time_step
-
-
-def circle_radius_excess(
-    radius: float, angle_per_step: float, mass: float, compliance: float, damping: float, time_step: float
-) -> float:
-    """r − L [m] of a steady circle of radius r [m] on a distance row, without gravity.
-
-    The phase per step is `angle_per_step` [rad]. Exact for the discrete motion; free of the mass as eps → 0.
-    """
-    theta = damping / time_step
-    return (
-        radius
-        * (1.0 - math.cos(angle_per_step))
-        * (0.5 * (1.0 + 2.0 * theta) + 2.0 * mass * compliance / time_step**2)
-    )
 
 
 def pendulum_length_deviation(gravity: float, length: float, damping: float, time_step: float) -> float:
@@ -108,21 +88,6 @@ def pendulum_period(gravity: float, length: float, amplitude: float) -> float:
     return 2.0 * math.pi * math.sqrt(length / gravity) / a
 
 
-def static_violation(compliance: float, force: float) -> float:
-    """g [m] of a row at rest that carries a tension [N]: eps F, for every time step and damping."""
-    return compliance * force
-
-
 def kepler_energy_swing(mean_motion: float, eccentricity: float, time_step: float) -> float:
     """Largest relative energy deviation, 1, of symplectic Euler on a slightly eccentric orbit: 2 h k xi."""
     return 2.0 * time_step * mean_motion * eccentricity
-
-
-def kepler_radius(angle: float, eccentricity: float) -> float:
-    """r [orbit parameter] at the angle [rad] of the planetarium's orbit: 1/(1 + xi sin θ)."""
-    return 1.0 / (1.0 + eccentricity * math.sin(angle))
-
-
-def kepler_period(mean_motion: float, eccentricity: float) -> float:
-    """Period [s] of an orbit of parameter 1 with strength k² [1/s²]: (2 π/k) (1 − xi²)^(−3/2)."""
-    return 2.0 * math.pi / mean_motion / math.sqrt(1.0 - eccentricity**2) ** 3

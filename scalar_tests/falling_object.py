@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.theory import free_fall_error
 from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
@@ -35,7 +36,7 @@ DURATION = 20.0  # s
 TIME_STEP = 1.0 / 60.0  # s
 TIME_STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)  # s, those of Figs 3.12 and 3.13
 HALF_STEP = Method(half_step_velocities=True)
-EXPECTED = 0.5 * GRAVITY * DURATION * TIME_STEP  # m: ½ g t h, 1.635
+EXPECTED = free_fall_error(GRAVITY, DURATION, TIME_STEP)  # m: ½ g t h, 1.635
 ENDS = {"position": Final(quantity=Position("sphere")), "velocity": Final(quantity=Velocity("sphere"))}
 
 
@@ -112,7 +113,7 @@ def draw_error(simulate: Simulate) -> Drawing:
     return Drawing(
         curves=(
             line("depth minus ½ g t²", time, -height - fallen(time)),
-            line("½ g t h", time, 0.5 * GRAVITY * time * TIME_STEP, "reference"),
+            line("½ g t h", time, free_fall_error(GRAVITY, time, TIME_STEP), "reference"),
             line("read one sample late", time[1:], -height[1:] - fallen(time[1:] - TIME_STEP)),
         ),
         x_label="time [s]",

@@ -7,8 +7,10 @@ so a scheme that loses either is found out by the clock.
 from __future__ import annotations
 
 import functools
+from typing import Literal
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from spook_tracker.engine import (
@@ -44,6 +46,8 @@ INERTIA = (0.9144, 1.098, 1.66)  # kg m²
 SPIN = (0.05, 1.0, 0.05)  # rad/s, body axes
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 200.0  # s
+TURN_DURATION = 10.0  # s
+ORDERS: tuple[Literal["order4", "order6", "order8"], ...] = ("order4", "order6", "order8")
 
 
 def scene() -> Scene:
@@ -152,6 +156,31 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
+def exact_turn() -> np.ndarray:
+    """Orientation (w, x, y, z) after TURN_DURATION, from Euler's equations integrated to rounding."""
+    moments = np.array(INERTIA)
+
+    def slope(_: float, state: np.ndarray) -> np.ndarray:
+        spin, scalar, vector = state[:3], state[3], state[4:]
+        change = 0.5 * (scalar * spin + np.cross(vector, spin))
+        return np.concatenate([np.cross(moments * spin, spin) / moments, [-0.5 * vector @ spin], change])
+
+    start = np.array([*SPIN, 1.0, 0.0, 0.0, 0.0])
+    solved = solve_ivp(slope, (0.0, TURN_DURATION), start, method="DOP853", rtol=3e-14, atol=1e-15)
+    return np.asarray(solved.y[3:, -1])
+
+
+def turn_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The tumbling up to where its orientation is compared."""
+    return simulate(scene(), time_step=time_step, duration=TURN_DURATION, method=method)
+
+
+def turn_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest error of a component of the orientation after 10 s."""
+    exact, turn = exact_turn(), turn_run(simulate, time_step, method).final_state["body"][3:7]
+    return float(np.abs(turn * np.sign(turn @ exact) - exact).max())
+
+
 def highest_spin(simulate: Simulate) -> BreakPoint:
     """Largest h |ω| about the axis of largest inertia, a little off it."""
 
@@ -253,6 +282,20 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-3,
             target_seconds=0.05,
+        ),
+        Ladder(
+            name="turn",
+            description="largest error of a component of the orientation after 10 s against Euler's equations",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (4, 6, 8, 12, 16)),
+            configurations=tuple(
+                Configuration(name=order, method=Method(composition=order), expected_order=float(order[-1]))
+                for order in ORDERS
+            ),
+            error=turn_error,
+            run=turn_run,
+            target_error=1e-3,
+            target_seconds=0.01,
         ),
     ),
     stability=(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -44,6 +44,7 @@ PRECESSION = 1.0  # rad/s
 SPIN = (MASS * GRAVITY * ARM / PRECESSION + (ACROSS + MASS * ARM**2) * PRECESSION * math.cos(LEAN)) / ALONG
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 20.0  # s
+ORDERS: tuple[Literal["order4", "order6", "order8"], ...] = ("order4", "order6", "order8")
 OBSERVE: dict[str, Observable] = {
     "place": Trace(quantity=Position("top")),
     "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
@@ -241,11 +242,34 @@ TEST = ScalarTest(
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=1.0),
                 Configuration(name="two substeps", method=Method(substeps=2), expected_order=1.0),
+                Configuration(name="half step", method=Method(half_step_velocities=True), expected_order=2.0),
+                Configuration(
+                    name="curved", method=Method(half_step_velocities=True, corrections=1), expected_order=2.0
+                ),
             ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
+        ),
+        Ladder(
+            name="high-order",
+            description="largest distance of the centre of mass from its circle in 20 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (32, 48, 64, 80)),
+            configurations=tuple(
+                Configuration(
+                    name=order,
+                    method=Method(composition=order),
+                    expected_order=float(order[-1]),
+                    order_range=(1 / 80, 1 / 48),
+                )
+                for order in ORDERS
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-5,
+            target_seconds=0.01,
         ),
     ),
 )

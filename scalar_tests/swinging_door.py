@@ -7,6 +7,7 @@ one more than needed, so the redundant rows must also be right while everything 
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from scipy.special import ellipj, ellipk
@@ -48,6 +49,7 @@ START = 0.5 * math.pi  # rad from the lowest position
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 22.0  # s
 LADDER_DURATION = 10.0  # s
+ORDERS: tuple[Literal["order4", "order6", "order8"], ...] = ("order4", "order6", "order8")
 LEVER = 0.5 * SIZE[0]  # m, from the axis to the centre of mass
 INERTIA = MASS * (SIZE[0] ** 2 + SIZE[1] ** 2) / 12.0 + MASS * LEVER**2  # kg m², about the axis
 ACROSS = GRAVITY * math.sin(LEAN)  # m/s², gravity across the axis
@@ -236,11 +238,39 @@ TEST = ScalarTest(
                     expected_order=1.0,
                     order_range=(1 / 960, 1 / 240),
                 ),
+                Configuration(
+                    name="half step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=2.0,
+                    order_range=(1 / 960, 1 / 240),
+                ),
+                Configuration(
+                    name="curved", method=Method(half_step_velocities=True, corrections=1), expected_order=2.0
+                ),
             ),
             error=ladder_error,
             run=ladder_run,
             target_error=0.02,
             target_seconds=0.1,
+        ),
+        Ladder(
+            name="high-order",
+            description="largest angle error over 10 s against elliptic functions",
+            unit="rad",
+            time_steps=tuple(1.0 / n for n in (8, 12, 16, 24, 32)),
+            configurations=tuple(
+                Configuration(
+                    name=order,
+                    method=Method(composition=order),
+                    expected_order=float(order[-1]),
+                    order_range=(1 / 32, 1 / 16),
+                )
+                for order in ORDERS
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-4,
+            target_seconds=0.01,
         ),
         Ladder(
             name="violation",

@@ -10,6 +10,7 @@ import pytest
 
 from spook_tracker.engine import (
     WORLD,
+    AngularMomentum,
     Ball,
     Box,
     Capsule,
@@ -43,6 +44,7 @@ from spook_tracker.engine import (
     Universal,
     Violation,
     compile,
+    simulate,
 )
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -153,6 +155,13 @@ SCENES: list[tuple[Callable[[], object], tuple[str, ...]]] = [
     (lambda: JointSpring(stiffness=1.0, rest=math.inf), ("spring", "rest")),
     (lambda: stones(no_contact=(("stone", "ghost"),)), ("no_contact", "'ghost'")),
     (lambda: stones(no_contact=("stone",)), ("no_contact", "pair")),
+    (lambda: stones(no_contact=(5,)), ("no_contact", "pair", "5")),
+    (lambda: stones(no_contact=5), ("no_contact", "sequence", "5")),
+    (lambda: Scene(bodies=None), ("bodies", "sequence", "None")),
+    (lambda: Scene(bodies=(A,), constraints=A), ("constraints", "sequence")),
+    (lambda: particle(mass="1"), ("'a'", "mass", "number", "'1'")),
+    (lambda: particle(mass=True), ("'a'", "mass", "number", "True")),
+    (lambda: particle(mass=10**400), ("'a'", "mass", "too large")),
 ]  # fmt: skip
 
 
@@ -202,8 +211,21 @@ def test_observing_what_is_not_there_is_refused_by_name(scene: Scene, quantity: 
         compile(scene, time_step=0.01, observe={"x": Final(quantity=quantity)})
 
 
+def test_observe_must_be_a_mapping_and_quantities_numbers() -> None:
+    for scene in (particles(), stones()):
+        with pytest.raises(MethodError, match=r"observe must map names.*not 5"):
+            compile(scene, time_step=0.01, observe=5)  # type: ignore[arg-type]
+    for point in (math.nan, (0.0, math.nan, 0.0), ("x", 0.0, 0.0)):
+        with pytest.raises(MethodError, match="observe: about"):
+            AngularMomentum(about=point)  # type: ignore[arg-type]
+    with pytest.raises(MethodError, match="duration must be a number of seconds, not '1'"):
+        simulate(particles(), time_step=0.01, duration="1")  # type: ignore[arg-type]
+
+
 def test_a_range_of_samples_must_be_one() -> None:
     for make in (
+        lambda: Final(quantity=Orientation(), first=0.5),  # type: ignore[arg-type]
+        lambda: Final(quantity=Orientation(), last=True),
         lambda: Final(quantity=Orientation(), first=-1),
         lambda: Final(quantity=Orientation(), first=3, last=2),
         lambda: Trace(quantity=Orientation(), every=0),

@@ -147,5 +147,5 @@ def test_a_singular_system_without_a_floor_is_reported() -> None:
 
 
 def test_options_of_particles_are_refused_for_rigid_bodies() -> None:
-    with pytest.raises(engine.MethodError, match="corrections is for scenes of particles only"):
-        engine.compile(Scene(bodies=(body(),)), time_step=TIME_STEP, method=Method(corrections=1))
+    with pytest.raises(engine.MethodError, match="string_stiffness is for scenes of particles only"):
+        engine.compile(Scene(bodies=(body(),)), time_step=TIME_STEP, method=Method(string_stiffness=True))

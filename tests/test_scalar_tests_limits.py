@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from pathlib import Path
+from types import FunctionType
 
 import numpy as np
 import pytest
 
+from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import double_pendulum
 from spook_tracker.scalar_tests.beam import scene as beam
@@ -17,6 +21,8 @@ from spook_tracker.scalar_tests.chain import GRAVITY
 from spook_tracker.scalar_tests.hanging_chain import scene as hanging
 from spook_tracker.scalar_tests.oscillator import damped
 from spook_tracker.scalar_tests.oscillator import scene as oscillator
+from spook_tracker.scalar_tests.pendulum import scene as pendulum
+from spook_tracker.scalar_tests.planetarium.metrics import OUR_SET_POINT
 from spook_tracker.scalar_tests.planetarium.scene import (
     DURATION,
     GAUSS,
@@ -248,3 +254,27 @@ def test_the_double_pendulum_may_be_half_a_step_off() -> None:
     gate = CATALOGUE["double_pendulum"].measurements[0].metrics[0]
 
     assert gate.limit == pytest.approx(0.5 * double_pendulum.TIME_STEP * np.abs(rates).max(), rel=2e-3)
+
+
+def test_the_closed_forms_of_theory_are_the_limits_and_references_of_the_pendulum_and_the_orbit() -> None:
+    length = measurement("pendulum", "plain").metrics[0]
+    swing = 100.0 * theory.kepler_energy_swing(GAUSS, 0.017, TIME_STEP)  # %
+
+    assert theory.pendulum_period(9.81, 1.0, math.pi / 2) == pytest.approx(pendulum.period(), rel=1e-15)
+    assert length.limit == pytest.approx(
+        100.0 * theory.pendulum_length_deviation(9.81, 1.0, 1 / 60, 1 / 60), rel=1e-3
+    )
+    assert swing == pytest.approx(9.76e-4, rel=1e-3)
+    assert f"{9.76e-4:.2e} %".replace("e-04", "e-4") in OUR_SET_POINT
+
+
+def test_every_closed_form_of_theory_is_asked_by_a_scalar_test_or_a_test() -> None:
+    root = Path(__file__).parent.parent
+    files = [*(root / "scalar_tests").rglob("*.py"), *(root / "tests").glob("*.py")]
+    text = "\n".join(path.read_text() for path in files)
+    forms = [name for name, form in vars(theory).items() if isinstance(form, FunctionType)]
+
+    assert len(forms) >= 8
+    assert [
+        name for name in forms if name != "row_coefficients" and not re.search(rf"\b{name}\b", text)
+    ] == []

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.tracker.judge.compare import Measured, compare, side_of
+from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.series_history import commit_of
+from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import MISSING, arrive, browser, look, programs, wait_for
 from tests.synthetic_history import SEVEN, history
@@ -157,10 +158,17 @@ def test_compare_shows_the_verdicts_of_the_command(driver: Any, site: Path, nigh
     runs = nights.runs()
     for before, after in ((15, 23), (23, 15), (22, 23)):
         sides = [
-            Measured(side=side_of(runs[i]), samples=nights.samples(runs[i].id), maps=nights.maps(runs[i].id))
-            for i in (before, after)
+            (
+                run,
+                ComparedRun(
+                    side=side_of(run),
+                    samples=with_work(nights.samples(run.id), run.engine),
+                    maps=nights.maps(run.id),
+                ),
+            )
+            for run in (runs[before], runs[after])
         ]
-        told = compare(*sides)
+        told = compare_in(nights, *sides)
         visit(driver, site, f"compare.html#before={runs[before].id}&after={runs[after].id}")
 
         text = driver.execute_script("return document.getElementById('told').innerText")

@@ -12,14 +12,18 @@ from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
     MapData,
+    Point,
     Sample,
     SeriesDefinition,
+    SeriesHistory,
     Timing,
     to_number,
 )
+from spook_tracker.tracker.judge import series_history
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.series_history import Night, judge_history, judge_run, telling
-from spook_tracker.tracker.judge.tonight import run_time_histories
+from spook_tracker.tracker.judge.lane import run_times
+from spook_tracker.tracker.judge.series_history import judge_all, judge_history
+from spook_tracker.tracker.judge.tonight import judge_maps, of_run
 
 SERIES = SeriesDefinition(
     key="t/c/m",
@@ -90,9 +94,9 @@ def sample(value: float, limit: float = 0.1, **evidence) -> Sample:
     )
 
 
-def history(*values: float, version: str = "1", releases: tuple[int, ...] = (0,)) -> list[Night]:
+def history(*values: float, version: str = "1", releases: tuple[int, ...] = (0,)) -> list[Point]:
     return [
-        Night(run(i, version="1.0.0" if i in releases else "1.0.1.dev1"), sample(value), version)
+        Point(run(i, version="1.0.0" if i in releases else "1.0.1.dev1"), sample(value), version)
         for i, value in enumerate(values)
     ]
 
@@ -164,7 +168,7 @@ def test_a_release_starts_the_count_again():
 
 def test_the_same_commit_with_two_values_is_non_deterministic():
     nights = [
-        Night(run(i, commit="c" * 40), sample(value), "1") for i, value in enumerate((0.01, 0.010000001))
+        Point(run(i, commit="c" * 40), sample(value), "1") for i, value in enumerate((0.01, 0.010000001))
     ]
     told = judge_history("t/c/m", SERIES, nights)
 
@@ -174,10 +178,10 @@ def test_the_same_commit_with_two_values_is_non_deterministic():
 
 def test_a_new_definition_or_float_environment_is_not_comparable_and_starts_a_new_level():
     nights = [
-        Night(run(0), sample(0.01), "1"),
-        Night(run(1), sample(0.05), "2"),
-        Night(run(2), sample(0.05), "2"),
-        Night(run(3, float_environment="other"), sample(0.09), "2"),
+        Point(run(0), sample(0.01), "1"),
+        Point(run(1), sample(0.05), "2"),
+        Point(run(2), sample(0.05), "2"),
+        Point(run(3, float_environment="other"), sample(0.09), "2"),
     ]
     told = judge_history("t/c/m", SERIES, nights)
 
@@ -204,7 +208,7 @@ def test_an_accepted_level_is_not_red_and_the_next_step_is():
 def test_run_times_of_another_machine_are_a_history_of_their_own():
     definition = series(kind="time", better="smaller", limit=None)
     nights = [
-        Night(run(i, fingerprint="ab"[i % 2]), sample(1.0 + 4.0 * (i % 2), limit=9.0), "1") for i in range(20)
+        Point(run(i, fingerprint="ab"[i % 2]), sample(1.0 + 4.0 * (i % 2), limit=9.0), "1") for i in range(20)
     ]
     told = judge_history("t/c/m", definition, nights)
 
@@ -214,7 +218,8 @@ def test_run_times_of_another_machine_are_a_history_of_their_own():
 
 def test_tonight_is_judged_against_the_nights_before_it_only():
     nights = history(0.01, 0.02, 0.01)
-    (found,) = judge_run({"t/c/m": (SERIES, nights)}, nights[1].run)
+    before = {"t/c/m": SeriesHistory(SERIES, tuple(nights[:2]))}
+    (found,) = of_run(judge_all(before), nights[1].run.id)
 
     assert found.red
     assert (found.first_bad, found.last_good) == (f"{1:040d}"[:12], f"{0:040d}"[:12])
@@ -224,36 +229,35 @@ def test_a_ladder_that_takes_longer_is_found_by_its_run_time():
     source = random.Random(1)
     ladder = series(kind="ladder", metric="ladder:e", limit=None, role="reported")
 
-    def rung(scale: float) -> list[Night]:
+    def rung(scale: float) -> list[Point]:
         nights = []
         for i in range(12):
             level = scale * (1.2 if i >= 10 else 1.0) * (1.0 + source.gauss(0.0, 0.01))
             timing = Timing(seconds=(level, 1.1 * level), runs_per_repeat=1)
-            nights.append(Night(run(i), sample(1e-3, timing=timing), "1"))
+            nights.append(Point(run(i), sample(1e-3, timing=timing), "1"))
         return nights
 
-    histories = {"a": (ladder, rung(1e-3)), "b": (ladder, rung(4e-3))}
-    tonight = histories["a"][1][-1].run
-    derived = run_time_histories(histories, tonight)
-    (found,) = judge_run(derived, tonight)
+    histories = {
+        name: SeriesHistory(ladder, tuple(rung(scale))) for name, scale in (("a", 1e-3), ("b", 4e-3))
+    }
+    derived = run_times(histories)
+    (found,) = of_run(judge_all(derived), "run-11")
 
     assert list(derived) == ["t/c/ladder:e:run-time"]
     assert (found.red, found.verdict.name) == (True, "slower")
     assert found.first_bad == f"{10:040d}"[:12]
 
 
-def test_nights_between_equal_nights_say_nothing():
-    nights = history(*([0.01] * 50), 0.02, *([0.01] * 50), releases=(0, 20))
-    told = telling(SERIES, nights)
+def test_nights_between_equal_nights_are_judged_without_a_look_and_alike(monkeypatch):
+    values = [*([0.01] * 50), 0.02, *([0.01] * 50)]
+    nights = history(*values, releases=(0, 20))
+    short = judge_history("t/c/m", SERIES, nights)
+    monkeypatch.setattr(series_history, "_repeats", lambda before, after: False)
 
-    assert [night.run.id for night in told] == [f"run-{i}" for i in (0, 20, 49, 50, 51, 100)]
-    whole, short = (judge_history("t/c/m", SERIES, n)[-1] for n in (nights, told))
-    assert (whole.verdict, whole.state) == (short.verdict, short.state)
+    assert judge_history("t/c/m", SERIES, nights) == short
 
 
 def test_maps_are_judged_cell_by_cell():
-    from spook_tracker.tracker.judge.series_history import judge_maps
-
     facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
     before = MapData(
         **facts, x_label="x", y_label="y", x=(1.0,), y=(1.0,), cells=(("settled",),), prediction=None

@@ -10,7 +10,7 @@ import pytest
 
 from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, Timing, to_number
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.compare import Measured, compare
+from spook_tracker.tracker.judge.compare import ComparedRun, Known, compare
 from spook_tracker.tracker.judge.comparison_document import CompareDocument, Side
 
 STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)
@@ -71,8 +71,8 @@ def side(name: str, **facts) -> Side:
     return Side(**{**common, **facts})
 
 
-def run(name: str, *pairs, maps=(), **facts) -> Measured:
-    return Measured(side=side(name, **facts), samples=dict(pairs), maps=maps)
+def run(name: str, *pairs, maps=(), **facts) -> ComparedRun:
+    return ComparedRun(side=side(name, **facts), samples=dict(pairs), maps=maps)
 
 
 def by_series(document: CompareDocument) -> dict[str, str]:
@@ -148,7 +148,7 @@ def test_an_accepted_level_is_told_and_not_red():
 
 
 def test_the_first_bad_commit_is_told_where_it_is_known():
-    known = {"t/c/m": ("good", "bad")}
+    known = Known(first_bad={"t/c/m": ("good", "bad")})
     document = compare(run("a", pair("t/c/m", 0.1)), run("b", pair("t/c/m", 0.2)), (), known)
 
     assert (document.changes[0].last_good, document.changes[0].first_bad) == ("good", "bad")
@@ -232,14 +232,14 @@ def test_a_time_of_one_session_is_judged_where_history_knows_its_noise():
         return pair("t/c/time", value, kind="time", better="smaller", unit="s", role="reported")
 
     before, slower = run("a", seconds(1.0)), run("b", seconds(1.1))
-    noise = {"t/c/time": (1.0, 0.05)}
+    noise = Known(usual={"t/c/time": (1.0, 0.05)})
 
     assert compare(before, slower).counts == {"same": 1}
     assert compare(before, run("b", seconds(3.0))).counts == {"changed": 1}
-    assert compare(before, slower, usual=noise).changes[0].name == "slower"
-    assert compare(before, run("b", seconds(1.04)), usual=noise).exit_code == 0
-    assert compare(before, run("b", seconds(0.9)), usual=noise).counts == {"improved": 1}
-    elsewhere = compare(before, run("b", seconds(9.0), machine="other"), usual=noise)
+    assert compare(before, slower, history=noise).changes[0].name == "slower"
+    assert compare(before, run("b", seconds(1.04)), history=noise).exit_code == 0
+    assert compare(before, run("b", seconds(0.9)), history=noise).counts == {"improved": 1}
+    elsewhere = compare(before, run("b", seconds(9.0), machine="other"), history=noise)
     assert elsewhere.changes[0].word == "not_comparable"
 
 

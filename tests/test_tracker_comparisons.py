@@ -8,14 +8,13 @@ import pytest
 
 from spook_tracker.tracker.website import comparisons as module
 from spook_tracker.tracker.website.comparisons import chosen, comparisons, page_data
-from spook_tracker.tracker.website.events import all_events
 from spook_tracker.tracker.website.nights import book
 from tests.synthetic_history import DocumentHistory, document, history
 
 
 def made(nights: DocumentHistory, known: dict[str, Any] | None = None) -> module.Comparisons:
     told = book(nights)
-    return comparisons(nights, told, all_events(told), (), known or {})
+    return comparisons(nights, told, (), known or {})
 
 
 def test_every_ordered_pair_of_the_newest_versions_is_there() -> None:
@@ -39,10 +38,10 @@ def test_the_choice_is_bounded_and_keeps_releases() -> None:
 def test_a_regression_names_its_first_bad_commit() -> None:
     runs = history(6, broken=3)
     told = made(runs)
-    bad = runs.runs()[3].engine.git_hash[:10]
+    bad = runs.runs()[3].engine.git_hash[:12]
 
     pair = told.pairs["run-spook-0002/run-spook-0005"]
-    friction = next(c for c in pair["changes"] if c[3] == "Friction" and c[1] == "red")
+    friction = next(c for c in pair["changes"] if c[3] == "Friction" and c[1] == "fail")
     assert (pair["verdict"], pair["code"]) == ("regressed", 1)
     assert friction[-1] == f"first bad commit {bad}"
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
-import pytest
-
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.website import events
-from spook_tracker.tracker.website.events import all_events, events_of, telling_nights
+from spook_tracker.tracker.website.events import all_events
 from spook_tracker.tracker.website.nights import Book, book
 from tests.synthetic_history import DocumentHistory, document, engine, sample, series
 
 GATE = series("t", "m", role="gate", limit=1.0, unit="m")
 
 
-def told(*values: float, **changes: Any) -> Book:
+def told(*values: float, accepted: Sequence[Accepted] = (), **changes: Any) -> Book:
     """A book of one gate with these values, night by night."""
     from msgspec.structs import replace
 
@@ -35,7 +33,7 @@ def told(*values: float, **changes: Any) -> Book:
                 maps=(),
             )
         )
-    return book(DocumentHistory(runs))
+    return book(DocumentHistory(runs), accepted)
 
 
 def test_a_broken_limit_is_told_from_its_first_night_until_it_is_mended() -> None:
@@ -48,7 +46,7 @@ def test_a_broken_limit_is_told_from_its_first_night_until_it_is_mended() -> Non
     assert event.good.index == 1
     assert event.end is not None
     assert event.end.index == 4
-    assert (event.name, event.standing, event.state) == ("limit crossed", "recovered", "fail")
+    assert (event.name, event.standing, event.stands) == ("limit crossed", "recovered", "fail")
 
 
 def test_a_regression_that_lasts_has_no_end() -> None:
@@ -56,22 +54,21 @@ def test_a_regression_that_lasts_has_no_end() -> None:
 
     assert event.lasting
     assert event.end is None
-    assert event.state == "watch"
+    assert event.stands == "watch"
     assert event.first.engine.git_hash == engine(2).git_hash
 
 
 def test_no_finite_value_is_red_that_same_night() -> None:
     (event,) = all_events(told(0.5, math.nan))
 
-    assert event.state == "fail"
+    assert event.stands == "fail"
     assert event.name == "not finite"
 
 
 def test_an_accepted_level_is_told_as_accepted() -> None:
-    made = told(0.5, 0.7, 0.7)
     level = Accepted(series="t/*", low=0.0, high=0.8, who="Ada", why="a wider beam", until=None)
 
-    (event,) = all_events(made, (level,))
+    (event,) = all_events(told(0.5, 0.7, 0.7, accepted=[level]))
     assert event.standing == "accepted"
     assert not event.lasting
     assert "Ada" in event.accepted
@@ -83,25 +80,6 @@ def test_a_value_that_is_red_from_the_first_night_on_is_told() -> None:
     assert event.lasting
     assert event.first.index == 0
     assert math.isnan(event.before)
-
-
-@pytest.mark.parametrize(
-    "values", [(0.5,) * 9, (0.5, 0.5, 3.0, 3.0, 3.0, 0.5, 0.5, 0.5), (0.5, 0.4, 0.6, 0.6, 0.6)]
-)
-def test_leaving_out_nights_that_stand_still_changes_no_verdict(values: tuple[float, ...]) -> None:
-    made = told(*values)
-    trend = made.tests[0].trends[0]
-    short = events_of(trend, made.nights)
-
-    original = telling_nights
-
-    try:
-        events.telling_nights = lambda trend: list(range(len(trend.nights)))
-        assert [(e.first, e.last, e.standing) for e in events_of(trend, made.nights)] == [
-            (e.first, e.last, e.standing) for e in short
-        ]
-    finally:
-        events.telling_nights = original
 
 
 def test_a_build_with_local_changes_is_tonight_only_while_it_is_the_newest() -> None:

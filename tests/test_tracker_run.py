@@ -9,9 +9,9 @@ import msgspec
 import pytest
 
 from spook_tracker.tracker.document.run_document import RunDocument, from_number
-from spook_tracker.tracker.measure.run import Request, RunError, Source, ci_address, run
+from spook_tracker.tracker.measure.run import Questions, Request, RunError, ci_address, run
 
-SOURCE = Source(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
+SOURCE = Questions(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
 
 
 @pytest.fixture(autouse=True)

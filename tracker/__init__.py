@@ -1,1 +1,34 @@
-"""What changed, and since which commit? Runs scalar tests, records them, judges them, publishes them."""
+"""What changed, and since which commit? Runs scalar tests, records them, judges them, publishes them.
+
+Everything the command line does can be done from here; each name is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.library import (
+        History,
+        NightlyReport,
+        compare,
+        judge,
+        nightly,
+        publish,
+        record,
+        run,
+    )
+
+__all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish", "record", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from spook_tracker.tracker import library
+
+    return getattr(library, name)
+
+
+def __dir__() -> list[str]:
+    return __all__

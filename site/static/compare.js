@@ -30,7 +30,7 @@
     const [word, red, page, test, series, old, now, said, sentence, since] = change.map((place) => texts[place]);
     const head = make("th", { scope: "row" }, make("a", { href: page }, test), make("span", { class: "sub" }, series));
     const cell = make("td", { "data-name": "Verdict" });
-    cell.append(verdict(red ? "fail" : STATES[word] || "none", said.toUpperCase()), make("span", { class: "sub" }, sentence));
+    cell.append(verdict(red || STATES[word] || "none", said.toUpperCase()), make("span", { class: "sub" }, sentence));
     if (since) { cell.append(make("span", { class: "sub" }, since)); }
     return make("tr", { "data-word": word }, head,
       make("td", { class: "num", "data-name": "Before" }, old), make("td", { class: "num", "data-name": "After" }, now), cell);

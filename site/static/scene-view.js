@@ -203,7 +203,7 @@ class SceneView {
     }
     if (this.movie.contact) {
       const tip = new THREE.ConeGeometry(1, 1, 12).rotateX(Math.PI / 2);
-      this.arrows = { shaft: this.mesh(rod.clone(), MOST_ARROWS), tip: this.mesh(tip, MOST_ARROWS), largest: this.movie.contact.reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0) };
+      this.arrows = { shaft: this.mesh(rod.clone(), MOST_ARROWS), tip: this.mesh(tip, MOST_ARROWS), largest: this.usualForce() };
     } else { this.arrows = null; }
     for (const centre of this.movie.attractors) {
       const star = new THREE.Mesh(new THREE.SphereGeometry(2 * this.dot, 24, 16), new THREE.MeshLambertMaterial());
@@ -212,6 +212,17 @@ class SceneView {
       this.world.add(star);
     }
     this.violationScale = (this.movie.violation || []).reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0);
+  }
+
+  // The scale of the arrows: impacts are far larger than what rests, so the middle of the samples decides.
+  usualForce() {
+    const { contact, count, bodies } = this.movie, most = [];
+    for (let i = 0; i < count; i += 1) {
+      let largest = 0;
+      for (let k = 3 * i * bodies; k < 3 * (i + 1) * bodies; k += 1) { largest = Math.max(largest, Math.abs(contact[k]) || 0); }
+      if (largest > 0) { most.push(largest); }
+    }
+    return most.sort((a, b) => a - b)[Math.floor(most.length / 2)] || 0;
   }
 
   floor(solid) {
@@ -306,7 +317,9 @@ class SceneView {
     const longest = 0.3 * this.size, width = 0.22 * this.dot;
     let used = 0;
     for (let body = 0; this.shown.forces && largest > 0 && body < n && used < MOST_ARROWS; body += 1) {
-      const i = 3 * (nearest * n + body), d = [0, 1, 2].map((k) => (this.movie.contact[i + k] * longest) / largest), length = Math.hypot(...d);
+      const i = 3 * (nearest * n + body), d = [0, 1, 2].map((k) => (this.movie.contact[i + k] * 0.5 * longest) / largest);
+      let length = Math.hypot(...d);
+      if (length > longest) { d.forEach((v, k) => { d[k] = (v * longest) / length; }); length = longest; }
       if (!(length > 0.01 * longest)) { continue; }
       this.poses.at(body, this.sample);
       const q = aim(...d, length), head = Math.min(length, 6 * width);

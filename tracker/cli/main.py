@@ -7,12 +7,14 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.history import compare, explain, list_tests, show, trend
+from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
     OneLineErrors,
+    accepted_option,
     database_option,
     example,
+    limit_option,
     source_options,
     workers_option,
 )
@@ -45,9 +47,9 @@ def main(context: click.Context, version: bool) -> None:
 
 
 def _print_versions() -> None:
-    from spook_tracker.tracker.measure.run import Source, present_version, tracker_version
+    from spook_tracker.tracker.measure.run import Questions, present_version, tracker_version
 
-    engine = present_version(Source())
+    engine = present_version(Questions())
     click.echo(
         f"tracker {tracker_version()}, {engine.name} {engine.version} ({engine.git_hash[:10] or 'no commit'})"
     )
@@ -67,6 +69,7 @@ def _print_versions() -> None:
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
 @workers_option
+@limit_option
 @source_options
 @database_option
 def run_command(
@@ -80,75 +83,131 @@ def run_command(
     junit_file: Path | None,
     workers: int,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
-    """Run scalar tests (all, or those named), print the pass table and record one run."""
+    """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
     request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
-    document = _measure(request, engine, catalogue, None if no_record else database)
-    _print_run(document, everything)
-    if json_file:
-        _write(json_file, _json(document))
-    if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_run
+    names = engine.split(",")
+    red = False
+    for name in names:
+        document = _measure(request, name, limit, catalogue, None if no_record else database)
+        _print_run(document, everything)
+        if json_file:
+            _write(_of_engine(json_file, name, names), _json(document))
+        if junit_file:
+            from spook_tracker.tracker.cli.report_junit import junit_of_run
 
-        _write(junit_file, junit_of_run(document))
-    _exit_red_if(document)
+            _write(_of_engine(junit_file, name, names), junit_of_run(document))
+        red = red or _red(document)
+    if red:
+        click.get_current_context().exit(RED)
+
+
+def _of_engine(file: Path, name: str, names: list[str]) -> Path:
+    """One file each where several engines were asked: run.json, run-mujoco.json."""
+    return file if name == names[0] else file.with_stem(f"{file.stem}-{name.replace(':', '-')}")
 
 
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
 @workers_option
+@limit_option
 @click.option(
     "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
 )
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@accepted_option
 @source_options
 @database_option
 def nightly(
     out: Path,
     quick: bool,
     workers: int,
+    accepted: Path | None,
     json_file: Path | None,
     junit_file: Path | None,
     engine: str,
+    limit: float | None,
     catalogue: str,
     database: str,
 ) -> None:
     """Run everything, record it, judge it against the history and publish the website."""
+    from spook_tracker.tracker.cli.console import say, watching
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.run import Request
 
-    request = Request(figures=True, sweep=not quick, stability=not quick, workers=workers, trigger="nightly")
-    document = _measure(request, engine, catalogue, database)
-    _print_run(document, everything=False)
-    if json_file:
-        _write(json_file, _json(document))
-    if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_run
+    first, *others = engine.split(",")
+    for other in others:
+        asked = Request(sweep=not quick, workers=workers, trigger="nightly")
+        _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
-        _write(junit_file, junit_of_run(document))
-    regressed = _judge_and_publish(database, document.id, out)
-    if regressed:
+    def tell(news: Any) -> None:
+        if isinstance(news, list):
+            from spook_tracker.tracker.cli.report_compare import finding_lines
+
+            say("\n".join(finding_lines(news, f"{out}/")))
+            return
+        _print_run(news, everything=False)
+        if json_file:
+            _write(json_file, _json(news))
+
+    with watching("measuring") as step:
+        report = night(
+            database,
+            out,
+            accepted=accepted_levels(accepted),
+            watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
+            tell=tell,
+            catalogue=catalogue,
+            engine=first,
+            limit=limit,
+            figures=True,
+            sweep=not quick,
+            stability=not quick,
+            workers=workers,
+        )
+    for sentence in report.notes:
+        say(f"note: {sentence}")
+    if junit_file:
+        from spook_tracker.tracker.cli.report_junit import junit_of_night
+
+        _write(junit_file, junit_of_night(report.findings))
+    _say_published(report.published, out)
+    if report.red:
         click.get_current_context().exit(RED)
-    _exit_red_if(document)
+
+
+@main.command(epilog=example("tracker engines"))
+def engines() -> None:
+    """The engines that can be asked, in which configurations, and what is missing for the others."""
+    import spook_tracker.tracker.cli.report_engines as report
+    from spook_tracker.tracker.cli.console import say
+
+    say("\n".join(report.engine_lines()))
 
 
 @main.command(epilog=example("tracker publish --out public"))
 @click.option(
     "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
 )
+@accepted_option
 @database_option
-def publish(out: Path, database: str) -> None:
+def publish(out: Path, accepted: Path | None, database: str) -> None:
     """Build the website from what is recorded."""
-    from spook_tracker.tracker.cli.history import history_of
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.library import publish as build
 
-    with history_of(database) as history:
-        _publish(history, out)
+    with History.open(database) as history:
+        _say_published(build(history, out, accepted_levels(accepted)), out)
 
 
 @main.command(epilog=example("tracker serve public --port 8000"))
@@ -181,16 +240,16 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
     main.add_command(command)
 
 
-def _measure(request: Any, engine: str, catalogue: str, database: str | None) -> Any:
+def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Source, run
+    from spook_tracker.tracker.measure.run import Questions, run
 
-    source = Source(catalogue=catalogue, engine=engine)
+    source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
     if database is None:
         with watching("measuring") as step:
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
@@ -211,45 +270,15 @@ def _print_run(document: Any, everything: bool) -> None:
     say(pass_table(document, everything))
 
 
-def _exit_red_if(document: Any) -> None:
+def _red(document: Any) -> bool:
     from spook_tracker.tracker.cli.report_table import red
 
-    if red(document):
-        click.get_current_context().exit(RED)
+    return bool(red(document))
 
 
-def _judge_and_publish(database: str, run_id: str, out: Path) -> bool:
-    """Whether tonight is worse than the history, having said so and published the site."""
+def _say_published(report: Any, out: Path) -> None:
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import accepted_levels, history_of
-    from spook_tracker.tracker.cli.report_compare import finding_lines
-    from spook_tracker.tracker.judge.tonight import tonight
 
-    with history_of(database) as history:
-        findings = tonight(history, history.run(run_id), accepted_levels())
-        say("\n".join(finding_lines(findings, f"{out}/")))
-    _retain(database)
-    with history_of(database) as history:
-        _publish(history, out)
-    return any(finding.red for finding in findings)
-
-
-def _retain(database: str) -> None:
-    """Drop figures and maps that the retention rule no longer keeps, once they have been compared."""
-    from spook_tracker.tracker.store.database import session_on
-    from spook_tracker.tracker.store.history import History
-    from spook_tracker.tracker.store.retention import drop_old_figures
-
-    with session_on(database) as session:
-        drop_old_figures(session, History(session))
-
-
-def _publish(history: Any, out: Path) -> None:
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import accepted_levels
-    from spook_tracker.tracker.website.publish import publish as build
-
-    report = build(history, out, accepted_levels())
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import click
@@ -36,10 +37,10 @@ def source_options(command: Command) -> Command:
     for option in (
         click.option(
             "--engine",
-            metavar="MODULE",
+            metavar="NAME[,NAME]",
             envvar="TRACKER_ENGINE",
-            default="spook_tracker.engine",
-            help="Another engine behind the same simulate(); also TRACKER_ENGINE.",
+            default="spook",
+            help="spook, mujoco, … (see: tracker engines) or module:NAME; also TRACKER_ENGINE.",
         ),
         click.option(
             "--catalogue",
@@ -53,6 +54,16 @@ def source_options(command: Command) -> Command:
     return command
 
 
+def limit_option(command: Command) -> Command:
+    """--limit SECONDS, so that a slow engine does not hold up a night."""
+    return click.option(
+        "--limit",
+        metavar="SECONDS",
+        type=click.FloatRange(min=0.0, min_open=True),
+        help="Wall time one simulation may take; by default 10 s for another engine.",
+    )(command)
+
+
 def workers_option(command: Command) -> Command:
     """How many processes measure values; run times are always taken alone."""
     return click.option(
@@ -61,6 +72,19 @@ def workers_option(command: Command) -> Command:
         show_default=True,
         type=click.IntRange(1, 256),
         help="Processes that measure values.",
+    )(command)
+
+
+ACCEPTED = "accepted.toml"
+
+
+def accepted_option(command: Command) -> Command:
+    """--accepted FILE: levels that people have accepted."""
+    return click.option(
+        "--accepted",
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help=f"Accepted levels; default {ACCEPTED}.",
     )(command)
 
 

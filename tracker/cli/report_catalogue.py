@@ -59,7 +59,7 @@ def card(name: str, test: ScalarTest) -> str:
     lines += [click.style("Measured", bold=True)]
     for measurement, metric in test.metrics():
         lines += [f"  {line}" for line in _metric(measurement, metric, room - 2)]
-    lines += ["", *paragraph("Conclusion", test.conclusion), *paragraph("Source", test.source)]
+    lines += ["", *paragraph("Conclusion", test.conclusion), *paragraph("Questions", test.source)]
     lines += paragraph("Misprints", *test.misprints)
     return "\n".join(lines).rstrip()
 

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import click
 
 from spook_tracker.tracker.cli.console import Column, clean, table, width
-from spook_tracker.tracker.document.run_document import Number, from_number
+from spook_tracker.tracker.document.run_document import Number
+from spook_tracker.tracker.document.wording import page_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
-from spook_tracker.tracker.judge.series_history import Finding
+from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.vocabulary import QUIET, WORDS, spaced
 
-MARK = {
-    "regressed": "✗",
-    "missing": "✗",
-    "non_deterministic": "✗",
-    "not_comparable": "?",
-    "accepted": "!",
-    "fixed": "✓",
-    "improved": "✓",
-    "identical": "=",
-    "same": "=",
-}
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
-QUIET = {"identical", "same", "not_measured"}
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
 
 
@@ -31,14 +22,14 @@ def value(number: Number | None, unit: str = "") -> str:
     """A value for a table; enough digits to see a change."""
     if number is None:
         return "-"
-    return f"{from_number(number):.9g} {unit if unit != '1' else ''}".rstrip()
+    return f"{float(number):.9g} {unit if unit != '1' else ''}".rstrip()
 
 
 def both(change: Change) -> tuple[str, str]:
     """Values before and after with as many digits as it takes to tell them apart, the later with its unit."""
     if change.before is None or change.after is None:
         return value(change.before), value(change.after, change.unit)
-    old, new = from_number(change.before), from_number(change.after)
+    old, new = float(change.before), float(change.after)
     digits = 6
     while digits < 17 and old != new and f"{old:.{digits}g}" == f"{new:.{digits}g}":
         digits += 1
@@ -85,8 +76,7 @@ def red_line(change: Change) -> str:
     ]
     if change.first_bad:
         parts.append(f"first bad commit {change.first_bad}, last good {change.last_good or 'unknown'}")
-    if change.page:
-        parts.append(f"see {change.page}")
+    parts.append(f"see {page_of(change.test)}")
     return clean("; ".join(part for part in parts if part))
 
 
@@ -131,8 +121,8 @@ def _how(change: Change) -> str:
 
 def _what(change: Change) -> str:
     """Mark and word; of a regression its name."""
-    word = change.name if change.red and change.name else change.word.replace("_", " ")
-    return f"{MARK.get(change.word, '·')} {word}"
+    word = change.name if change.red and change.name else spaced(change.word)
+    return f"{WORDS[change.word].mark} {word}"
 
 
 def _paint(_row: int, text: str) -> str:
@@ -174,12 +164,12 @@ def _ratios(frontier: Frontier) -> tuple[float | None, float | None, float | Non
 
 def counted(document: CompareDocument) -> str:
     """Counts by word, the worst first."""
-    return ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in document.counts.items())
+    return ", ".join(f"{count} {spaced(word)}" for word, count in document.counts.items())
 
 
 def _verdict(document: CompareDocument) -> str:
     mark = {"regressed": "✗", "not_comparable": "?"}.get(document.verdict, "✓")
-    words = f"{mark} {document.verdict.replace('_', ' ')}: {counted(document) or 'nothing measured'}"
+    words = f"{mark} {spaced(document.verdict)}: {counted(document) or 'nothing measured'}"
     return click.style(words, fg=COLOUR.get(mark), bold=True)
 
 
@@ -188,7 +178,7 @@ def compare_markdown(document: CompareDocument) -> str:
     lines = [
         f"### {_escape(name_of(document.before))} → {_escape(name_of(document.after))}",
         "",
-        f"**{document.verdict.replace('_', ' ')}**: {counted(document)}",
+        f"**{spaced(document.verdict)}**: {counted(document)}",
         "",
     ]
     shown = [change for change in document.changes if change.word not in QUIET]
@@ -225,24 +215,60 @@ def _escape(text: str) -> str:
 
 
 def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
-    """What tonight came to against the history: a line for each red series, and one over all."""
-    lines = [click.style(_finding_line(finding, site), fg="red") for finding in findings if finding.red]
-    if lines:
-        return [*lines, click.style(f"✗ {len(lines)} worse than the history", fg="red", bold=True)]
-    return [click.style(f"✓ {len(findings)} series hold their level", fg="green")]
+    """What tonight came to against the history: one sentence over all, then a line for each red series."""
+    red = [finding for finding in findings if finding.red]
+    return [summary(findings), *(click.style(_finding_line(finding, site), fg="red") for finding in red)]
+
+
+def summary(findings: Sequence[Finding]) -> str:
+    """One sentence: how many are red, how many of them since tonight, and which is the worst."""
+    red = [finding for finding in findings if finding.red]
+    words = Counter(finding.verdict.word for finding in findings if not finding.red)
+    if red:
+        new = sum(finding.news for finding in red)
+        news = f"{new} new tonight" if new else "none of them new tonight"
+        worst = clean(f"the worst: {red[0].series}, {red[0].name}")
+        return click.style(f"✗ {len(red)} worse than the history, {news}; {worst}", fg="red", bold=True)
+    held = len(findings) - words["new"] - words["not_comparable"]
+    parts = [f"{held} series hold their level"] if held or not words else []
+    if words["new"]:
+        parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
+    if words["not_comparable"]:
+        parts.append(f"{words['not_comparable']} have a new definition or float environment, not compared")
+    return click.style("✓ " + "; ".join(parts), fg="green")
 
 
 def _finding_line(finding: Finding, site: str) -> str:
-    from spook_tracker.tracker.judge.compare import page_of
-
     judged, definition = finding.judged, finding.definition
-    parts = [f"✗ {finding.series}: {finding.verdict.name or finding.verdict.word}"]
+    parts = [f"✗ {finding.series}: {finding.name}"]
     if judged is not None and definition is not None:
         before = judged.against.sample.value if judged.against else None
         parts.append(f"{value(before)} → {value(judged.night.sample.value, definition.unit)}")
         parts.append(_limit(definition.limit))
     parts.append(finding.verdict.sentence)
-    if finding.first_bad:
-        parts.append(f"first bad commit {finding.first_bad}, last good {finding.last_good or 'unknown'}")
+    if finding.blame:
+        parts.append(("" if finding.news else "still red: ") + finding.blame)
     parts.append(f"see {site}{page_of(finding.test)}")
     return clean("; ".join(parts))
+
+
+def findings_json(findings: Sequence[Finding]) -> str:
+    """What tonight came to, the worst first, as JSON: a list with an object for each series."""
+    import msgspec
+
+    told = [
+        {
+            "series": finding.series,
+            "test": finding.test,
+            "word": finding.verdict.word,
+            "name": finding.name if finding.red else "",
+            "red": finding.red,
+            "news": finding.red and finding.news,
+            "sentence": finding.verdict.sentence,
+            "value": finding.judged.night.sample.value if finding.judged else None,
+            "first_bad": finding.first_bad,
+            "last_good": finding.last_good,
+        }
+        for finding in findings
+    ]
+    return msgspec.json.format(msgspec.json.encode(told), indent=1).decode()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from spook_tracker.tracker.cli.report_compare import red_line
-from spook_tracker.tracker.cli.report_table import is_red, limit, measured, pairs
+from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
+from spook_tracker.tracker.judge.standing import is_red
+from spook_tracker.tracker.judge.tonight import Finding
 
 ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -31,6 +34,17 @@ def junit_of_run(run: RunDocument) -> str:
         failure = f"{words} {sample.failure}".strip() if is_red(definition, sample) else ""
         name = definition.key.partition("/")[2]
         cases[definition.test].append((name, failure, sample.outcome == "crashed"))
+    return _document(dict(cases))
+
+
+def junit_of_night(findings: Sequence[Finding]) -> str:
+    """Every series of a night as judged against its history."""
+    cases = defaultdict(list)
+    for finding in findings:
+        failure = f"{finding.name}: {finding.verdict.sentence}; {finding.blame}" if finding.red else ""
+        sample = finding.judged.night.sample if finding.judged else None
+        crashed = sample is not None and sample.outcome == "crashed"
+        cases[finding.test].append((finding.series.partition("/")[2], failure, crashed))
     return _document(dict(cases))
 
 

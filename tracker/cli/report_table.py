@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import click
 
@@ -15,9 +15,10 @@ from spook_tracker.tracker.document.run_document import (
     RunDocument,
     Sample,
     SeriesDefinition,
-    from_number,
 )
+from spook_tracker.tracker.judge.standing import count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
+from spook_tracker.tracker.judge.vocabulary import CLASSES
 
 NARROW = 100  # columns; below, time step and set point have no column of their own
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
@@ -31,7 +32,7 @@ def number(value: float, digits: int = 6) -> str:
 
 def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> str:
     """The value with its unit, or the class of its failure."""
-    value = from_number(sample.value)
+    value = float(sample.value)
     if sample.outcome not in ("value", "out_of_limit") and not math.isinf(value):
         return sample.outcome.replace("_", " ")
     return f"{number(value, digits)} {_unit(definition)}".rstrip()
@@ -54,7 +55,7 @@ def _unit(definition: SeriesDefinition) -> str:
 
 def margin(definition: SeriesDefinition, sample: Sample) -> str:
     """How far inside the limit: per cent, or decades where per cent says nothing; negative is outside."""
-    value, bound = from_number(sample.value), definition.limit
+    value, bound = float(sample.value), definition.limit
     if bound is None or not math.isfinite(value):
         return "-"
     if isinstance(bound, tuple):
@@ -86,18 +87,10 @@ def set_point(definition: SeriesDefinition, sample: Sample) -> str:
     return "held" if sample.set_point_held else "LEFT"
 
 
-def is_red(definition: SeriesDefinition, sample: Sample) -> bool:
-    """A gate or companion outside its limit or off its set point. Reported values are never red alone."""
-    return definition.role != "reported" and not (
-        sample.passed and (sample.set_point_held or definition.set_point is None)
-    )
-
-
 def word(definition: SeriesDefinition, sample: Sample) -> str:
     """The last column: what a reader looks for first."""
-    if definition.role == "reported":
-        return "· seen" if sample.passed else "· " + sample.outcome.replace("_", " ")
-    return "✓ PASS" if sample.passed else "✗ FAIL"
+    mark, said, _ = CLASSES[standing(definition, sample)]
+    return f"{mark} {said}"
 
 
 def pairs(run: RunDocument) -> list[Pair]:
@@ -168,7 +161,6 @@ def _row(definition: SeriesDefinition, sample: Sample, narrow: bool) -> tuple[st
     mark = "●" if definition.role == "gate" else " "
     name, room_left = f"{mark} {definition.metric} [{', '.join(facts)}]", margin(definition, sample)
     if narrow:
-        judged = "✗ LEFT" if held == "LEFT" and sample.passed else judged
         bound = limit(definition).removesuffix(f" {_unit(definition)}")
         return name, measured(definition, sample, 4), bound, room_left.replace("decades", "dec"), judged
     step = "" if definition.time_step is None else number(definition.time_step, 4)
@@ -210,29 +202,15 @@ def failures(run: RunDocument) -> list[str]:
 
 def verdict(run: RunDocument) -> str:
     """The last line: how many limits held."""
-    judged = [pair for pair in pairs(run) if pair[0].role != "reported"]
-    bad = [pair for pair in judged if is_red(*pair)]
-    left = sum(sample.passed for _, sample in bad)
-    if not judged:
+    found = count(pairs(run))
+    if not found.expected and not found.lost:
         return "nothing was measured against a limit"
-    if not bad:
-        gates = sum(definition.role == "gate" for definition, _ in judged)
-        words = f"✓ green: all {len(judged)} limits and set points hold; gates (●) among them: {gates}"
-        return click.style(words, fg="green", bold=True)
-    words = f"✗ red: {len(bad) - left} of {len(judged)} limits broken"
-    return click.style(words + (f", {left} set points left" if left else ""), fg="red", bold=True)
-
-
-def counts(run: RunDocument) -> Mapping[str, int]:
-    """How many series passed, failed or are only reported."""
-    found = {"passed": 0, "failed": 0, "reported": 0}
-    for definition, sample in pairs(run):
-        kind = (
-            "reported"
-            if definition.role == "reported"
-            else "failed"
-            if is_red(definition, sample)
-            else "passed"
+    if not found.red:
+        words = (
+            f"✓ green: all {found.expected} limits and set points hold; gates (●) among them: {found.gates}"
         )
-        found[kind] += 1
-    return found
+        return click.style(words, fg="green", bold=True)
+    words = f"✗ red: {found.broken} of {found.limits} limits broken"
+    words += f", {found.left} set points left" if found.left else ""
+    words += f", {found.lost} values missing" if found.lost else ""
+    return click.style(words, fg="red", bold=True)

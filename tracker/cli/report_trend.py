@@ -8,37 +8,29 @@ import click
 
 from spook_tracker.tracker.cli.console import Column, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import limit, number
-from spook_tracker.tracker.document.run_document import SeriesDefinition, from_number
-from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.change_points import change_points
-from spook_tracker.tracker.judge.series_history import Judged, Night, commit_of, is_noisy, judge_history
+from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of, is_noisy
+from spook_tracker.tracker.judge.vocabulary import STATES, spaced
 
-MARK = {"detected": "✗ red", "accepted": "! accepted", "recovered": "✓ recovered", "suspected": "? suspected"}
 
-
-def trend_lines(
-    key: str,
-    definition: SeriesDefinition,
-    history: Sequence[Night],
-    accepted: Sequence[Accepted] = (),
-    last: int = 10,
-) -> list[str]:
+def trend_lines(told: Told, last: int = 10) -> list[str]:
     """The series as lines, oldest value at the left, newest at the bottom."""
-    values = [from_number(night.sample.value) for night in history]
+    definition, judged = told.definition, told.nights
+    values = [j.night.value for j in judged]
     unit = "" if definition.unit in ("", "1") else f" {definition.unit}"
     lines = [
-        click.style(key, bold=True),
+        click.style(told.key, bold=True),
         f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {limit(definition)})",
     ]
-    judged = judge_history(key, definition, history, accepted)
     lines += [f"  {line}" for line in changes(definition, judged)]
     rows = [
         (
             j.night.run.started[:10],
             j.night.run.engine.version,
             commit_of(j.night.run),
-            number(from_number(j.night.sample.value), 12) + unit,
-            MARK.get(j.state, "") or j.verdict.word.replace("_", " "),
+            number(j.night.value, 12) + unit,
+            STATES[j.state] or spaced(j.verdict.word),
             j.verdict.sentence,
         )
         for j in judged[-last:]
@@ -57,17 +49,13 @@ def trend_lines(
 def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]:
     """Where the level changed: exactly, or by statistics where there is noise."""
     if not is_noisy(definition):
-        told = [
-            j
-            for j in judged
-            if j.verdict.word not in ("identical", "same", "new") and not _repeats(j, judged)
-        ]
+        told = [j for j in judged if j.verdict.word not in ("identical", "same", "new") and not _repeats(j)]
         return [
             f"{j.night.run.started[:10]} {commit_of(j.night.run)}: {j.verdict.name or j.verdict.word} "
             f"{j.verdict.sentence}"
             for j in told
         ]
-    values = [from_number(j.night.sample.value) for j in judged]
+    values = [j.night.value for j in judged]
     return [
         f"{judged[point.place].night.run.started[:10]} {commit_of(judged[point.place].night.run)}: "
         f"level {number(point.before)} → {number(point.after)} (p = {point.probability:.3f})"
@@ -75,6 +63,6 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
     ]
 
 
-def _repeats(judged: Judged, history: Sequence[Judged]) -> bool:
+def _repeats(judged: Judged) -> bool:
     """A night that is only still red."""
-    return judged.first_bad is not None and judged.first_bad is not judged.night
+    return judged.red and not judged.news

@@ -8,13 +8,16 @@ imported with nothing else. Non-finite values travel as the strings "nan", "inf"
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
 import msgspec
 
 SCHEMA_VERSION = 1
 
-OutcomeClass = Literal["value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing"]
+OutcomeClass = Literal[
+    "value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing", "not_supported"
+]
 Text = Annotated[str, msgspec.Meta(max_length=65_536)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 Number = float | Literal["nan", "inf", "-inf"]
@@ -59,7 +62,7 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     unit: Text
     role: Literal["gate", "companion", "reported"]
     better: Literal["smaller_magnitude", "larger", "smaller", "inside"]
-    kind: Literal["scalar", "ladder", "order", "time", "break_point"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point", "work"]
     time_step: float | None  # s
     parameters: dict[str, float]
     limit: float | tuple[float, float] | None
@@ -255,6 +258,43 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
     trajectories: tuple[Trajectory, ...] = ()
+
+
+class Run(Protocol):
+    """What is read of a run: a stored run, a run document, or any value with these."""
+
+    @property
+    def id(self) -> str: ...
+    @property
+    def started(self) -> str: ...
+    @property
+    def engine(self) -> EngineVersion: ...
+    @property
+    def machine(self) -> Machine: ...
+
+
+class Point(NamedTuple):
+    """One value of a series over versions, and the definition hash it was measured under."""
+
+    run: Any  # a Run
+    sample: Sample
+    test_version: str
+
+    @property
+    def value(self) -> float:
+        """The value as a float; NaN and infinities are what they are."""
+        return float(self.sample.value)
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesHistory:
+    """A series over versions, in commit order; `definition` as of the newest run that has it.
+
+    The one shape in which histories travel from the store to the judge and the pages.
+    """
+
+    definition: SeriesDefinition
+    points: tuple[Point, ...]
 
 
 def to_number(value: float) -> Number:

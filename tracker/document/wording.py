@@ -159,8 +159,10 @@ def named(definition: SeriesDefinition) -> tuple[str, str]:
 
 
 def conditions(definition: SeriesDefinition) -> str:
-    """Configuration and parameters: plain, N = 80."""
+    """Configuration, parameters, and of a ladder's rung the time step: plain, N = 80, h = 0.0125 s."""
     named_values = [f"{key} = {number(value)}" for key, value in sorted(definition.parameters.items())]
+    if definition.kind == "ladder" and definition.time_step is not None:
+        named_values.append(f"h = {quantity(definition.time_step, 's')}")
     return ", ".join([definition.configuration, *named_values])
 
 
@@ -170,6 +172,11 @@ def slug(name: str) -> str:
         return name
     letters = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40].strip("-")
     return f"{letters or 'x'}-{hashlib.sha256(name.encode('utf-8', 'replace')).hexdigest()[:8]}"
+
+
+def page_of(test: str) -> str:
+    """The page of the website about a test, from the website's root."""
+    return f"tests/{slug(test)}.html"
 
 
 def version(engine: EngineVersion) -> str:

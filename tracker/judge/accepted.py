@@ -9,14 +9,14 @@ accepted.toml holds tables like
     why = "one sentence"
     until = 2027-01-31                                 # optional: after this day it is red again
 
-A value inside the range is not red until that day. What is not finite is never accepted.
+and, for a gate that left the catalogue on purpose, `removed = true` in place of the range. A value inside the range is not red until that day. What is not finite is never accepted.
 """
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from fnmatch import fnmatchcase
@@ -25,7 +25,7 @@ from typing import Any
 
 from spook_tracker.tracker.document.errors import TrackerError
 
-KNOWN = {"series", "range", "who", "why", "until"}
+KNOWN = {"series", "range", "removed", "who", "why", "until"}
 
 
 class AcceptedError(TrackerError):
@@ -42,16 +42,20 @@ class Accepted:
     who: str
     why: str
     until: date | None = None
+    removed: bool = False  # that the series is not asked for any more, instead of a range
+
+    def names(self, key: str) -> bool:
+        """Whether the entry is about that series."""
+        return fnmatchcase(key, self.series)
+
+    def over(self, night: date) -> bool:
+        """Whether its day has passed."""
+        return self.until is not None and night > self.until
 
     def takes(self, key: str, value: float, night: date) -> bool:
         """Whether that value of that series is accepted on that night."""
         in_time = self.until is None or night <= self.until
-        return (
-            in_time
-            and fnmatchcase(key, self.series)
-            and math.isfinite(value)
-            and self.low <= value <= self.high
-        )
+        return in_time and self.names(key) and math.isfinite(value) and self.low <= value <= self.high
 
     def __str__(self) -> str:
         until = f", until {self.until}" if self.until else ""
@@ -80,7 +84,10 @@ def _entry(place: str, entry: Any) -> Accepted:
     for name in ("series", "who", "why"):
         if not isinstance(entry.get(name), str) or not entry[name].strip():
             raise AcceptedError(f"{place}: {name} must be a text; say {name}")
-    band = entry.get("range")
+    removed = entry.get("removed", False)
+    if not isinstance(removed, bool) or (removed and "range" in entry):
+        raise AcceptedError(f"{place}: removed must be true, without a range")
+    band = entry.get("range", [math.inf, math.inf] if removed else None)
     if (
         not isinstance(band, list)
         or len(band) != 2
@@ -95,10 +102,32 @@ def _entry(place: str, entry: Any) -> Accepted:
         raise AcceptedError(f"{place}: until must be a date like 2027-01-31, without quotes")
     low, high = float(band[0]), float(band[1])
     return Accepted(
-        series=entry["series"], low=low, high=high, who=entry["who"], why=entry["why"], until=until
+        series=entry["series"],
+        low=low,
+        high=high,
+        who=entry["who"],
+        why=entry["why"],
+        until=until,
+        removed=removed,
     )
 
 
-def acceptance(levels: Sequence[Accepted], key: str, value: float, night: date) -> Accepted | None:
-    """The entry that takes this value, if one does."""
+def acceptance(
+    levels: Sequence[Accepted], key: str, value: float, night: date, removed: bool = False
+) -> Accepted | None:
+    """The entry that takes this value, or that the series is gone, if one does."""
+    if removed:
+        return next((x for x in levels if x.removed and x.names(key) and not x.over(night)), None)
     return next((level for level in levels if level.takes(key, value, night)), None)
+
+
+def unused(levels: Sequence[Accepted], keys: Iterable[str], night: date) -> list[str]:
+    """A sentence for each entry that does nothing: its day has passed, or no series has such a name."""
+    names = list(keys)
+    said = []
+    for level in levels:
+        if level.over(night):
+            said.append(f"accepted until {level.until} and over: {level.series}; remove the entry")
+        elif not any(level.names(key) for key in names):
+            said.append(f"accepted, but there is no such series: {level.series}; correct or remove the entry")
+    return said

@@ -7,56 +7,84 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal
 
 import msgspec
 
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, from_number
-from spook_tracker.tracker.document.wording import slug
+from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
-from spook_tracker.tracker.judge.noise import Usual, judge_time
-from spook_tracker.tracker.judge.verdict import RED, Verdict, judge, judge_map
+from spook_tracker.tracker.judge.lane import Records, histories, line_of
+from spook_tracker.tracker.judge.noise import Usual, judge_time, only_followed, to_be_confirmed
+from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off, judge_all, red_class
+from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
+from spook_tracker.tracker.judge.tonight import map_key
+from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
+from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class
+from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
-FAMILY = {
-    "scalar": "values",
-    "ladder": "sweep",
-    "order": "sweep",
-    "time": "sweep",
-    "break_point": "stability",
-}
-GROSS = 0.3  # decades: a time read off one session that doubled is worth a line, though it proves nothing
-ORDER = (
-    "missing",
-    "regressed",
-    "non_deterministic",
-    "accepted",
-    "not_comparable",
-    "fixed",
-    "improved",
-    "changed",
-    "new",
-    "not_measured",
-    "same",
-    "identical",
-)
+TIMES = ("time", "run_time")
+DOUBLED = 0.3  # decades: a time read off one session that doubled is worth a line, though it proves nothing
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measured:
+class ComparedRun:
     """One side of a comparison."""
 
     side: Side
     samples: Samples
     maps: Sequence[MapData] = ()
+    whole: bool = False  # the whole catalogue was asked: what is not there was removed
 
     @property
     def night(self) -> date:
         return datetime.fromisoformat(self.side.started).astimezone(UTC).date()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """What the history knows about two runs: see `known`."""
+
+    usual: Mapping[str, Usual] = field(default_factory=dict)  # level and noise of times at the earlier run
+    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of made series of run time
+    suspected: frozenset[str] = frozenset()  # times whose slow night is not confirmed yet
+    first_bad: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # last good, first bad commit
+
+
+def known(told: Mapping[str, Told], before: str, after: str) -> Known:
+    """What judged histories know about two runs, by their ids.
+
+    A red series is blamed on the commit where it last became worse up to the later run.
+    """
+    usual: dict[str, Usual] = {}
+    values: dict[str, tuple[float, float]] = {}
+    first_bad: dict[str, tuple[str, str]] = {}
+    suspected = set()
+    for key, series in told.items():
+        old = new = None
+        for judged in reversed(series.nights):
+            if new is None and judged.night.run.id == after:
+                new = judged
+            if old is None and judged.night.run.id == before:
+                old = judged
+            if old is not None and new is not None:
+                break
+        if new is not None and new.red and new.worse_at is not None:
+            good = new.before_worse
+            first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
+        if series.definition.kind != "time" or old is None or old.usual is None:
+            continue
+        level, threshold = old.usual
+        usual[key] = (old.night.value, threshold) if old.red else (level, threshold)
+        if new is not None:
+            values[key] = (old.night.value, new.night.value)
+            if new.state == "suspected":
+                suspected.add(key)
+    return Known(usual=usual, values=values, suspected=frozenset(suspected), first_bad=first_bad)
 
 
 def side_of(run: Any) -> Side:
@@ -74,23 +102,19 @@ def side_of(run: Any) -> Side:
 
 
 def compare(
-    before: Measured,
-    after: Measured,
+    before: ComparedRun,
+    after: ComparedRun,
     accepted: Sequence[Accepted] = (),
-    first_bad: Mapping[str, tuple[str, str]] | None = None,
-    usual: Mapping[str, Usual] | None = None,
+    history: Known | None = None,
 ) -> CompareDocument:
-    """What changed from one to the other.
-
-    `first_bad`: by series, the last good and first bad commit. `usual`: by series of run times, their level at
-    the earlier version and the relative change that stands clear of their noise, where history knows them.
-    """
-    changes = _series_changes(before, after, usual or {}) + _map_changes(before, after)
+    """What changed from one to the other; `history` is what is known about both beyond themselves."""
+    history = history or Known()
+    changes = _series_changes(before, after, history) + _map_changes(before, after)
     same_machine = before.side.machine == after.side.machine
     if same_machine and before.side.run != after.side.run:
-        changes += run_times(before.samples, after.samples)
-    changes = [_known(_accept(change, accepted, after.night), first_bad or {}) for change in changes]
-    changes.sort(key=lambda change: (ORDER.index(change.word), change.role != "gate", change.series))
+        changes += [_in_history(change, history) for change in run_times(before.samples, after.samples)]
+    changes = [_blamed(_accept(change, accepted, after.night), history.first_bad) for change in changes]
+    changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
     verdict = _overall(changes)
     return CompareDocument(
         schema_version=1,
@@ -105,34 +129,64 @@ def compare(
     )
 
 
+def compare_in(
+    records: Records,
+    before: tuple[Any, ComparedRun],
+    after: tuple[Any, ComparedRun],
+    accepted: Sequence[Accepted] = (),
+) -> CompareDocument:
+    """`compare` with what the history knows: the noise of run times, the first bad commit of what is red."""
+    (old, earlier), (new, later) = before, after
+    runs = [run for run in records.runs() if run.engine.name == new.engine.name]
+    newest = next((run for run in reversed(runs) if run.id in (old.id, new.id)), new)
+    line = line_of(runs, newest)
+    timed = {key for key, (d, s) in later.samples.items() if d.kind == "time" or s.timing is not None}
+    told = judge_all(histories(records, line, timed)) if timed and len(line) > 1 else {}
+    later = replace(later, whole=getattr(new, "trigger", "") == "nightly")
+    document = compare(earlier, later, accepted, known(told, old.id, new.id))
+    reds = {change.series for change in document.changes if change.red} - told.keys()
+    if not reds:
+        return document
+    told |= judge_all(histories(records, line, reds))
+    return compare(earlier, later, accepted, known(told, old.id, new.id))
+
+
 def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regressed", "not_comparable"]:
     """Red before anything; then whether what decides could be compared at all."""
     if any(change.red for change in changes):
         return "regressed"
     compared = [c for c in changes if c.word not in ("not_comparable", "new", "not_measured")]
-    values = [change for change in changes if change.kind not in ("time", "run_time")]
+    values = [change for change in changes if change.kind not in TIMES]
     if not compared or any(c.word == "not_comparable" and c.role != "reported" for c in values):
         return "not_comparable"
-    told = [change for change in compared if change.kind not in ("time", "run_time")] or compared
+    told = [change for change in compared if change.kind not in TIMES] or compared
     return "identical" if all(change.word == "identical" for change in told) else "same"
 
 
-def _series_changes(before: Measured, after: Measured, usual: Mapping[str, Usual]) -> list[Change]:
+def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> list[Change]:
     old_run, new_run = before.side, after.side
-    measured = {(definition.test, FAMILY[definition.kind]) for definition, _ in after.samples.values()}
+    measured = {(definition.test, FAMILIES[definition.kind]) for definition, _ in after.samples.values()}
     changes = []
     for key in before.samples.keys() | after.samples.keys():
         old, new = before.samples.get(key), after.samples.get(key)
+        if (old is None or new is None) and (old or new)[0].kind == "work":  # type: ignore[index]
+            continue  # a sum of what is told by itself
         if old is None and new is not None:
             verdict = Verdict(word="new", sentence="measured for the first time")
             changes.append(_change(key, new[0], None, new[1], verdict))
         elif new is None and old is not None:
-            asked = (old[0].test, FAMILY[old[0].kind]) in measured
-            changes.append(_gone(key, old, asked))
+            family = FAMILIES[old[0].kind]
+            asked = (old[0].test, family) in measured
+            removed = after.whole and old[0].role == "gate" and any(f == family for _, f in measured)
+            changes.append(_gone(key, old, asked, removed))
         elif old is not None and new is not None:
-            if new[0].kind == "time" and from_number(new[1].value) != from_number(old[1].value):
+            if why := _another_question(old[0], new[0]):
+                verdict = Verdict(word="not_comparable", sentence=why)
+            elif new[0].kind == "time" and float(new[1].value) != float(old[1].value):
                 same_machine = before.side.machine == after.side.machine
-                verdict = _time_scalar(old, new, same_machine, usual.get(key))
+                verdict = _time_scalar(old, new, same_machine, history.usual.get(key))
+                verdict = to_be_confirmed(verdict) if key in history.suspected else verdict
+                verdict = only_followed(verdict) if is_read_off(new[0]) else verdict
             else:
                 verdict = judge(
                     new[0],
@@ -152,14 +206,27 @@ def same_commit(before: Side, after: Side) -> bool:
     return clean and (before.engine, before.git_hash) == (after.engine, after.git_hash)
 
 
-def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool) -> Change:
+def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool, removed: bool) -> Change:
     """A value that is not there: a gap where the test was run, silence where it was not asked."""
     definition, sample = old
     if asked and definition.kind != "time":
         verdict = Verdict(word="missing", sentence="no longer measured by this test", name="missing")
         return _change(key, definition, sample, None, verdict)
+    if removed:
+        words = "the whole catalogue was asked, and this gate is not in it any more"
+        return _change(key, definition, sample, None, Verdict(word="removed", sentence=words, name="removed"))
     change = _change(key, definition, sample, None, Verdict(word="same", sentence="not measured in this run"))
     return msgspec.structs.replace(change, word="not_measured")
+
+
+def _another_question(old: SeriesDefinition, new: SeriesDefinition) -> str:
+    """Why two definitions ask for different numbers though they carry one name and version; else empty."""
+    if old.test_version != new.test_version:
+        return ""  # told by the judge
+    for what in ("unit", "better", "reference", "limit"):
+        if getattr(old, what) != getattr(new, what):
+            return f"another {what}: {getattr(old, what)} and {getattr(new, what)}"
+    return ""
 
 
 def _time_scalar(
@@ -174,11 +241,25 @@ def _time_scalar(
     verdict = judge(new[0], old[1], new[1], same_definition=old[0].test_version == new[0].test_version)
     if verdict.word in ("regressed", "improved", "changed") and old[1].outcome == new[1].outcome:
         if usual is not None:
-            return judge_time(usual, from_number(new[1].value), new[0].better == "larger")
-        gross = abs(verdict.decades or 0.0) > GROSS
+            return judge_time(usual, float(new[1].value), new[0].better == "larger")
+        gross = abs(verdict.decades or 0.0) > DOUBLED
         words = f"{verdict.sentence}, of one timing session"
         return Verdict(word="changed" if gross else "same", sentence=words, decades=verdict.decades)
     return verdict
+
+
+def _in_history(change: Change, history: Known) -> Change:
+    """A run time judged as the nights judge it, where they know its level and noise."""
+    if change.series not in history.usual or change.series not in history.values:
+        return change
+    old, new = history.values[change.series]
+    verdict = judge_time(history.usual[change.series], new)
+    if change.series in history.suspected:
+        verdict = to_be_confirmed(verdict)
+    return msgspec.structs.replace(
+        change, word=verdict.word, red=verdict.red, stands="watch" if verdict.red else "followed", name=verdict.name, sentence=verdict.sentence,
+        before=old, after=new, decades=verdict.decades,
+    )  # fmt: skip
 
 
 def _change(
@@ -198,20 +279,27 @@ def _change(
         unit=definition.unit,
         word=verdict.word,
         red=verdict.word in RED,
+        stands=_stands(definition, after, verdict),
         name=verdict.name,
         sentence=verdict.sentence,
         before=before.value if before else None,
         after=after.value if after else None,
-        before_outcome=before.outcome if before else None,
-        after_outcome=after.outcome if after else None,
+        before_outcome=honest(before).outcome if before else None,
+        after_outcome=honest(after).outcome if after else None,
         limit=definition.limit,
         decades=verdict.decades,
         ulps=verdict.ulps,
-        page=page_of(definition.test),
     )
 
 
-def _map_changes(before: Measured, after: Measured) -> list[Change]:
+def _stands(definition: SeriesDefinition, after: Sample | None, verdict: Verdict) -> Class:
+    if after is None:
+        return "fail" if verdict.red else "none"
+    own = standing(definition, after)
+    return red_class(own, after) if verdict.red else own
+
+
+def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
     old_maps = {(m.test, m.configuration, m.name): m for m in before.maps}
     changes = []
     for new in after.maps:
@@ -222,7 +310,7 @@ def _map_changes(before: Measured, after: Measured) -> list[Change]:
         verdict = judge_map(old, new)
         changes.append(
             Change(
-                series="/".join((new.test, new.configuration, f"map:{new.name}")),
+                series=map_key(new),
                 test=new.test,
                 metric=f"map:{new.name}",
                 configuration=new.configuration,
@@ -231,6 +319,7 @@ def _map_changes(before: Measured, after: Measured) -> list[Change]:
                 unit="",
                 word=verdict.word,
                 red=verdict.red,
+                stands="watch" if verdict.red else "pass",
                 name=verdict.name,
                 sentence=verdict.sentence,
                 before=None,
@@ -238,7 +327,6 @@ def _map_changes(before: Measured, after: Measured) -> list[Change]:
                 before_outcome=None,
                 after_outcome=None,
                 limit=None,
-                page=page_of(new.test),
             )
         )
     return changes
@@ -248,20 +336,20 @@ def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change
     """A red change at an accepted level is not red; it says who took it and why."""
     if not change.red or change.after is None:
         return change
-    level = acceptance(accepted, change.series, from_number(change.after), night)
+    level = acceptance(accepted, change.series, float(change.after), night)
     if level is None:
         return change
-    return msgspec.structs.replace(change, word="accepted", red=False, accepted=str(level))
+    return msgspec.structs.replace(change, word="accepted", red=False, stands="accepted", accepted=str(level))
 
 
-def _known(change: Change, first_bad: Mapping[str, tuple[str, str]]) -> Change:
+def _blamed(change: Change, first_bad: Mapping[str, tuple[str, str]]) -> Change:
     if not change.red or change.series not in first_bad:
         return change
     good, bad = first_bad[change.series]
     return msgspec.structs.replace(change, last_good=good, first_bad=bad)
 
 
-def _notes(before: Measured, after: Measured, changes: Sequence[Change]) -> list[str]:
+def _notes(before: ComparedRun, after: ComparedRun, changes: Sequence[Change]) -> list[str]:
     notes = []
     if before.side.machine != after.side.machine:
         notes.append("run times are not compared: the runs are of different machines")
@@ -269,12 +357,13 @@ def _notes(before: Measured, after: Measured, changes: Sequence[Change]) -> list
         notes.append("values are not compared: the runs are of different float environments")
     if before.side.engine != after.side.engine:
         notes.append(f"different engines: {before.side.engine} and {after.side.engine}")
+    lost = sum(
+        change.before_outcome in NO_VALUE and change.after_outcome in NO_VALUE and change.role != "reported"
+        for change in changes
+    )
+    if lost:
+        notes.append(f"no value on either side: {lost} series that should have one")
     silent = sorted({change.test for change in changes if change.word == "not_measured"})
     if silent:
         notes.append(f"in part not measured in the later run: {', '.join(silent)}")
     return notes
-
-
-def page_of(test: str) -> str:
-    """The page of the website about a test."""
-    return f"tests/{slug(test)}.html"

@@ -9,10 +9,10 @@ from statistics import median
 
 from spook_tracker.tracker.document.order import error_in_time, time_at_error
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing, from_number
-from spook_tracker.tracker.document.wording import slug
 from spook_tracker.tracker.judge.comparison_document import Change, Frontier
+from spook_tracker.tracker.judge.lane import geometric_mean
 from spook_tracker.tracker.judge.timing_statistics import compare_times
-from spook_tracker.tracker.judge.verdict import Word
+from spook_tracker.tracker.judge.vocabulary import Word
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 Rung = tuple[SeriesDefinition, Sample, Sample]
@@ -34,8 +34,6 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
         sentence = f"{percent:+.0f} % run time over {found.rungs} rungs"
         if word == "same":
             sentence += f", inside the noise of these sessions (±{100.0 * found.floor:.0f} %)"
-        total_old = sum(min(old.seconds) for old, _ in both)
-        total_new = sum(min(new.seconds) for _, new in both)
         changes.append(
             Change(
                 series=f"{definition.test}/{definition.configuration}/{definition.metric}:run-time",
@@ -47,15 +45,15 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
                 unit="s",
                 word=word,
                 red=word == "regressed",
+                stands="watch" if word == "regressed" else "followed",
                 name="slower at equal error" if word == "regressed" else "",
                 sentence=sentence,
-                before=total_old,
-                after=total_new,
+                before=geometric_mean(min(old.seconds) for old, _ in both),
+                after=geometric_mean(min(new.seconds) for _, new in both),
                 before_outcome="value",
                 after_outcome="value",
                 limit=None,
                 decades=math.log10(found.ratio),
-                page=f"tests/{slug(definition.test)}.html",
             )
         )
     return changes

@@ -8,22 +8,9 @@ from __future__ import annotations
 from typing import Literal
 
 from spook_tracker.tracker.document.run_document import Name, Number, OutcomeClass, Struct, Text
+from spook_tracker.tracker.judge.vocabulary import Class, Word
 
 COMPARE_SCHEMA_VERSION = 1
-Word = Literal[
-    "identical",
-    "same",
-    "changed",
-    "improved",
-    "fixed",
-    "new",
-    "accepted",
-    "not_measured",
-    "regressed",
-    "missing",
-    "non_deterministic",
-    "not_comparable",
-]
 
 
 class Side(Struct, frozen=True, kw_only=True):
@@ -47,10 +34,11 @@ class Change(Struct, frozen=True, kw_only=True):
     metric: Name
     configuration: Name
     role: Literal["gate", "companion", "reported"]
-    kind: Literal["scalar", "ladder", "order", "time", "break_point", "map", "run_time"]
+    kind: Literal["scalar", "ladder", "order", "time", "break_point", "work", "map", "run_time"]
     unit: Text
     word: Word
     red: bool
+    stands: Class  # of a red change: fail if a limit is broken or there is no value, else watch
     name: Text  # what to call a regression: "drift", "slower", "limit crossed"; else empty
     sentence: Text
     before: Number | None
@@ -62,7 +50,6 @@ class Change(Struct, frozen=True, kw_only=True):
     ulps: int | None = None
     first_bad: Text = ""  # hash or version of the first bad commit, if history knows it
     last_good: Text = ""
-    page: Text = ""  # of the website, relative to its root
     accepted: Text = ""  # by whom and why, if accepted.toml takes this level
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Literal
 
@@ -18,7 +18,7 @@ from spook_tracker.tracker.judge.verdict import Verdict
 WINDOW = 30  # nights that say what is usual
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
 FLOOR = 0.05  # relative
-GROSS = 0.5  # relative
+FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
 SIGMAS = 4.0
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CREEP = 5  # nights in each median that is compared for drift
@@ -36,6 +36,8 @@ class Noisy:
     against: int | None = None
     first_bad: int | None = None
     last_good: int | None = None
+    worse_at: int | None = None  # where it last became worse
+    usual: Usual | None = None  # after this night
 
 
 def judge_noisy(
@@ -52,13 +54,15 @@ def judge_noisy(
     anchor: list[int] = []  # places of the nights at the last release
     suspects: list[int] = []  # unusual nights in a row, not yet or already red
     red_since: int | None = None
-    found = []
+    found: list[Noisy] = []
+    levels: list[Usual] = []  # before each night but the first
     for place, value in enumerate(values):
         if not usual:
             usual, anchor = [place], [place]
             found.append(Noisy(verdict=Verdict(word="new", sentence="the first value"), state="green"))
             continue
         level, threshold = _usual([values[i] for i in usual])
+        levels.append((level, threshold))
         change = _worse_by(level, value, larger_is_better)
         if change > threshold:
             suspects.append(place)
@@ -95,13 +99,29 @@ def judge_noisy(
             found.append(
                 Noisy(verdict=faster or same, state="recovered" if recovered else "green", against=usual[0])
             )
-    return found
+    if found:
+        levels.append(_usual([values[i] for i in usual]))
+    return [replace(night, usual=after) for night, after in zip(found, levels, strict=True)]
 
 
-def usual_of(values: Sequence[float]) -> Usual | None:
-    """What is usual after these nights; None while there are too few to know the noise."""
-    recent = [value for value in values[-WINDOW:] if math.isfinite(value)]
-    return _usual(recent) if len(recent) >= FEWEST else None
+def to_be_confirmed(verdict: Verdict) -> Verdict:
+    """A slow night that no second one has confirmed yet is not red."""
+    if not verdict.red:
+        return verdict
+    return replace(
+        verdict, word="same", name="", sentence=f"{verdict.sentence}, to be confirmed by another night"
+    )
+
+
+def only_followed(verdict: Verdict) -> Verdict:
+    """A time read off a ladder is not red: the ladder's errors and its run time are judged themselves.
+
+    Between two rungs a little noise of time moves it by the order times as much, or by a whole rung.
+    """
+    if not verdict.red:
+        return verdict
+    words = f"{verdict.sentence}; the ladder's errors and its run time decide"
+    return replace(verdict, word="changed", name="", sentence=words)
 
 
 def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Verdict:
@@ -122,7 +142,7 @@ def _usual(values: Sequence[float]) -> Usual:
         return math.inf, FLOOR
     level = median(finite)
     if len(finite) < FEWEST or level == 0.0:
-        return level, GROSS
+        return level, FEW_NIGHTS_FLOOR
     noise = NORMAL * median(abs(value - level) for value in finite) / abs(level)
     return level, max(FLOOR, SIGMAS * noise)
 

@@ -1,98 +1,67 @@
 """The history of a series, judged night by night: what is red, since when, and whether it came back.
 
+This is the one way from a history to verdicts; commands, pages, feed and badge all show what comes out here.
 A night is compared with the level that holds: the last night that was not red. A red level is not taken over,
-so it stays red until it is mended or accepted. Small steps that each stay inside the tolerance are caught by
-comparing with the last release as well, and are called drift. Values without noise are judged after one run,
-exactly; run times by the robust statistics of tracker/judge/noise.py.
+so it stays red until it is mended or accepted; a red night worse than the red night before it is news of its
+own. Small steps that each stay inside the tolerance are caught by comparing with the last release, and with
+the level that was last accepted, as well, and are called drift. Values without noise are judged after one
+run, exactly; run times by the robust statistics of tracker/judge/noise.py.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
-from typing import Any, Literal, Protocol
 
-from spook_tracker.tracker.document.run_document import (
-    EngineVersion,
-    Machine,
-    MapData,
-    Sample,
-    SeriesDefinition,
-    from_number,
-)
+from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.noise import judge_noisy
-from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
+from spook_tracker.tracker.judge.noise import Usual, judge_noisy, only_followed
+from spook_tracker.tracker.judge.standing import NO_VALUE, standing
+from spook_tracker.tracker.judge.verdict import Verdict, judge, same_bits
+from spook_tracker.tracker.judge.vocabulary import Class, State
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
 NOISY_NIGHTS = 400  # how far back run times are judged again
-State = Literal["green", "detected", "accepted", "recovered", "suspected"]
-
-
-class Run(Protocol):
-    """What is read of a run: tracker.store.history.RunInfo, or any value with these."""
-
-    @property
-    def id(self) -> str: ...
-    @property
-    def started(self) -> str: ...
-    @property
-    def engine(self) -> EngineVersion: ...
-    @property
-    def machine(self) -> Machine: ...
-
-
-@dataclass(frozen=True, slots=True)
-class Night:
-    """One value in the history of a series."""
-
-    run: Run
-    sample: Sample
-    test_version: str
+LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that is called drift, too
+IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
     """A night with its verdict. `against` is the night it was compared with."""
 
-    night: Night
+    night: Point
     verdict: Verdict
     state: State
-    against: Night | None = None
-    first_bad: Night | None = None  # where the present red began
-    last_good: Night | None = None
+    stands: Class  # what a reader sees: FAIL, WATCH, PASS …
+    against: Point | None = None
+    first_bad: Point | None = None  # where the present red began
+    last_good: Point | None = None
+    worse_at: Point | None = None  # where it last became worse while red: first_bad, or a later night
+    before_worse: Point | None = None  # the night before that
     accepted: str = ""
+    usual: Usual | None = None  # of run times: level and noise after this night
 
     @property
     def red(self) -> bool:
         return self.state == "detected"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """What became of one series or map tonight."""
-
-    series: str
-    definition: SeriesDefinition | None  # None for a map
-    test: str
-    judged: Judged | None  # None for a map
-    verdict: Verdict
-    red: bool
-
     @property
-    def first_bad(self) -> str:
-        """The commit where it began, as far as the history knows."""
-        if self.judged is None or self.judged.first_bad is None:
-            return ""
-        return commit_of(self.judged.first_bad.run)
+    def news(self) -> bool:
+        """Red for a reason of tonight, and not only still red."""
+        return self.red and self.worse_at is self.night
 
-    @property
-    def last_good(self) -> str:
-        if self.judged is None or self.judged.last_good is None:
-            return ""
-        return commit_of(self.judged.last_good.run)
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A series with all its nights judged, oldest first."""
+
+    key: str
+    definition: SeriesDefinition
+    nights: tuple[Judged, ...]
 
 
 def commit_of(run: Run) -> str:
@@ -110,18 +79,31 @@ def is_release(run: Run) -> bool:
     return RELEASE.fullmatch(run.engine.version) is not None and not run.engine.dirty
 
 
-def nights(points: Iterable[Iterable[Any]]) -> list[Night]:
-    """Nights from (run, sample, test version), as the history keeps them, in commit order."""
-    return [Night(*point) for point in points]
+def blame(bad: Run, good: Run | None) -> str:
+    """Which commit, or which range of commits, a change came with."""
+    if good is None:
+        return f"first bad commit {commit_of(bad)}, last good unknown"
+    if bad.engine.git_hash and good.engine.git_hash not in ("", *bad.engine.parents):
+        return f"bad since {commit_of(bad)}, last good {commit_of(good)}: any commit between may be the first"
+    return f"first bad commit {commit_of(bad)}, last good {commit_of(good)}"
+
+
+def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepted] = ()) -> dict[str, Told]:
+    """Every series with the verdict of each of its nights, by key."""
+    return {
+        key: Told(key, found.definition, tuple(judge_history(key, found.definition, found.points, accepted)))
+        for key, found in histories.items()
+    }
 
 
 def judge_history(
-    key: str, definition: SeriesDefinition, history: Sequence[Night], accepted: Sequence[Accepted] = ()
+    key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted] = ()
 ) -> list[Judged]:
     """Every night's verdict, oldest first."""
+    taken = [level for level in accepted if level.names(key)]
     if is_noisy(definition):
-        return _judge_times(key, definition, history, accepted)
-    return list(_judge_values(key, definition, history, accepted))
+        return _judge_times(key, definition, history, taken)
+    return list(_judge_values(key, definition, history, taken))
 
 
 def is_noisy(definition: SeriesDefinition) -> bool:
@@ -129,100 +111,195 @@ def is_noisy(definition: SeriesDefinition) -> bool:
     return definition.kind == "time"
 
 
+def is_read_off(definition: SeriesDefinition) -> bool:
+    """Whether a time is read off a ladder: time to an error, error in a time."""
+    return definition.metric.endswith((":time-to-error", ":error-in-time"))
+
+
 def _judge_values(
-    key: str, definition: SeriesDefinition, history: Sequence[Night], accepted: Sequence[Accepted]
+    key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> Iterator[Judged]:
-    level: Night | None = None  # the last night that was not red
-    release: Night | None = None  # the last release, or the first night there is
-    first_bad: Night | None = None
+    level: Point | None = None  # the last night that was not red
+    release: Point | None = None  # the last release, or the first night there is
+    settled: Point | None = None  # the last accepted level, or the first night there is
+    red: Judged | None = None  # the night before, if it was red
+    calm: Class | None = None  # what the night before stood for, if it can be repeated without a look
+    gone: set[float] = set()  # bad values that had been mended
+    lent: tuple[Point, Accepted] | None = None  # the level before one that is accepted until a day
     for night in history:
-        if level is None or not _comparable(level, night):
-            why = "the first value" if level is None else _why_not(level, night)
-            word: Literal["new", "not_comparable"] = "new" if level is None else "not_comparable"
-            level, release, first_bad = night, night, None
-            state: State = "green"
-            if _broken(definition, night):
-                state, first_bad = "detected", night
-            yield Judged(
-                night=night, verdict=Verdict(word=word, sentence=why), state=state, first_bad=first_bad
-            )
+        if lent is not None and lent[1].over(night_of(night.run)):
+            level, lent, calm = lent[0], None, None  # what was lent is due: the old level counts again
+            release = settled = level
+        if calm is not None and level is not None and _repeats(level, night):
+            yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
+            level = night
+            if is_release(night.run):
+                release = night
             continue
-        verdict = _against(definition, level, night)
-        against = level
-        if not verdict.red and release is not None and release is not level:
-            drifted = _against(definition, release, night)
-            if drifted.word == "regressed":
-                verdict, against = _drift(drifted, release), release
-        taken = acceptance(accepted, key, from_number(night.sample.value), night_of(night.run))
-        bad = verdict.red or _broken(definition, night)
+        own = standing(definition, night.sample)
+        broken = own in ("fail", "watch")
+        if level is None or settled is None or release is None or not _comparable(level, night):
+            word, why = (
+                ("new", "the first value") if level is None else ("not_comparable", _why_not(level, night))
+            )
+            level = release = settled = night
+            verdict, against = Verdict(word=word, sentence=why), None  # type: ignore[arg-type]
+            red = None
+        else:
+            verdict, against = _judged(definition, level, release, settled, night)
+            if verdict.word == "regressed" and night.value in gone:
+                words = f"{verdict.sentence}; this value came and went before"
+                verdict = replace(verdict, name="flip-flop", sentence=words)
+        bad = verdict.red or broken
+        gone_for_good = night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
+        taken = acceptance(accepted, key, night.value, night_of(night.run), gone_for_good) if bad else None
         if bad and taken is None:
-            first_bad = first_bad or night
-            yield Judged(
+            worse = red is None or _worsened(definition, red.night, night)
+            good = (
+                None if level is night or standing(definition, level.sample) in ("fail", "watch") else level
+            )
+            if red is not None and red.last_good is not None:
+                good = red.last_good
+            red = Judged(
                 night=night,
                 verdict=verdict,
                 state="detected",
+                stands=red_class(own, night.sample),
                 against=against,
-                first_bad=first_bad,
-                last_good=None if _broken(definition, level) else level,
+                first_bad=night if red is None or red.first_bad is None else red.first_bad,
+                last_good=good,
+                worse_at=night if worse or red is None else red.worse_at,
+                before_worse=(red.night if red else good) if worse or red is None else red.before_worse,
             )
+            calm = None
+            yield red
             continue
-        state = "accepted" if bad else "recovered" if first_bad is not None else "green"
+        state: State = "accepted" if bad else "recovered" if red is not None else "green"
+        if red is not None:
+            gone.add(red.night.value)
         yield Judged(
             night=night,
             verdict=verdict,
             state=state,
+            stands="accepted" if bad else own,
             against=against,
             accepted=str(taken) if bad else "",
         )
-        level, first_bad = night, None
-        if bad or is_release(night.run) or verdict.word in ("improved", "fixed"):
+        if taken is not None and taken.until is not None and level is not night:
+            lent = lent or (level, taken)
+        elif bad or verdict.word in ("improved", "fixed"):
+            lent = None
+        level, red, calm = night, None, None if bad or lent else own
+        if bad or verdict.word in ("improved", "fixed"):
+            release = settled = night
+        if is_release(night.run):
             release = night
 
 
-def _broken(definition: SeriesDefinition, night: Night) -> bool:
-    """Outside a limit that decides, whatever the nights before were: red until it holds or is accepted."""
-    return not night.sample.passed and definition.role != "reported"
+def red_class(own: Class, sample: Sample) -> Class:
+    """A limit broken or no value is FAIL; what only became worse than it was is WATCH."""
+    return (
+        "fail"
+        if own == "fail" or sample.outcome in NO_VALUE or not math.isfinite(float(sample.value))
+        else "watch"
+    )
 
 
-def _drift(verdict: Verdict, release: Night) -> Verdict:
-    version = release.run.engine.version
-    return replace(verdict, name="drift", sentence=f"{verdict.sentence}, little by little since {version}")
+def _repeats(before: Point, after: Point) -> bool:
+    """The same bits of the same state under the same definition: nothing to judge."""
+    old, new = before.sample, after.sample
+    return (
+        old.value == new.value
+        and same_bits(before.value, after.value)
+        and old.outcome == new.outcome
+        and old.set_point_held == new.set_point_held
+        and (old.state_hash == new.state_hash or "" in (old.state_hash, new.state_hash))
+        and _comparable(before, after)
+    )
 
 
-def _against(definition: SeriesDefinition, before: Night, after: Night) -> Verdict:
-    return judge(definition, before.sample, after.sample, same_commit=_same_commit(before.run, after.run))
+def _judged(
+    definition: SeriesDefinition, level: Point, release: Point, settled: Point, night: Point
+) -> tuple[Verdict, Point]:
+    """Against the level that holds, then against the last release, then against the last accepted level."""
+    verdict = _against(definition, level, night)
+    if verdict.red:
+        return verdict, level
+    for anchor, allowed in ((release, 1.0), (settled, LONG_DRIFT)):
+        if anchor is level:
+            continue
+        wide = replace_tolerance(definition, allowed)
+        drifted = _against(wide, anchor, night)
+        if drifted.word == "regressed":
+            return _drift(drifted, anchor), anchor
+        if drifted.word == "improved" and verdict.word == "changed" and allowed == 1.0:
+            return _drift(drifted, anchor), anchor
+    return verdict, level
 
 
-def _same_commit(before: Run, after: Run) -> bool:
+def replace_tolerance(definition: SeriesDefinition, factor: float) -> SeriesDefinition:
+    """The definition with so many times its tolerances."""
+    if factor == 1.0:
+        return definition
+    import msgspec
+
+    return msgspec.structs.replace(
+        definition,
+        tolerance=factor * definition.tolerance,
+        relative_tolerance=factor * definition.relative_tolerance,
+    )
+
+
+def _worsened(definition: SeriesDefinition, before: Point, after: Point) -> bool:
+    """Whether a red night is worse than the red night before it."""
+    return _against(definition, before, after).red
+
+
+def _drift(verdict: Verdict, anchor: Point) -> Verdict:
+    words = f"{verdict.sentence}, little by little since {anchor.run.engine.version}"
+    return replace(verdict, name="drift" if verdict.red else "", sentence=words)
+
+
+def _against(definition: SeriesDefinition, before: Point, after: Point) -> Verdict:
+    return judge(definition, before.sample, after.sample, same_commit=same_commit(before.run, after.run))
+
+
+def same_commit(before: Run, after: Run) -> bool:
+    """Built from one clean commit of one engine: the answers must agree bit for bit."""
     old, new = before.engine, after.engine
     clean = old.git_hash != "" and not old.dirty and not new.dirty
     return clean and (old.name, old.git_hash) == (new.name, new.git_hash)
 
 
-def _comparable(before: Night, after: Night) -> bool:
+def _comparable(before: Point, after: Point) -> bool:
     same_test = before.test_version == after.test_version
     return same_test and before.run.machine.float_environment == after.run.machine.float_environment
 
 
-def _why_not(before: Night, after: Night) -> str:
+def _why_not(before: Point, after: Point) -> str:
     if before.test_version != after.test_version:
         return "the definition of the test changed"
     return "measured in another float environment"
 
 
 def _judge_times(
-    key: str, definition: SeriesDefinition, history: Sequence[Night], accepted: Sequence[Accepted]
+    key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> list[Judged]:
     """Run times: each machine and each definition of the test is a history of its own."""
     lanes: dict[tuple[str, str], list[int]] = {}
     for place, night in enumerate(history):
         lanes.setdefault((night.run.machine.fingerprint, night.test_version), []).append(place)
     found: dict[int, Judged] = {}
-    for places in lanes.values():
+    old = Verdict(word="same", sentence="too long ago to be judged again")
+    for every in lanes.values():
+        for place in every[:-NOISY_NIGHTS]:
+            own = standing(definition, history[place].sample)
+            found[place] = Judged(night=history[place], verdict=old, state="green", stands=own)
+        places = every[-NOISY_NIGHTS:]
         lane = [history[place] for place in places]
-        values = [from_number(night.sample.value) for night in lane]
+        values = [night.value for night in lane]
         taken = [
-            acceptance(accepted, key, value, night_of(night.run))
+            acceptance(accepted, key, value, night_of(night.run)) if accepted else None
             for night, value in zip(lane, values, strict=True)
         ]
         verdicts = judge_noisy(
@@ -232,77 +309,26 @@ def _judge_times(
             accepted=[level is not None for level in taken],
         )
         for i, noisy in enumerate(verdicts):
+            if noisy.state in ("detected", "suspected") and is_read_off(definition):
+                noisy = replace(
+                    noisy, verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
+                )
+            own = standing(definition, lane[i].sample)
+            stands: Class = "accepted" if noisy.state == "accepted" else own
+            first = lane[noisy.first_bad] if noisy.first_bad is not None else None
+            worse_at = lane[noisy.worse_at] if noisy.worse_at is not None else first
+            good = lane[noisy.last_good] if noisy.last_good is not None else None
             found[places[i]] = Judged(
                 night=lane[i],
                 verdict=noisy.verdict,
                 state=noisy.state,
+                stands=red_class(own, lane[i].sample) if noisy.state == "detected" else stands,
                 against=lane[noisy.against] if noisy.against is not None else None,
-                first_bad=lane[noisy.first_bad] if noisy.first_bad is not None else None,
-                last_good=lane[noisy.last_good] if noisy.last_good is not None else None,
+                first_bad=first,
+                last_good=good,
+                worse_at=worse_at,
+                before_worse=good,
                 accepted=str(taken[i]) if noisy.state == "accepted" else "",
+                usual=noisy.usual,
             )
-    return [found[place] for place in range(len(history))]
-
-
-def judge_run(
-    histories: Mapping[str, tuple[SeriesDefinition, Sequence[Night]]],
-    run: Run,
-    accepted: Sequence[Accepted] = (),
-) -> list[Finding]:
-    """What each series measured in `run` came to, judged against the nights before it; red first."""
-    findings = []
-    for key, (definition, history) in histories.items():
-        until = next((i for i in reversed(range(len(history))) if history[i].run.id == run.id), None)
-        if until is None:
-            continue
-        told = telling(definition, history[: until + 1])
-        judged = judge_history(key, definition, told, accepted)[-1]
-        findings.append(
-            Finding(
-                series=key,
-                definition=definition,
-                test=definition.test,
-                judged=judged,
-                verdict=judged.verdict,
-                red=judged.red,
-            )
-        )
-    return sorted(findings, key=lambda finding: (not finding.red, finding.series))
-
-
-def telling(definition: SeriesDefinition, history: Sequence[Night]) -> Sequence[Night]:
-    """The nights that can change the last verdict: of a stretch of equal values its ends and its releases."""
-    if is_noisy(definition):
-        return history[-NOISY_NIGHTS:]
-    facts = [
-        (
-            repr(night.sample.value),
-            night.sample.outcome,
-            night.sample.state_hash,
-            night.test_version,
-            night.run.machine.float_environment,
-        )
-        for night in history
-    ]
-    last = len(history) - 1
-    return [
-        night
-        for i, night in enumerate(history)
-        if i in (0, last) or facts[i] != facts[i - 1] or facts[i] != facts[i + 1] or is_release(night.run)
-    ]
-
-
-def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Finding]:
-    """Tonight's stability maps against those of an earlier night."""
-    old = {(m.test, m.configuration, m.name): m for m in before}
-    findings = []
-    for new in after:
-        earlier = old.get((new.test, new.configuration, new.name))
-        if earlier is None:
-            continue
-        verdict = judge_map(earlier, new)
-        key = f"{new.test}/{new.configuration}/map:{new.name}"
-        findings.append(
-            Finding(series=key, definition=None, test=new.test, judged=None, verdict=verdict, red=verdict.red)
-        )
-    return findings
+    return [found[place] for place in sorted(found)]

@@ -27,7 +27,7 @@ EXACT_UP_TO = 40  # repeats together, for the exact distribution
 class TimeChange:
     """Run time of one side against another, over one ladder or one run."""
 
-    ratio: float  # later / earlier, median over rungs
+    ratio: float  # later / earlier, geometric mean over rungs: that of the values shown
     floor: float  # relative change that had to be passed
     significant: float  # share of rungs whose repeats differ by rank in the direction of the ratio
     rungs: int
@@ -46,7 +46,7 @@ def compare_times(before: Sequence[Timing], after: Sequence[Timing]) -> TimeChan
     rungs = list(zip(before, after, strict=True))
     if not rungs:
         return None
-    ratio = math.exp(median(math.log(min(b.seconds) / min(a.seconds)) for a, b in rungs))
+    ratio = math.exp(sum(math.log(min(b.seconds) / min(a.seconds)) for a, b in rungs) / len(rungs))
     spread = median(max(_spread(a.seconds), _spread(b.seconds)) for a, b in rungs)
     floor = max(FLOOR, 2.0 * spread)
     work = [b.instructions / a.instructions for a, b in rungs if a.instructions and b.instructions]

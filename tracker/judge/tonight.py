@@ -2,87 +2,122 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.document.run_document import MapData, SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.series_history import Finding, Night, Run, judge_maps, judge_run
+from spook_tracker.tracker.judge.events import name_of
+from spook_tracker.tracker.judge.lane import Records, histories, line_of
+from spook_tracker.tracker.judge.series_history import Judged, Told, blame, commit_of, judge_all
+from spook_tracker.tracker.judge.verdict import Verdict, judge_map
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
 
-RECENT = 60  # nights read with all their evidence: state hashes, failures, timings
 
-Histories = dict[str, tuple[SeriesDefinition, list[Night]]]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What became of one series or map tonight."""
+
+    series: str
+    definition: SeriesDefinition | None  # None for a map
+    test: str
+    judged: Judged | None  # None for a map
+    verdict: Verdict
+    red: bool
+    news: bool = True  # red for a reason of tonight, not only still red
+
+    @property
+    def name(self) -> str:
+        """What happened, in a word or two."""
+        return name_of(self.judged) if self.judged else self.verdict.name or self.verdict.word
+
+    @property
+    def first_bad(self) -> str:
+        """The commit where it began, as far as the history knows."""
+        if self.judged is None or self.judged.first_bad is None:
+            return ""
+        return commit_of(self.judged.first_bad.run)
+
+    @property
+    def last_good(self) -> str:
+        if self.judged is None or self.judged.last_good is None:
+            return ""
+        return commit_of(self.judged.last_good.run)
+
+    @property
+    def blame(self) -> str:
+        """The commit or the range of commits it came with, in words; empty if history does not know."""
+        if self.judged is None or self.judged.first_bad is None:
+            return ""
+        good = self.judged.last_good
+        return blame(self.judged.first_bad.run, good.run if good else None)
 
 
-def tonight(history: Any, run: Any, accepted: Sequence[Accepted] = ()) -> list[Finding]:
+def tonight(records: Records, run: Any, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """Findings of one recorded run against its history (tracker.store.history.History); red first."""
-    runs = list(history.runs(run.engine.name))
-    place = [other.id for other in runs].index(run.id)
-    recent = {other.id: history.samples(other.id) for other in runs[max(0, place - RECENT + 1) : place + 1]}
-    stored = history.series(recent[run.id], evidence=False)
-    histories: Histories = {
-        key: (found.definition, [_night(key, point, recent) for point in found.points])
-        for key, found in stored.items()
-    }
-    findings = judge_run(histories | run_time_histories(histories, run), run, accepted)
-    for other in reversed(runs[:place]):
-        if other.machine.float_environment == run.machine.float_environment and history.maps(other.id):
-            findings += judge_maps(history.maps(other.id), history.maps(run.id))
+    line = line_of(records.runs(), run)
+    findings = of_run(judge_all(histories(records, line), accepted), run.id)
+    for other in reversed(line[:-1]):
+        if other.machine.float_environment == run.machine.float_environment and records.maps(other.id):
+            findings += judge_maps(records.maps(other.id), records.maps(run.id))
             break
-    return sorted(findings, key=lambda finding: (not finding.red, finding.series))
+    return worst_first(findings)
 
 
-def _night(key: str, point: Any, recent: Mapping[str, Mapping[str, Any]]) -> Night:
-    """A point of a history, with its evidence if it is recent."""
-    run, sample, version = point
-    if run.id in recent and key in recent[run.id]:
-        sample = recent[run.id][key][1]
-    return Night(run, sample, version)
-
-
-def run_time_histories(
-    histories: Mapping[str, tuple[SeriesDefinition, Sequence[Night]]], run: Run
-) -> Histories:
-    """One series of run time for each ladder configuration: the geometric mean over the rungs timed in `run`.
-
-    Nights that did not time all of these rungs are left out: means over other rungs say nothing.
-    """
-    ladders: dict[str, list[tuple[SeriesDefinition, Sequence[Night]]]] = {}
-    for definition, history in histories.values():
-        if definition.kind == "ladder" and any(n.run.id == run.id and n.sample.timing for n in history):
-            key = f"{definition.test}/{definition.configuration}/{definition.metric}:run-time"
-            ladders.setdefault(key, []).append((definition, history))
-    return {key: _run_time(key, rungs) for key, rungs in ladders.items()}
-
-
-def _run_time(
-    key: str, rungs: Sequence[tuple[SeriesDefinition, Sequence[Night]]]
-) -> tuple[SeriesDefinition, list[Night]]:
-    by_run: dict[str, list[Night]] = {}
-    for _, history in rungs:
-        for night in history:
-            if night.sample.timing is not None:
-                by_run.setdefault(night.run.id, []).append(night)
-    definition = msgspec.structs.replace(
-        rungs[0][0],
-        key=key,
-        metric=f"{rungs[0][0].metric}:run-time",
-        unit="s",
-        kind="time",
-        better="smaller",
-        time_step=None,
-    )
-    order = [night.run.id for night in max((history for _, history in rungs), key=len)]
-    told = []
-    for run_id in order:
-        found = by_run.get(run_id, [])
-        if len(found) < len(rungs):
+def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
+    """The findings of the newest run of some judged histories."""
+    findings = []
+    for key, series in told.items():
+        judged = series.nights[-1] if series.nights else None
+        if judged is None or judged.night.run.id != run_id:
             continue
-        logs = [math.log(min(n.sample.timing.seconds)) for n in found if n.sample.timing]
-        seconds = math.exp(sum(logs) / len(logs))
-        sample = Sample(series=key, value=seconds, outcome="value", passed=True, set_point_held=True)
-        told.append(Night(found[0].run, sample, found[0].test_version))
-    return definition, told
+        findings.append(
+            Finding(
+                series=key,
+                definition=series.definition,
+                test=series.definition.test,
+                judged=judged,
+                verdict=judged.verdict,
+                red=judged.red,
+                news=judged.news,
+            )
+        )
+    return worst_first(findings)
+
+
+def worst_first(findings: Sequence[Finding]) -> list[Finding]:
+    """Red before the rest, FAIL before WATCH, news before what was red already."""
+
+    def rank(finding: Finding) -> tuple[bool, int, bool, str]:
+        stands = CLASS_RANK[finding.judged.stands] if finding.judged else CLASS_RANK["watch"]
+        return not finding.red, stands, not finding.news, finding.series
+
+    return sorted(findings, key=rank)
+
+
+def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Finding]:
+    """Tonight's stability maps against those of an earlier night."""
+    old = {(m.test, m.configuration, m.name): m for m in before}
+    findings = []
+    for new in after:
+        earlier = old.get((new.test, new.configuration, new.name))
+        if earlier is None:
+            continue
+        verdict = judge_map(earlier, new)
+        findings.append(
+            Finding(
+                series=map_key(new),
+                definition=None,
+                test=new.test,
+                judged=None,
+                verdict=verdict,
+                red=verdict.red,
+            )
+        )
+    return findings
+
+
+def map_key(stability_map: MapData) -> str:
+    """The series key of a map."""
+    return f"{stability_map.test}/{stability_map.configuration}/map:{stability_map.name}"

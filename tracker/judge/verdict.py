@@ -15,9 +15,6 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
-
-import msgspec
 
 from spook_tracker.tracker.document.run_document import (
     MapData,
@@ -26,20 +23,9 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     from_number,
 )
+from spook_tracker.tracker.judge.standing import honest
+from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
 
-Word = Literal[
-    "identical",
-    "same",
-    "changed",
-    "improved",
-    "fixed",
-    "new",
-    "regressed",
-    "missing",
-    "non_deterministic",
-    "not_comparable",
-]
-RED: frozenset[Word] = frozenset({"regressed", "missing", "non_deterministic"})
 RANK: dict[OutcomeClass, int] = {
     "value": 0,
     "out_of_limit": 1,
@@ -50,6 +36,7 @@ RANK: dict[OutcomeClass, int] = {
     "missing": 4,
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
+LAST_BITS = 16  # doubles apart: a limit crossed by so few is a matter of rounding, and is said to be
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
 ROUNDING = {"ladder": 1e-10}  # of the reference or of 1: what is rounding where no limit gives a scale
 ROUNDING_ELSE = 1e-12
@@ -86,18 +73,23 @@ def judge(
         return _incomparable("the definition of the test changed")
     if not same_environment:
         return _incomparable("measured in another float environment")
-    before, after = _honest(before), _honest(after)
+    if "not_supported" in (before.outcome, after.outcome):
+        return _unasked(before, after)
+    before, after = honest(before), honest(after)
     old, new = from_number(before.value), from_number(after.value)
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
     if same_bits(old, new) and before.outcome == after.outcome:
-        if before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash):
+        same_state = before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash)
+        if same_state or definition.kind == "work":
             return Verdict(word="identical", sentence="the same bits", ulps=0)
         if same_commit:
             return _unrepeatable(decades, 0)
         return Verdict(word="changed", sentence="the same value from another final state", ulps=0)
     if same_commit:
         return _unrepeatable(decades, ulps)
-    by_class = _by_class(definition, before, after)
+    if definition.kind == "work" and before.state_hash != after.state_hash:
+        return Verdict(word="changed", sentence=_distance(decades, None, "other work for other answers"))
+    by_class = _by_class(before, after, decades, ulps)
     if by_class is not None:
         return by_class
     if not (math.isfinite(old) and math.isfinite(new)):
@@ -111,15 +103,17 @@ def judge(
     return _by_size(definition, old, new, decades, ulps)
 
 
-def _honest(sample: Sample) -> Sample:
-    """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
-    if RANK[sample.outcome] >= RANK["not_finite"] or math.isfinite(from_number(sample.value)):
-        return sample
-    return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
-
-
 def _incomparable(why: str) -> Verdict:
     return Verdict(word="not_comparable", sentence=why)
+
+
+def _unasked(before: Sample, after: Sample) -> Verdict:
+    """An engine that cannot be asked is neither better nor worse."""
+    if before.outcome == after.outcome:
+        return Verdict(word="same", sentence="still not supported")
+    if after.outcome == "not_supported":
+        return _incomparable(f"no longer supported: {after.failure}")
+    return _incomparable("supported for the first time")
 
 
 def _unrepeatable(decades: float | None, ulps: int | None) -> Verdict:
@@ -136,15 +130,25 @@ def _words(outcome: OutcomeClass) -> str:
     return outcome.replace("_", " ")
 
 
-def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Verdict | None:
+def _by_class(before: Sample, after: Sample, decades: float | None, ulps: int | None) -> Verdict | None:
     old, new = RANK[before.outcome], RANK[after.outcome]
+    if after.outcome == "missing" and new > old:
+        gone: Word = "removed" if after.failure.startswith("removed") else "missing"
+        return Verdict(word=gone, sentence=after.failure or "asked for and not answered", name=gone)
     if new > old:
         crossed = after.outcome == "out_of_limit"
-        what = "crossed its limit" if crossed else f"{_words(before.outcome)} became {_words(after.outcome)}"
+        far = "" if ulps is None or ulps > LAST_BITS else f" by {ulps} ULP: the last bits decide"
+        what = (
+            f"crossed its limit{far}"
+            if crossed
+            else f"{_words(before.outcome)} became {_words(after.outcome)}"
+        )
         return Verdict(
             word="regressed",
             sentence=what + (f": {after.failure}" if after.failure else ""),
-            name=_crossed(definition) if crossed else _words(after.outcome),
+            name="limit crossed" if crossed else _words(after.outcome),
+            decades=decades,
+            ulps=ulps,
         )
     if new < old:
         word: Word = "fixed" if new == 0 else "improved"
@@ -152,10 +156,6 @@ def _by_class(definition: SeriesDefinition, before: Sample, after: Sample) -> Ve
     if before.outcome != after.outcome:
         return Verdict(word="changed", sentence=f"{_words(before.outcome)} became {_words(after.outcome)}")
     return None
-
-
-def _crossed(definition: SeriesDefinition) -> str:
-    return "wrong order" if definition.kind == "order" else "limit crossed"
 
 
 def _by_size(
@@ -185,12 +185,7 @@ def _by_size(
 
 
 def _called(definition: SeriesDefinition) -> str:
-    return {
-        "break_point": "less stable",
-        "order": "wrong order",
-        "ladder": "less accurate",
-        "time": "slower",
-    }.get(definition.kind, "worse")
+    return CALLED_WORSE.get(definition.kind, "worse")
 
 
 def badness(definition: SeriesDefinition, value: float) -> float | None:

@@ -60,7 +60,8 @@ def definition_hash(measure: Callable[..., Any], facts: object) -> str:
 @functools.lru_cache(maxsize=4096)
 def _digest(measure: Callable[..., Any]) -> str:
     """Of a function and all it reaches; a measurement's metrics share it."""
-    seen = _Seen(home=_package(getattr(measure, "__module__", "") or ""))
+    asked = measure.args[0] if isinstance(measure, functools.partial) and measure.args else measure
+    seen = _Seen(home=_package(getattr(asked, "__module__", "") or ""))
     return hashlib.sha256(repr(_describe(measure, seen)).encode()).hexdigest()
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -84,6 +85,12 @@ def ask(question: Callable[[], Any]) -> Outcome:
     except SimulationFailed as failure:
         status = failure.result.status
         return Outcome(None, status if status != "completed" else "crashed", sentence(str(failure)))
+    except NotSupported as lack:
+        return Outcome(None, "not_supported", sentence(str(lack)))
+    except ZeroDivisionError:
+        return Outcome(
+            None, "not_finite", "the measurement divided by zero: a force or a length it needs was none"
+        )
     except SystemExit:
         return Outcome(None, "crashed", "the test tried to end the tracker")
     except RecursionError:

@@ -18,10 +18,13 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_complet
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from multiprocessing import get_context
 from typing import Any, Literal
 
+import spook_tracker.tracker.measure.others as others
 import spook_tracker.tracker.measure.trajectory as motion
+from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -49,6 +52,7 @@ from spook_tracker.tracker.measure.question import (
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
+PEER_TIME_LIMIT = 10.0  # s of wall time per simulation of an engine that is only shown
 CRASH = "the engine's process died while answering"
 
 
@@ -57,11 +61,12 @@ class RunError(TrackerError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class Questions:
     """Where the questions and the engine are found, by name."""
 
     catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
-    engine: str = "spook_tracker.engine"  # a module with simulate, explain and build_info
+    engine: str = "spook"  # as `engine.find` knows it
+    limit: float | None = None  # s of wall time for one simulation; None leaves it to the test
 
     def tests(self) -> Mapping[str, ScalarTest]:
         module, _, attribute = self.catalogue.partition(":")
@@ -73,15 +78,16 @@ class Source:
             raise RunError(
                 f"there is no catalogue {self.catalogue!r} ({error}); name one as module:NAME"
             ) from None
-        return found
+        engine = self.module()
+        configurations = getattr(engine, "configurations", ())
+        return others.asked_of(found, configurations, engine.gating) if configurations else found
 
     def module(self) -> Any:
+        """The engine: simulate, build_info, and its configurations if it is not ours."""
         try:
-            return importlib.import_module(self.engine)
-        except ImportError as error:
-            raise RunError(
-                f"engine {self.engine!r} cannot be imported ({error}); build it with: pip install -e ."
-            ) from None
+            return find(self.engine)
+        except EngineMissing as error:
+            raise RunError(str(error)) from None
 
     def simulate(self) -> Simulate:
         module = self.module()
@@ -89,7 +95,16 @@ class Source:
             simulate: Simulate = module.simulate
         except AttributeError:
             raise RunError(f"engine {self.engine!r} has no function simulate; it is not an engine") from None
-        return simulate
+        limit = self.limit
+        if limit is None and hasattr(module, "configurations"):
+            limit = PEER_TIME_LIMIT
+        return simulate if limit is None else partial(_limited, simulate, limit)
+
+
+def _limited(simulate: Simulate, limit: float, scene: Any, **options: Any) -> Any:
+    """Simulate for at most `limit` seconds of wall time."""
+    options["time_limit"] = min(limit, options.get("time_limit") or limit)
+    return simulate(scene, **options)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +158,7 @@ def select(catalogue: Mapping[str, ScalarTest], names: Iterable[str]) -> dict[st
     return {name: test for name, test in catalogue.items() if not wanted or name in wanted}
 
 
-def run(source: Source, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
+def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
     """Everything asked for at the engine's present version on this machine. Raises RunError only."""
     started = _now()
     tests = select(source.tests(), request.tests)
@@ -171,7 +186,8 @@ def run(source: Source, request: Request, watch: Watch = lambda progress: None) 
     saved: Mapping[str, Mapping[str, float]] = {}
     if request.sweep:
         measured += ladders.timed_series(tests, errors, simulate, request.repeats)
-        saved = ladders.saved_by_leaving_out(tests, simulate)
+        if not hasattr(engine, "configurations"):
+            saved = ladders.saved_by_leaving_out(tests, simulate)
     _refuse_doubles(series.key for series, _ in measured)
     return RunDocument(
         schema_version=1,
@@ -215,7 +231,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
-def perform(source: Source, task: Task) -> tuple[Any, ...]:
+def perform(source: Questions, task: Task) -> tuple[Any, ...]:
     """Do one piece of work in this process."""
     test, simulate = source.tests()[task.test], source.simulate()
     first = task.index[0]
@@ -233,7 +249,7 @@ def perform(source: Source, task: Task) -> tuple[Any, ...]:
 
 
 def _perform_all(
-    source: Source, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int, watch: Watch
+    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int, watch: Watch
 ) -> Iterator[tuple[int, tuple[Any, ...]]]:
     """Results by position, as they come; a dead process loses only the piece that killed it."""
     left = {name: sum(task.test == name for task in tasks) for name in tests}
@@ -247,7 +263,7 @@ def _perform_all(
 
 
 def _answers(
-    source: Source, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int
+    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int
 ) -> Iterator[tuple[Task, tuple[Any, ...]]]:
     if workers <= 1:
         yield from ((task, perform(source, task)) for task in tasks)
@@ -278,7 +294,7 @@ def _begin_quietly() -> None:
 
 
 def _gather(
-    pool: Executor, source: Source, tasks: Iterable[Task]
+    pool: Executor, source: Questions, tasks: Iterable[Task]
 ) -> Iterator[tuple[Task, tuple[Any, ...] | None]]:
     futures: dict[Future[tuple[Any, ...]], Task] = {}
     try:
@@ -353,6 +369,6 @@ def ci_address(environment: Mapping[str, str]) -> str:
     return environment.get("CI_JOB_URL") or environment.get("BUILD_URL") or ""
 
 
-def present_version(source: Source) -> EngineVersion:
+def present_version(source: Questions) -> EngineVersion:
     """The engine that would be measured now."""
     return engine_version(source.module())

@@ -10,16 +10,21 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from sqlalchemy import ColumnElement, and_, select
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
-from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
+from spook_tracker.tracker.document.run_document import (
+    Point,
+    RunDocument,
+    Sample,
+    SeriesDefinition,
+    SeriesHistory,
+)
 from spook_tracker.tracker.store import git, models, rows
 from spook_tracker.tracker.store.ancestry import commit_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
@@ -30,22 +35,6 @@ CHUNK = 500  # ids in one IN (...)
 LAST = "9999"  # sorts after every time: commits whose time is unknown
 Body = TypeVar("Body")
 Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definition, sample
-
-
-class Point(NamedTuple):
-    """One value of a series, and the definition hash it was measured under."""
-
-    run: RunInfo
-    sample: Sample
-    test_version: str
-
-
-@dataclass(frozen=True, slots=True)
-class SeriesHistory:
-    """A series over versions, in commit order; `definition` as of the newest run that has it."""
-
-    definition: SeriesDefinition
-    points: tuple[Point, ...]
 
 
 class History:
@@ -59,9 +48,22 @@ class History:
         self._canonical = self._read_names()
         self._definitions: dict[int, SeriesDefinition] = {}
 
+    @classmethod
+    @contextmanager
+    def open(cls, database: str) -> Iterator[History]:
+        """The history in a database, for reading: sqlite:///FILE or postgresql://…"""
+        from spook_tracker.tracker.store.database import session_on
+
+        with session_on(database, readonly=True) as session:
+            yield cls(session)
+
     def runs(self, engine: str | None = None) -> tuple[RunInfo, ...]:
         """All runs, or those of one engine, ancestors first; dirty and unversioned builds at the end."""
         return tuple(run for run in self._runs if engine is None or run.engine.name == engine)
+
+    def series_keys(self) -> tuple[str, ...]:
+        """Today's keys of all series, in order."""
+        return tuple(sorted(set(self._canonical.values())))
 
     def run(self, run_id: str) -> RunInfo:
         """The run with exactly this id. UnknownName if there is none."""

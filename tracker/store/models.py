@@ -35,7 +35,16 @@ NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_name)s",
     "ck": "ck_%(table_name)s_%(constraint_name)s",
 }
-OUTCOMES = ("value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing")
+OUTCOMES = (
+    "value",
+    "out_of_limit",
+    "not_finite",
+    "diverged",
+    "timed_out",
+    "crashed",
+    "missing",
+    "not_supported",
+)
 SPECIALS = ("nan", "inf", "-inf", "-0.0")  # float64 values that not every database keeps
 
 
@@ -247,7 +256,7 @@ class Sample(Base):
     value: Mapped[float | None] = mapped_column(Double, comment="the float64; NULL if it is not finite")
     special: Mapped[str | None] = _text("nan, inf, -inf or -0.0 where the value is one of these")
     outcome: Mapped[str] = _text(
-        "class: value, out_of_limit, not_finite, diverged, timed_out, crashed, missing"
+        "class: value, out_of_limit, not_finite, diverged, timed_out, crashed, missing, not_supported"
     )
     passed: Mapped[bool] = mapped_column(comment="inside the limit of that night")
     set_point_held: Mapped[bool] = mapped_column(comment="inside the band theory expects")

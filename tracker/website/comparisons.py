@@ -12,28 +12,28 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import Number, from_number
+from spook_tracker.tracker.document.run_document import Number
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
     day,
     named,
     number,
+    page_of,
     quantity,
     short_hash,
-    slug,
     version,
 )
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.compare import Measured, compare, side_of
+from spook_tracker.tracker.judge.compare import ComparedRun, compare, known, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.series_history import is_release
-from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.nights import Book, Night, Source
+from spook_tracker.tracker.judge.vocabulary import QUIET, spaced
+from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.website.nights import Book, Night, Records
 
 NEWEST = 10  # versions to choose from
 RELEASES = 6  # and the newest releases before them
-QUIET = {"identical", "same", "not_measured"}
 FILE = "data/comparisons.json"
 
 
@@ -55,29 +55,26 @@ def chosen(book: Book) -> list[Night]:
 
 
 def comparisons(
-    history: Source, book: Book, events: Sequence[Event], accepted: Sequence[Accepted], known: dict[str, Any]
+    history: Records, book: Book, accepted: Sequence[Accepted], stored: dict[str, Any]
 ) -> Comparisons:
-    """All ordered pairs; `known` are those of the last publication."""
+    """All ordered pairs; `stored` are those of the last publication."""
     nights = chosen(book)
-    sides: dict[str, Measured] = {}
+    sides: dict[str, ComparedRun] = {}
     titles = {test.name: test.card.title for test in book.tests}
     descriptions = {
         t.definition.key: f"{named(t.definition)[0]} ({conditions(t.definition)})"
         for test in book.tests
         for t in test.trends
     }
-    first_bad = {
-        e.trend.definition.key: (short_hash(e.good.engine) if e.good else "", short_hash(e.first.engine))
-        for e in events
-        if e.lasting
-    }
+    told = {t.definition.key: t.told for test in book.tests for t in test.trends}
 
-    def side(night: Night) -> Measured:
+    def side(night: Night) -> ComparedRun:
         if night.id not in sides:
-            sides[night.id] = Measured(
+            sides[night.id] = ComparedRun(
                 side=side_of(night),
-                samples=history.samples(night.id),
+                samples=with_work(history.samples(night.id), night.engine),
                 maps=history.maps(night.id),
+                whole=night.trigger == "nightly",
             )
         return sides[night.id]
 
@@ -88,11 +85,12 @@ def comparisons(
                 continue
             name = f"{before.id}/{after.id}"
             newest = after is book.tonight
-            if name not in known or newest:
-                told = compare(side(before), side(after), accepted, first_bad if newest else {})
-                pairs[name] = _told(told, titles, descriptions)
+            if name not in stored or newest:
+                history_knows = known(told, before.id, after.id)
+                document = compare(side(before), side(after), accepted, history_knows)
+                pairs[name] = _told(document, titles, descriptions)
             else:
-                pairs[name] = known[name]
+                pairs[name] = stored[name]
     return Comparisons(nights, pairs)
 
 
@@ -158,12 +156,12 @@ def _told(document: CompareDocument, titles: dict[str, str], descriptions: dict[
 
 
 def _change(change: Change, titles: dict[str, str], descriptions: dict[str, str]) -> list[str]:
-    said = change.name or change.word.replace("_", " ")
+    said = change.name or spaced(change.word)
     since = f"first bad commit {change.first_bad}" if change.first_bad else change.accepted
     return [
         change.word,
-        "red" if change.red else "",
-        f"tests/{slug(change.test)}.html",
+        change.stands if change.red else "",
+        page_of(change.test),
         clean(titles.get(change.test, change.test)),
         clean(descriptions.get(change.series, f"{change.metric} ({change.configuration})")),
         _value(change.before, change.unit),
@@ -175,7 +173,7 @@ def _change(change: Change, titles: dict[str, str], descriptions: dict[str, str]
 
 
 def _value(value: Number | None, unit: str) -> str:
-    return "–" if value is None else quantity(from_number(value), unit, 7)
+    return "–" if value is None else quantity(float(value), unit, 7)
 
 
 def _ratio(value: float | None) -> str:

@@ -127,8 +127,8 @@ def regressions(events: Sequence[Event]) -> Table:
 def _event_line(event: Event) -> list[Any]:
     good, end = event.good, event.end
     return [
-        event.trend.definition.key, event.name, event.sentence, event.before, event.value,
-        event.trend.definition.unit, good.engine.git_hash if good else "", event.first.engine.git_hash,
+        event.definition.key, event.name, event.sentence, event.before, event.value,
+        event.definition.unit, good.engine.git_hash if good else "", event.first.engine.git_hash,
         event.first.started, event.standing, end.started if end else "", event.accepted,
     ]  # fmt: skip
 

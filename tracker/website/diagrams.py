@@ -106,7 +106,7 @@ def trend_chart(
                 notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
             )
         )  # fmt: skip
-    began = [e for e in events if e.trend is trend and e.first.index in at]
+    began = [e for e in events if e.definition.key == trend.definition.key and e.first.index in at]
     if began:
         lines.append(_beginnings(began, trend))
     scale, bounds, note = _axis_of(trend)

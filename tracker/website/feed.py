@@ -17,6 +17,8 @@ from spook_tracker.tracker.document.wording import (
     short_hash,
     version,
 )
+from spook_tracker.tracker.judge.standing import Count
+from spook_tracker.tracker.judge.vocabulary import Class, spaced
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night
 
@@ -35,17 +37,18 @@ def atom(book: Book, events: Sequence[Event], addresses: dict[str, str]) -> byte
     ElementTree.SubElement(feed, f"{{{ATOM}}}link", {"href": "index.html"})
     author = ElementTree.SubElement(feed, f"{{{ATOM}}}author")
     _put(author, "name", "SPOOK tracker")
-    news: list[tuple[Night, Event, str]] = [(e.first, e, "regressed") for e in events]
+    news: list[tuple[Night, Event, str]] = [(e.first, e, spaced(e.word)) for e in events]
+    news += [(e.worse_at, e, "regressed again") for e in events if e.worse_at is not e.first]
     news += [(e.end, e, e.standing) for e in events if e.end is not None]
-    news.sort(key=lambda item: (-item[0].index, item[1].trend.definition.key, item[2]))
+    news.sort(key=lambda item: (-item[0].index, item[1].definition.key, item[2]))
     for night, event, word in news[:MOST_ENTRIES]:
-        _entry(feed, night, event, word, addresses.get(event.trend.definition.test, "index.html"))
+        _entry(feed, night, event, word, addresses.get(event.definition.test, "index.html"))
     told: bytes = ElementTree.tostring(feed, encoding="utf-8", xml_declaration=True)
     return told
 
 
 def _entry(feed: ElementTree.Element, night: Night, event: Event, word: str, address: str) -> None:
-    d = event.trend.definition
+    d = event.definition
     entry = ElementTree.SubElement(feed, f"{{{ATOM}}}entry")
     _put(entry, "title", f"{clean(d.test)}: {clean(d.metric)} {word} at {version(night.engine)}")
     _put(entry, "id", f"tag:spook-tracker,2026:{_code(d.key, night.id, word)}")
@@ -53,6 +56,7 @@ def _entry(feed: ElementTree.Element, night: Night, event: Event, word: str, add
     ElementTree.SubElement(entry, f"{{{ATOM}}}link", {"href": address})
     told = f"{clean(named(d)[0])} ({clean(conditions(d))}): "
     told += f"{quantity(event.before, d.unit, 6)} before, {quantity(event.value, d.unit, 6)} after; limit {limit(d)}. "
+    told = f"{event.name}: {told}"
     _put(entry, "summary", told + f"Commit {short_hash(night.engine) or 'unknown'}.")
 
 
@@ -69,18 +73,18 @@ def _code(*parts: str) -> str:
     return hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:20]
 
 
-def badge_words(kept: int, gates: int) -> str:
+def badge_words(found: Count) -> str:
     """What the badge says."""
-    return f"{kept} of {gates} limits kept"
+    return f"{found.kept} of {found.limits} limits kept"
 
 
-def badge_json(state: str, words: str) -> bytes:
+def badge_json(state: Class, words: str) -> bytes:
     """The endpoint format that badge services read."""
     colour = COLOURS.get(state, COLOURS["watch"])[1]
     return json.dumps({"schemaVersion": 1, "label": "physics", "message": words, "color": colour}).encode()
 
 
-def badge_svg(state: str, words: str) -> bytes:
+def badge_svg(state: Class, words: str) -> bytes:
     """The badge as a picture; widths are estimated, the text is fitted into them."""
     colour = COLOURS.get(state, COLOURS["watch"])[0]
     left, right = 58, 14 + round(6.3 * len(words))

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
@@ -21,14 +20,16 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     TestCard,
     Trajectory,
-    from_number,
 )
-from spook_tracker.tracker.document.wording import instant, version
+from spook_tracker.tracker.document.wording import version
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.lane import histories, lines
+from spook_tracker.tracker.judge.series_history import Told, judge_all
+from spook_tracker.tracker.judge.standing import worst
+from spook_tracker.tracker.judge.vocabulary import Class
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
 MapKey = tuple[str, str, str]  # test, configuration, name
-EARLIEST = datetime.min.replace(tzinfo=UTC)
-State = Literal["pass", "watch", "fail", "none"]
 
 
 @dataclass(frozen=True)
@@ -48,18 +49,21 @@ class Night:
 
 @dataclass
 class Trend:
-    """One series over the nights, in order."""
+    """One series over the nights, in order, each night judged."""
 
-    definition: SeriesDefinition  # the newest
+    told: Told
     nights: list[int] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
     outcomes: list[str] = field(default_factory=list)
     held: list[bool] = field(default_factory=list)  # set point
-    samples: list[Sample] = field(default_factory=list)  # without evidence
-    versions: list[str] = field(default_factory=list)  # of the test's definition
     latest: Sample | None = None  # of the newest night that has one, with its evidence
     before: Sample | None = None  # of the night before that, where it was timed
     order: int = 0  # place in its run's document
+
+    @property
+    def definition(self) -> SeriesDefinition:
+        """The newest."""
+        return self.told.definition
 
     @property
     def value(self) -> float:
@@ -67,15 +71,13 @@ class Trend:
         return self.values[-1] if self.values else math.nan
 
     @property
-    def state(self) -> State:
-        """What the newest value says."""
+    def state(self) -> Class:
+        """What the newest night stands for."""
         return self.state_at(-1) if self.values else "none"
 
-    def state_at(self, place: int) -> State:
-        """pass, watch (inside the limit, set point left) or fail."""
-        if self.outcomes[place] != "value":
-            return "fail"
-        return "pass" if self.held[place] else "watch"
+    def state_at(self, place: int) -> Class:
+        """What one night stands for, as the judge says."""
+        return self.told.nights[place].stands
 
 
 @dataclass
@@ -109,13 +111,9 @@ class TestHistory:
         return [t for t in self.trends if t.definition.kind == kind]
 
     @property
-    def state(self) -> State:
-        """fail if a gate is red; watch if a companion or a set point is; else pass."""
-        gates = [t.state for t in self.gates()]
-        if "fail" in gates or not gates:
-            return "fail" if gates else "none"
-        others = [t.state for t in self.trends if t.definition.role == "companion"]
-        return "watch" if "watch" in gates or "watch" in others or "fail" in others else "pass"
+    def state(self) -> Class:
+        """The worst of its series; none where no series was judged."""
+        return worst(t.state for t in self.trends)
 
 
 @dataclass
@@ -143,7 +141,7 @@ class Book:
         return self.nights[-1]
 
 
-class Source(Protocol):
+class Records(Protocol):
     """What is read of `tracker.store.history.History`."""
 
     def runs(self, engine: str | None = None) -> Sequence[Any]: ...
@@ -155,36 +153,19 @@ class Source(Protocol):
     def trajectories(self, run_id: str) -> Sequence[Trajectory]: ...
 
 
-def book(history: Source) -> Book:
+def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
     """The book of a history. The engine of the newest run that was not imported is the one it is about."""
     runs = list(history.runs())
     if not runs:
         return Book([], [])
-    own = [run for run in runs if run.trigger != "import"] or runs
-    name = max(own, key=lambda run: instant(run.started) or EARLIEST).engine.name
-    of_engine: dict[str, list[Any]] = {}
-    for run in runs:
-        of_engine.setdefault(run.engine.name, []).append(run)
-    series = history.series(evidence=False)
-    nights, tests = _chapter(history, _line(of_engine.pop(name)), series)
-    others = []
-    for runs_of_other in of_engine.values():
-        other_nights, other_tests = _chapter(history, _line(runs_of_other), series)
-        others.append((other_nights[-1], other_tests))
-    return Book(nights, tests, others)
-
-
-def _line(runs: Sequence[Any]) -> list[Any]:
-    """The runs that have a place in the commit order, and the newest one whatever it was built from.
-
-    This is what `latest` and `previous` choose from on the command line.
-    """
-    newest = max(runs, key=lambda run: instant(run.started) or EARLIEST)
-    return [run for run in runs if (run.engine.git_hash and not run.engine.dirty) or run is newest]
+    first, *others = lines(runs)
+    nights, tests = _chapter(history, first, accepted)
+    chapters = [_chapter(history, line, accepted) for line in others]
+    return Book(nights, tests, [(found[-1], their_tests) for found, their_tests in chapters])
 
 
 def _chapter(
-    history: Source, runs: Sequence[Any], series: Mapping[str, Any]
+    history: Records, runs: Sequence[Any], accepted: Sequence[Accepted]
 ) -> tuple[list[Night], list[TestHistory]]:
     """One engine's nights and tests."""
     nights = [
@@ -194,24 +175,19 @@ def _chapter(
         )
         for index, run in enumerate(runs)
     ]  # fmt: skip
-    place = {night.id: night.index for night in nights}
     trends: dict[str, Trend] = {}
-    last_with: dict[str, int] = {}  # the newest night of each test
-    for key, found in series.items():
-        trend = Trend(found.definition)
-        for run, sample, test_version in found.points:
-            at = place.get(run.id)
-            if at is not None:
-                trend.nights.append(at)
-                trend.values.append(from_number(sample.value))
-                trend.outcomes.append(sample.outcome)
-                trend.held.append(sample.set_point_held)
-                trend.samples.append(sample)
-                trend.versions.append(test_version)
-        if trend.nights:
-            trends[key] = trend
-            test = trend.definition.test
-            last_with[test] = max(last_with.get(test, 0), trend.nights[-1])
+    for key, told in judge_all(histories(history, nights), accepted).items():
+        if not told.nights:
+            continue
+        points = [judged.night for judged in told.nights]
+        trends[key] = Trend(
+            told,
+            nights=[point.run.index for point in points],
+            values=[point.value for point in points],
+            outcomes=[point.sample.outcome for point in points],
+            held=[point.sample.set_point_held for point in points],
+            latest=points[-1].sample,
+        )
     _add_evidence(history, nights, trends)
     _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
@@ -261,7 +237,7 @@ def _bare_card(name: str, title: str) -> TestCard:
     )  # fmt: skip
 
 
-def _add_evidence(history: Source, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
+def _add_evidence(history: Records, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
     """The newest sample of every series in full: failure, counters, timing."""
     wanted: dict[int, list[str]] = {}
     for key, trend in trends.items():
@@ -270,12 +246,12 @@ def _add_evidence(history: Source, nights: Sequence[Night], trends: Mapping[str,
         samples = history.samples(nights[place].id)
         places = {key: i for i, key in enumerate(samples)}
         for key in wanted[place]:
+            trends[key].order = places.get(key, len(places))
             if key in samples:
                 trends[key].latest = samples[key][1]
-                trends[key].order = places[key]
 
 
-def _add_earlier_ladders(history: Source, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
+def _add_earlier_ladders(history: Records, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
     """The ladder of the night before beside tonight's."""
     timed = [(key, trend) for key, trend in trends.items() if trend.definition.kind == "ladder"]
     before = max((trend.nights[-2] for _, trend in timed if len(trend.nights) > 1), default=None)

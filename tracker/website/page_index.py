@@ -8,37 +8,39 @@ from collections.abc import Sequence
 from typing import Any
 
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
-from spook_tracker.tracker.website.events import Event, judged
-from spook_tracker.tracker.website.nights import Book, State, TestHistory, Trend
+from spook_tracker.tracker.judge.standing import Count, count, expected, worst
+from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
+from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
 
 HEAT_NIGHTS = 60
-ORDER: dict[State, int] = {"fail": 0, "watch": 1, "none": 2, "pass": 3}
 
 
-def health(book: Book, events: Sequence[Event]) -> tuple[State, int, int]:
-    """The verdict of the newest night: state, gates kept, gates."""
-    fresh = [t for test in book.tests for t in test.gates() if t.nights[-1] == book.tonight.index]
-    red = sum(trend.state == "fail" for trend in fresh)
-    watched = any(event.lasting for event in events)
-    state: State = "fail" if red else "none" if not fresh else "watch" if watched else "pass"
-    return state, len(fresh) - red, len(fresh)
+def tonight(book: Book) -> list[Trend]:
+    """The series measured in the newest night."""
+    last = book.tonight.index
+    return [t for test in book.tests for t in test.trends if t.nights[-1] == last]
+
+
+def counted(book: Book) -> Count:
+    """Limits and set points of the newest night."""
+    samples = ((t.definition, t.told.nights[-1].night.sample) for t in tonight(book))
+    return count((definition, sample) for definition, sample in samples if sample.outcome != "missing")
+
+
+def health(book: Book) -> tuple[Class, Count]:
+    """What the newest night stands for, and how many limits and set points hold."""
+    found = counted(book)
+    state = worst(t.state for t in tonight(book))
+    return "none" if state == "followed" and not found.expected else state, found
 
 
 def index(book: Book, events: Sequence[Event]) -> Page:
     """Is the engine healthy tonight?"""
     gates = [(test, trend) for test in book.tests for trend in test.gates()]
-    fresh = [(test, trend) for test, trend in gates if trend.nights[-1] == book.tonight.index]
-    red = [trend for _, trend in fresh if trend.state == "fail"]
-    banded = [
-        trend
-        for test in book.tests
-        for trend in test.trends
-        if trend.definition.set_point and trend.nights[-1] == book.tonight.index
-    ]
-    held = [trend for trend in banded if trend.held[-1]]
     open_events = [e for e in events if e.lasting]
-    state, kept, _ = health(book, events)
+    state, found = health(book)
     seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
     others = [row(t, test.card.title, address(test), book.nights) for test, t in gates if not test.card.seven]
     others += [
@@ -51,42 +53,58 @@ def index(book: Book, events: Sequence[Event]) -> Page:
     step = steps.pop() if len(steps) == 1 else None
     context = {
         "state": state,
-        "headline": _headline(state, len(red), len(open_events)),
+        "headline": _headline(state, found, tonight(book)),
         "summary": summary(book),
-        "kept": kept,
-        "gates": len(fresh),
-        "held": len(held),
-        "set_points": len(banded),
+        "kept": found.kept,
+        "limits": found.limits,
+        "held": found.set_points - found.left,
+        "set_points": found.set_points,
         "nights": len(book.nights),
         "seven": seven,
         "others": others,
         "common_step": _step_words(step),
         "heat": heat(book),
+        "signs": [(name, said, meaning) for name, (_, said, meaning) in CLASSES.items()],
         "open": [event_row(e, book) for e in open_events[:12]],
     }
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
 
 
-def gates_at(book: Book) -> list[tuple[int, int]]:
-    """Gates kept and gates measured, night by night."""
-    kept, measured = [0] * len(book.nights), [0] * len(book.nights)
+def counts_by_night(book: Book) -> list[Count]:
+    """Limits and set points, night by night."""
+    pairs: list[list[Any]] = [[] for _ in book.nights]
     for test in book.tests:
-        for trend in test.gates():
-            for night, outcome in zip(trend.nights, trend.outcomes, strict=True):
-                measured[night] += 1
-                kept[night] += outcome == "value"
-    return list(zip(kept, measured, strict=True))
+        for trend in test.trends:
+            if expected(trend.definition):
+                for night, judged in zip(trend.nights, trend.told.nights, strict=True):
+                    if judged.night.sample.outcome != "missing":
+                        pairs[night].append((trend.definition, judged.night.sample))
+    return [count(of_night) for of_night in pairs]
 
 
-def _headline(state: State, red: int, watched: int) -> str:
+def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:
     if state == "none":
         return "No limit was tested tonight"
-    if state == "pass":
-        return "Every limit is kept tonight"
-    if state == "fail":
-        return "One limit is broken tonight" if red == 1 else f"{red} limits are broken tonight"
-    others = "one other series is red" if watched == 1 else f"{watched} other series are red"
-    return f"Every gate is kept; {others}"
+    if found.broken:
+        return (
+            "One limit is broken tonight"
+            if found.broken == 1
+            else f"{found.broken} limits are broken tonight"
+        )
+    lost = sum(t.state == "fail" for t in fresh)
+    if lost:
+        return (
+            "Every limit is kept; one value is missing"
+            if lost == 1
+            else f"Every limit is kept; {lost} values are missing"
+        )
+    red = sum(t.state == "watch" for t in fresh)
+    if red:
+        others = "one other series is red" if red == 1 else f"{red} other series are red"
+        return f"Every limit is kept; {others}"
+    if state == "accepted":
+        return "Every limit is kept or accepted tonight"
+    return "Every limit is kept tonight"
 
 
 def summary(book: Book) -> str:
@@ -159,21 +177,10 @@ def heat(book: Book) -> dict[str, Any]:
     }
 
 
-def night_state(test: TestHistory, night: int) -> State:
-    """The verdict of a test on one night, as recorded then."""
-    worst: State = "none"
-    for trend in test.trends:
-        if not judged(trend):
-            continue
-        place = place_of(trend, night)
-        if place is None:
-            continue
-        state = trend.state_at(place)
-        if state == "fail" and trend.definition.role != "gate":
-            state = "watch"
-        if worst == "none" or ORDER[state] < ORDER[worst]:
-            worst = state
-    return worst
+def night_state(test: TestHistory, night: int) -> Class:
+    """The verdict of a test on one night: the worst of its series, as the judge says."""
+    places = ((trend, place_of(trend, night)) for trend in test.trends)
+    return worst(trend.state_at(place) for trend, place in places if place is not None)
 
 
 def place_of(trend: Trend, night: int) -> int | None:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from spook_tracker.tracker.document.wording import slug, web_address
+from spook_tracker.tracker.judge.tonight import map_key
+from spook_tracker.tracker.judge.vocabulary import spaced
 from spook_tracker.tracker.website.comparisons import Comparisons, choice, page_data
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
@@ -16,10 +18,10 @@ from spook_tracker.tracker.website.diagrams import (
     trend_chart,
     view,
 )
-from spook_tracker.tracker.website.events import Event, map_key, map_verdicts
+from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
 from spook_tracker.tracker.website.nights import Book, TestHistory
-from spook_tracker.tracker.website.page_index import gates_at, health, summary
+from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
 from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
@@ -100,7 +102,7 @@ def compare(told: Comparisons) -> Page:
     if len(told.nights) > 1:
         before, after = told.nights[-2:]
         pair = told.pairs[f"{before.id}/{after.id}"]
-        counts = ", ".join(f"{n} {word.replace('_', ' ')}" for word, n in pair["counts"].items())
+        counts = ", ".join(f"{n} {spaced(word)}" for word, n in pair["counts"].items())
         headline = {"identical": "Identical", "same": "No regression", "regressed": "Regressed"}
         first = {
             "before": choice(before),
@@ -117,7 +119,7 @@ def compare(told: Comparisons) -> Page:
 def versions(book: Book) -> Page:
     """What ran where."""
     nights = list(reversed(book.nights))
-    kept = gates_at(book)
+    counts = counts_by_night(book)
     machines = Counter(night.machine for night in book.nights)
     context = {
         "nights": [
@@ -125,13 +127,13 @@ def versions(book: Book) -> Page:
                 "night": night,
                 "anchor": slug(night.id),
                 "machine": slug(night.machine.fingerprint),
-                "kept": kept[night.index][0],
-                "gates": kept[night.index][1],
+                "kept": counts[night.index].kept,
+                "gates": counts[night.index].limits,
                 "state": "none"
-                if not kept[night.index][1]
-                else "pass"
-                if kept[night.index][0] == kept[night.index][1]
-                else "fail",
+                if not counts[night.index].limits
+                else "fail"
+                if counts[night.index].broken
+                else "pass",
                 "log": web_address(night.ci_address),
             }
             for night in nights[:MOST_NIGHTS]
@@ -148,9 +150,9 @@ def versions(book: Book) -> Page:
 
 def data(book: Book, events: Sequence[Event]) -> Page:
     """Every number as a file."""
-    _, kept, gates = health(book, events)
+    _, found = health(book)
     context = {
-        "badge": f"physics: {badge_words(kept, gates)}",
+        "badge": f"physics: {badge_words(found)}",
         "tests": [{"title": t.card.title, "address": address(t), "slug": slug(t.name)} for t in book.tests],
     }
     return Page("data.html", "data.html", "Data", "Every number as CSV and JSON.", context)

@@ -16,12 +16,16 @@ from spook_tracker.tracker.document.wording import (
     margin,
     named,
     number,
+    page_of,
     quantity,
     seconds,
     slug,
 )
-from spook_tracker.tracker.website.events import Event, judged
-from spook_tracker.tracker.website.nights import Book, Night, State, TestHistory, Trend
+from spook_tracker.tracker.judge.series_history import blame
+from spook_tracker.tracker.judge.standing import expected
+from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 from spook_tracker.tracker.website.svg import sparkline
 
 SPARK_NIGHTS = 40
@@ -59,7 +63,7 @@ class Row:
     set_point: str
     margin: str
     share: str | None  # of the gauge, per cent
-    state: State
+    state: Class
     judged: bool
     failure: str
     spark: dict[str, object]
@@ -97,7 +101,7 @@ def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) ->
         margin=inside.text if math.isfinite(trend.value) else "no value",
         share=None if share is None else f"{100.0 * min(1.0, max(share, 0.012)):.1f}",
         state=state,
-        judged=judged(trend),
+        judged=expected(d),
         failure=failed,
         spark=sparkline(trend.values[ends], states),
         stale=day(nights[last].started) if nights and (last := trend.nights[-1]) != nights[-1].index else "",
@@ -117,24 +121,26 @@ def _shown(trend: Trend, word: str) -> str:
 
 def address(test: TestHistory, root: str = "") -> str:
     """Where the page of a test is."""
-    return f"{root}tests/{slug(test.name)}.html"
+    return f"{root}{page_of(test.name)}"
 
 
 def event_row(event: Event, book: Book) -> dict[str, Any]:
     """An event as a line of a table."""
-    d = event.trend.definition
+    d = event.definition
     test = next(t for t in book.tests if t.name == d.test)
     return {
         "test": test.card.title,
         "what": f"{named(d)[0]} ({conditions(d)})",
         "address": address(test),
         "anchor": f"e-{slug(d.key + '/' + event.first.id)}",
-        "state": event.state,
+        "state": event.stands,
         "name": event.name,
         "sentence": event.sentence,
         "now": quantity(event.value, d.unit, 6),
         "before": quantity(event.before, d.unit, 6) if math.isfinite(event.before) else "–",
         "night": event.first,
+        "again": event.worse_at if event.worse_at is not event.first else None,
+        "blame": blame(event.first, event.good),
         "good": event.good,
         "end": event.end,
         "standing": event.standing,

@@ -23,7 +23,8 @@ from spook_tracker.tracker.website import data_files, feed
 from spook_tracker.tracker.website.comparisons import FILE, comparisons, read_known, stored
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
-from spook_tracker.tracker.website.nights import Book, Source, TestHistory, book
+from spook_tracker.tracker.website.live_module import module_script
+from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
@@ -42,6 +43,8 @@ ASSETS = {  # name in templates: file under site/static
     "view": "scene-view.js",
     "player": "player.js",
     "replay": "replay.js",
+    "live_engine": "live-engine.js",
+    "live": "live.js",
 }
 PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt", "three-LICENSE.txt")
 
@@ -60,7 +63,7 @@ class Report:
         return self.written + self.skipped
 
 
-def publish(history: Source, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
+def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red.
@@ -71,17 +74,21 @@ def publish(history: Source, out: Path, accepted: Sequence[Accepted] = ()) -> Re
     names = {name: _hashed(ASSETS[name], content) for name, content in contents.items()}
     making = digest(*(path.read_bytes() for path in sorted([*templates.iterdir(), *_sources()])))
     made = environment(templates)
-    told = book(history)
+    told = book(history, accepted)
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
+        module = ""
+        if (engine := module_script(static)) is not None:
+            module = f"assets/{_hashed('live-module.js', engine)}"
+            folder.add(module, digest(engine), partial(bytes, engine))
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
-        events = all_events(told, accepted) if told.nights else []
+        events = all_events(told) if told.nights else []
         levels = digest(making.encode(), repr(accepted).encode())
-        compared = comparisons(history, told, events, accepted, read_known(out, levels))
-        for page in pages(told, events, compared):
+        compared = comparisons(history, told, accepted, read_known(out, levels))
+        for page in pages(told, events, compared, module):
             context = _context(page, names, told.nights[-1] if told.nights else None)
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
 
@@ -125,8 +132,8 @@ def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Cal
         yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
     news = feed.atom(told, events, {test.name: address(test) for test in told.tests})
     yield "feed.xml", news, partial(bytes, news)
-    state, kept, gates = health(told, events)
-    words = feed.badge_words(kept, gates)
+    state, found = health(told)
+    words = feed.badge_words(found)
     yield "badge.svg", (state + words).encode(), partial(feed.badge_svg, state, words)
     yield "badge.json", (state + words).encode(), partial(feed.badge_json, state, words)
 
@@ -149,6 +156,7 @@ def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:
         "navigation": NAVIGATION,
         "assets": assets,
         "plotly": page.plotly,
+        "module": "",  # the live page has one
         "night": night,
         **page.context,
     }

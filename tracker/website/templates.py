@@ -14,6 +14,7 @@ import jinja2
 from markupsafe import Markup
 
 from spook_tracker.tracker.document import wording
+from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
 from spook_tracker.tracker.resources import resource
 
 ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
@@ -27,6 +28,11 @@ def embedded(value: Any) -> Markup:
     return Markup(text)
 
 
+def said(name: Class) -> str:
+    """The word of a class of nights: PASS, FAIL …"""
+    return CLASSES[name][1]
+
+
 def environment(folder: Path | None = None) -> jinja2.Environment:
     """The templates under site/templates with our filters."""
     made = jinja2.Environment(
@@ -38,6 +44,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
     )
     made.filters |= {
         "data": embedded,
+        "said": said,
         "clean": wording.clean,
         "clock": wording.clock,
         "day": wording.day,

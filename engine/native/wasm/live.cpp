@@ -142,13 +142,14 @@ void live_lock(int first, int second, double x, double y, double z, double along
     joint.compliance = {along, along, along, about, about, about};
     joint.damping.fill(damping);
     live->bodies.joints.push_back(joint);
+    if (first >= 0 && second >= 0) live->bodies.no_contact.push_back({first, second});
 }
 
 char* live_name() { return name; }
 
-int live_observe(int index, double other, int every) {
+int live_observe(int index, int other, int every) {
     const int number = static_cast<int>(live->quantities.size());
-    live->quantities.push_back({name, index, {}, static_cast<int>(other)});
+    live->quantities.push_back({name, index, {}, other});
     Observation trace;
     trace.quantity = number;
     trace.reduction = Reduction::trace;

@@ -39,7 +39,7 @@ void live_lock(int first, int second, double x, double y, double z, double along
 /// Where the caller writes a name before live_observe: up to 63 bytes and a zero.
 char* live_name();
 /// Trace the quantity of that name (engine/native: QuantityRequest), every `every` samples. Returns its number.
-int live_observe(int index, double other, int every);
+int live_observe(int index, int other, int every);
 
 /// Run from the start. Returns 0 completed, 1 diverged, 2 not finite, 3 timed out.
 int live_run(int steps, double time_limit);

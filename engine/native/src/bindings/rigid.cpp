@@ -139,6 +139,10 @@ RigidMethod to_method(const nb::dict& method) {
     options.read_kind("friction", out.friction);
     options.read("iterations", out.iterations);
     options.read("residual_tolerance", out.residual_tolerance);
+    options.read("composition", out.composition);
+    options.read("half_step_velocities", out.half_step_velocities);
+    options.read("corrections", out.corrections);
+    options.read("correction_cap", out.correction_cap);
     options.read("force_collision", out.force_collision);
     options.read("force_rotation", out.force_rotation);
     options.expect_all_read();

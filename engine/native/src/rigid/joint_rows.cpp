@@ -120,6 +120,60 @@ void assemble_joint(const JointConstants& joint, const BodyState& first, const B
     write.angular(cross(carried(second, joint.axes[1]), axes[0]), dot(joint.axes[0], tilt * joint.axes[1]));
 }
 
+void joint_bias(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                double* bias) noexcept {
+    const Ends ends(joint, first, second);
+    const Vec3 w1 = first.angular_velocity, w2 = second.angular_velocity;
+    const auto spun = [](Vec3 w, Vec3 r) { return cross(w, cross(w, r)); };
+    const Vec3 bend = spun(w2, ends.second_arm) - spun(w1, ends.first_arm);
+    const Vec3 parting =
+        second.velocity + cross(w2, ends.second_arm) - first.velocity - cross(w1, ends.first_arm);
+    if (joint.kind == JointKind::distance) {
+        const Vec3 d = joint.span + ends.gap;
+        const double length = norm(d), along = dot(d, parting) / length;
+        *bias = (dot(parting, parting) - along * along + dot(d, bend)) / length;
+        return;
+    }
+    Vec3 axes[3];
+    for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
+    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
+        *bias++ =
+            dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), parting) + dot(spun(w1, axes[k]), ends.gap);
+    if (joint.kind == JointKind::ball) return;
+    if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
+        // q = t₁* t₂ with t' = ½ w t gives q'' = ¼ t₁* (d w₂ − w₁ d) t₂, d = w₂ − w₁.
+        const Vec3 d = w2 - w1;
+        const Quat inner = {dot(w1, d) - dot(d, w2), 0, 0, 0};
+        const Vec3 turned = cross(d, w2) - cross(w1, d);
+        const Quat q = conjugate(first.turn) * Quat{inner.w, turned.x, turned.y, turned.z} * second.turn;
+        const Quat plain = conjugate(first.turn) * second.turn;
+        const double sign = plain.w < 0.0 ? -0.5 : 0.5;
+        for (int k = 0; k < 3; ++k) *bias++ = sign * dot(joint.axes[k], Vec3{q.x, q.y, q.z});
+        return;
+    }
+    const auto angle_bias = [&](Vec3 a, Vec3 b) {  // of a · b, a carried by the first body, b by the second
+        return dot(spun(w1, a), b) + 2.0 * dot(cross(w1, a), cross(w2, b)) + dot(a, spun(w2, b));
+    };
+    if (joint.kind == JointKind::hinge) {
+        const Vec3 axis = carried(second, joint.axes[0]);
+        *bias++ = -angle_bias(axes[2], axis);
+        *bias++ = angle_bias(axes[1], axis);
+        return;
+    }
+    *bias++ = angle_bias(axes[0], carried(second, joint.axes[1]));
+}
+
+double axial_bias(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept {
+    const Vec3 w1 = first.angular_velocity, w2 = second.angular_velocity;
+    const Vec3 axis = carried(first, joint.axes[0]), turning = cross(w1, axis);
+    if (joint.kind != JointKind::prismatic) return dot(turning, w2 - w1);
+    const Ends ends(joint, first, second);
+    const Vec3 bend = cross(w2, cross(w2, ends.second_arm)) - cross(w1, cross(w1, ends.first_arm));
+    const Vec3 parting =
+        second.velocity + cross(w2, ends.second_arm) - first.velocity - cross(w1, ends.first_arm);
+    return dot(axis, bend) + 2.0 * dot(turning, parting) + dot(cross(w1, turning), ends.gap);
+}
+
 AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept {
     AxialRow row;
     const Ends ends(joint, first, second);

@@ -40,6 +40,13 @@ JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
 void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second,
                     JointRows& rows, Vec3& first_reach, Vec3& second_reach) noexcept;
 
+/// What the rows' second time derivatives are when both ends go on with constant velocity and angular velocity.
+void joint_bias(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                double* bias) noexcept;
+
+/// The same for the rate of the free coordinate.
+double axial_bias(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept;
+
 /// The free coordinate of a hinge (angle within ±π) or prismatic joint [rad or m], its rate and one Jacobian row.
 struct AxialRow {
     double coordinate = 0.0, rate = 0.0;

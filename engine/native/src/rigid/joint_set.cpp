@@ -122,6 +122,27 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
              axial.spring.violation_gain * (state.angle - axial.spring_rest));
 }
 
+JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
+    const JointBlock& block = blocks_[index];
+    const Joint& joint = joints_[block.joint];
+    if (block.axial) return {0.0, 0.0, 1.0};
+    const JointConstants& c = joint.constants;
+    const auto& gain = joint.gain[row];
+    const double relaxation = 0.25 * (1.0 / gain.upsilon - 1.0);
+    if (c.kind == JointKind::distance) return {gain.violation, relaxation, c.rest_length};
+    const bool linear = row < (c.kind == JointKind::prismatic ? 2 : 3);
+    const double arms = norm(c.first_arm) + norm(c.second_arm);
+    return {gain.violation, relaxation, linear && arms > 0.0 ? arms : 1.0};
+}
+
+void JointSet::bias(int index, std::span<const BodyState> bodies, double* out) const noexcept {
+    const JointBlock& block = blocks_[index];
+    const Joint& joint = joints_[block.joint];
+    const BodyState &first = body(joint.first, bodies), &second = body(joint.second, bodies);
+    if (!block.axial) return joint_bias(joint.constants, first, second, out);
+    std::fill_n(out, block.size, axial_bias(joint.constants, first, second));
+}
+
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {
     const Joint& joint = joints_[index];
     double first[36], second[36];

@@ -52,6 +52,16 @@ public:
     void assemble(int block, std::span<const BodyState> bodies, double* first, double* second,
                   BlockRight& right) noexcept;
 
+    /// The constants of one row: (4/h) Ups; θ; and the size of the joint that curvature and rounding are measured
+    /// by (m; 1 for angles).
+    struct RowGain {
+        double violation, relaxation, extent;
+    };
+    RowGain gain(int block, int row) const noexcept;
+
+    /// Second time derivatives of a block's rows when both ends go on with constant velocities.
+    void bias(int block, std::span<const BodyState> bodies, double* out) const noexcept;
+
     /// Violations of a joint's own rows at the given state [m or rad].
     void violation(int joint, std::span<const BodyState> bodies, double* out) const noexcept;
     /// Free coordinate of a hinge (unwrapped) or prismatic joint.

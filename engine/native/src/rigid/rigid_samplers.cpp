@@ -38,10 +38,23 @@ Sampler momentum_sampler(const RigidSystem* s, bool angular, Vec3 about) {
             }};
 }
 
+/// Whether positions and orientations alone give it.
+bool of_places(Quantity quantity) {
+    switch (quantity) {
+        case Quantity::position:
+        case Quantity::orientation:
+        case Quantity::violation:
+        case Quantity::joint_coordinate:
+        case Quantity::potential_energy: return true;
+        default: return false;
+    }
+}
+
 }  // namespace
 
 Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
     const RigidSystem* s = &system;
+    if (!of_places(from_text<Quantity>(request.kind, "quantity"))) system.see_velocities();
     const int index = request.index, other = request.other, count = system.bodies();
     switch (from_text<Quantity>(request.kind, "quantity")) {
         case Quantity::position:

@@ -71,6 +71,10 @@ struct RigidMethod {
     FrictionModel friction = FrictionModel::cone;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
+    int composition = 2;                // order; above 2 a symmetric composition of constrained steps
+    bool half_step_velocities = false;  // velocities live at mid-step
+    int corrections = 0;                // extra solves per step for the curvature of the rows
+    double correction_cap = 0.3;        // of the joint's arms, or rad
     bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs
     bool force_rotation = false;   // give particles a rotation nobody sees, to measure what it costs
 };

@@ -49,7 +49,8 @@ double* RigidSystem::jacobian(int block, bool second) noexcept {
     return spare_.data() + spare_at_[block] + (second ? 6 * joints_.blocks()[block].size : 0);
 }
 
-void RigidSystem::solve_block() {
+/// Jacobians into the matrix, right sides of the rows.
+void RigidSystem::assemble_blocks() {
     const auto blocks = joints_.blocks();
     const int row_blocks = static_cast<int>(blocks.size());
     double* right = right_.data();
@@ -78,8 +79,21 @@ void RigidSystem::solve_block() {
         std::copy_n(numbers.right.data(), block.size, right);
         right += block.size;
     }
+}
+
+void RigidSystem::fill_inertias() {
+    const int row_blocks = static_cast<int>(joints_.blocks().size());
     for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const int i = tied_[k];
+        if (constants_[tied_[k]].particle) continue;
+        const BodyState& s = live_.bodies[tied_[k]];
+        double* diagonal = matrix_.diagonal(row_blocks + static_cast<int>(k)) + 21;
+        for (int row = 0; row < 3; ++row) std::copy_n(s.inertia.m + 3 * row, 3, diagonal + 6 * row);
+    }
+}
+
+void RigidSystem::fill_block_momenta() {
+    double* right = right_.data() + rows_;
+    for (int i : tied_) {
         const BodyConstants& body = constants_[i];
         const BodyState& s = live_.bodies[i];
         const Vec3 p = body.mass * (s.velocity + kick(i));
@@ -89,28 +103,34 @@ void RigidSystem::solve_block() {
         const Vec3 l = s.angular_momentum + h_ * body.torque;
         right[0] = l.x, right[1] = l.y, right[2] = l.z;
         right += 3;
-        double* diagonal = matrix_.diagonal(row_blocks + static_cast<int>(k)) + 21;
-        for (int row = 0; row < 3; ++row) std::copy_n(s.inertia.m + 3 * row, 3, diagonal + 6 * row);
     }
+}
+
+void RigidSystem::solve_block() {
+    assemble_blocks();
+    fill_inertias();
+    fill_block_momenta();
+    if (method_.corrections > 0) bend_rows_back();
     if (clock_) clock_->mark(Stage::assemble_rows);
 
-    const auto settled = [this](std::span<const double> left) {
-        const Worst worst = worst_row(left);
-        return worst.residual <= 1e-13 * worst.speed;
-    };
-    const bool doubtful = redundant_.factor_and_solve(matrix_, method_.floor, right_.data(), solution_.data(),
-                                                      method_.refinements, settled);
-    if (!redundant_.finite()) {
+    if (!factor_and_solve()) {
         live_.not_solved = tied_.front();
         return;
     }
-    if (doubtful) find_contradiction();
+    if (method_.corrections > 0) correct_curvature();
+    take_block_solution();
+    if (clock_) clock_->mark(Stage::solve_block);
+}
+
+void RigidSystem::take_block_solution() {
+    const auto blocks = joints_.blocks();
     const double* x = solution_.data();
-    for (int k = 0; k < row_blocks; ++k) {
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
         JointSet::State& state = joints_.states[blocks[k].joint];
         double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
         for (int i = 0; i < blocks[k].size; ++i) multiplier[i] = -*x++;
     }
+    const bool at_once = !clock_ && !half_step_;  // moved while at hand; a timed run keeps the stages apart
     for (int i : tied_) {
         BodyState& s = live_.bodies[i];
         s.velocity = {x[0], x[1], x[2]};
@@ -119,10 +139,27 @@ void RigidSystem::solve_block() {
             s.angular_momentum = s.inertia * Vec3{x[0], x[1], x[2]};
             x += 3;
         }
-        if (!clock_) integrate_body(i);  // while it is at hand; a timed run keeps the stages apart
+        if (at_once) integrate_body(i);
     }
-    tied_are_moved_ = clock_ == nullptr;
-    if (clock_) clock_->mark(Stage::solve_block);
+    tied_are_moved_ = at_once;
+}
+
+bool RigidSystem::factor_and_solve() {
+    const bool doubtful = redundant_.factor_and_solve(
+        matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
+        [this](std::span<const double> left) { return settled(left); });
+    if (redundant_.finite() && doubtful) find_contradiction();
+    return redundant_.finite();
+}
+
+void RigidSystem::solve_again() {
+    redundant_.solve(matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
+                     [this](std::span<const double> left) { return settled(left); });
+}
+
+bool RigidSystem::settled(std::span<const double> left) const {
+    const Worst worst = worst_row(left);
+    return worst.residual <= 1e-13 * worst.speed;
 }
 
 RigidSystem::Worst RigidSystem::worst_row(std::span<const double> left) const {
@@ -259,11 +296,10 @@ void RigidSystem::wrench(int joint, double* out) const noexcept {
     std::fill_n(out, 6, 0.0);
     const JointSet::State& state = joints_.states[joint];
     const auto blocks = joints_.blocks();
-    auto* self = const_cast<RigidSystem*>(this);
     Vec3 force, torque;
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         if (blocks[k].joint != joint) continue;
-        const double* rows = self->jacobian(static_cast<int>(k), true);
+        const double* rows = jacobian(static_cast<int>(k), true);
         const double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
         for (int i = 0; i < blocks[k].size; ++i) {
             const double f = multiplier[i] / h_;

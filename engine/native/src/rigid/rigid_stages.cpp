@@ -41,6 +41,7 @@ Facts facts_of(const RigidScene& scene) {
 StageChoices choose_stages(const RigidScene& scene, bool observing) {
     const Facts is = facts_of(scene);
     const RigidMethod& method = scene.method;
+    const bool composed = method.composition > 2;
     const bool rows = is.joints || is.contacts, direct = method.solver != SolverKind::iterative;
     const bool pivots = direct && (is.contacts || (is.joints && is.bounded));
     const std::string no_rows = "no joints and no contacts, so nothing to solve";
@@ -96,9 +97,20 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                  : no_rows);
             case Stage::friction:
                 return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
-            case Stage::string_stiffness:
-            case Stage::correct_curvature: return leave_out(particles_only);
-            case Stage::half_step: return leave_out("velocities live at whole steps");
+            case Stage::string_stiffness: return leave_out(particles_only);
+            case Stage::correct_curvature:
+                return choose_if(
+                    is.joints && (composed || method.corrections > 0),
+                    composed ? "iteration keeps the curvature of the rows to rounding"
+                             : std::to_string(method.corrections) +
+                                   " extra back-substitutions keep the curvature of the rows",
+                    is.joints ? "the method linearises the rows" : "no joints, so nothing is curved");
+            case Stage::half_step:
+                return choose_if(composed || method.half_step_velocities,
+                                 composed ? "a symmetric composition of half-step steps, order" +
+                                                std::to_string(method.composition)
+                                          : "velocities live at mid-step: half-kick start, mid-step read-out",
+                                 "velocities live at whole steps");
             case Stage::integrate_positions:
                 return choose_if(is.moving, "bodies can move", "nothing can move");
             case Stage::integrate_rotations:

@@ -70,8 +70,9 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept {
                 r.m[3 * i + 2] * body.inertia.z * r.m[3 * j + 2];
 }
 
-bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
-    if (body.motion == Motion::fixed) return true;
+namespace {
+
+bool advance_pose(const BodyConstants& body, double h, BodyState& state) noexcept {
     state.displacement += h * state.velocity;
     if (body.particle) return true;
     if (body.motion == Motion::kinematic) {
@@ -88,7 +89,22 @@ bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
         const Vec3 e = 0.5 * h * w;
         state.turn = unit(Quat{std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z} * state.turn);
     }
-    refresh(body, state);
+    return true;
+}
+
+}  // namespace
+
+bool move(const BodyConstants& body, double h, BodyState& state) noexcept {
+    if (body.motion == Motion::fixed) return true;
+    if (!advance_pose(body, h, state)) return false;
+    if (!body.particle) state.turn_less_one = rotation_less_one(state.turn);
+    return true;
+}
+
+bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
+    if (body.motion == Motion::fixed) return true;
+    if (!advance_pose(body, h, state)) return false;
+    if (!body.particle) refresh(body, state);
     return true;
 }
 

@@ -48,6 +48,9 @@ BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcep
 /// Angular velocity from angular momentum, and the derived matrices, at the state's orientation.
 void refresh(const BodyConstants& body, BodyState& state) noexcept;
 
+/// Where integrate() takes a body, without the rest of what is derived from it: displacement, turn, turn_less_one.
+bool move(const BodyConstants& body, double h, BodyState& state) noexcept;
+
 /// Moves a body on by h with its velocities (kinematic) or its momenta (dynamic, after a solve). False when it
 /// turns too fast for the time step.
 bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept;

@@ -31,6 +31,15 @@ void RigidSystem::apply_forces() {
 
 void RigidSystem::step() {
     if (clock_) clock_->start();
+    if (!live_.velocity_ready) velocity_stage();
+    live_.velocity_ready = false;
+    integrate_all();
+}
+
+void RigidSystem::velocity_stage() {
+    if (half_step_)
+        for (int i = 0; i < bodies(); ++i)
+            live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
     if (!force_.empty()) apply_forces();
     kick_free_bodies();
     if (contacts_ && find_contacts()) {
@@ -42,7 +51,6 @@ void RigidSystem::step() {
     } else {
         for (int i : tied_) kick_free_body(i);  // bodies that could touch but do not
     }
-    integrate_all();
 }
 
 void RigidSystem::kick_free_body(int i) noexcept {

@@ -75,6 +75,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
                            method_.floor, method_.refinements});
     }
+    composed_ = method_.composition > 2;
+    half_step_ = stages_.runs(Stage::half_step) && !composed_;
     if (solver_ == RigidSolver::block) analyse_block();
     reset(nullptr);
 }
@@ -101,6 +103,8 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     stages_.take(Stage::apply_loads);
     if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
     if (stages_.take(Stage::apply_springs)) springs_ = scene.springs;
+    stages_.take(Stage::half_step);
+    stages_.take(Stage::correct_curvature);
     stages_.take(Stage::integrate_positions);
     stages_.take(Stage::integrate_rotations);
     stages_.take(Stage::observe);
@@ -123,6 +127,8 @@ void RigidSystem::reset(StageClock* clock) {
     matrix_.clear_counters();
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
+    if (composed_) start_composition();
+    if (half_step_ || method_.corrections > 0) start_half_step();
     if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
     mixed_.mass.assign(tied_.size(), Mat6{});
     mixed_.momentum.resize(tied_.size());
@@ -138,12 +144,29 @@ void RigidSystem::reset(StageClock* clock) {
 }
 
 void RigidSystem::advance(std::int64_t steps) {
+    if (composed_) return compose(steps * method_.substeps);
     for (std::int64_t n = steps * method_.substeps; n > 0; --n) step();
 }
 
 void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->start();
-    recorder.sample(sample);
+    if (velocities_seen_ && (composed_ || half_step_)) {
+        // What is seen lives at the sample; what goes on does not.
+        LargeArray<BodyState> going;
+        if (half_step_) {
+            if (!live_.velocity_ready) velocity_stage();
+            live_.velocity_ready = true;
+            going = live_.bodies;
+            read_half_step();
+        } else {
+            going = live_.bodies;
+            read_composition();
+        }
+        recorder.sample(sample);
+        live_.bodies = std::move(going);
+    } else {
+        recorder.sample(sample);
+    }
     if (clock_) clock_->mark(Stage::observe);
 }
 
@@ -151,6 +174,11 @@ Health RigidSystem::health() const {
     if (live_.too_fast >= 0)
         return {Status::diverged, live_.too_fast,
                 "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+    if (live_.lost >= 0)
+        return {
+            Status::diverged, live_.lost,
+            "is held by joints that no motion satisfies, even in a small part of the step; start it where its "
+            "joints can move, or take a smaller time step"};
     if (live_.contradicted >= 0)
         return {Status::diverged, live_.contradicted,
                 "is held by rows that contradict each other; give one of them a compliance"};
@@ -195,7 +223,15 @@ double RigidSystem::potential_energy() const noexcept {
     return sum;
 }
 
-std::vector<double> RigidSystem::final_state() const {
+std::vector<double> RigidSystem::final_state() {
+    if (live_.lost < 0 && live_.not_solved < 0) {
+        if (composed_) read_composition();
+        if (half_step_) {
+            if (!live_.velocity_ready) velocity_stage();
+            live_.velocity_ready = true;
+            read_half_step();
+        }
+    }
     std::vector<double> out;
     out.reserve(13 * constants_.size());
     for (int i = 0; i < bodies(); ++i) {
@@ -232,6 +268,10 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("back_substitutions", work.solves);
     put("pivot_rounds", rounds_);
     put("sweeps", sweeps_);
+    if (composed_) {
+        report.counters["newton_iterations"] = live_.newton_iterations;
+        report.counters["halved_steps"] = live_.halved_steps;
+    }
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     std::int64_t moving = 0;
     for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;

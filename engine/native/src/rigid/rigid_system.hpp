@@ -21,6 +21,11 @@ namespace spook {
 /// How a step's rows are solved: block is one factorisation, for bilateral rows; pivot and iterative know bounds.
 enum class RigidSolver { none, block, pivot, iterative };
 
+/// What mid-step velocities are averaged from.
+struct BodyMomenta {
+    Vec3 velocity, angular_momentum;
+};
+
 /// One scene with its state. One step of h, symplectic order:
 ///   forces → p = M v + h f;  contacts → impact;  joints → rows;  one solve → v₊, λ;
 ///   positions and orientations with v₊.
@@ -52,7 +57,7 @@ public:
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
     void count(RunReport& report, std::int64_t steps) const;
-    std::vector<double> final_state() const;
+    std::vector<double> final_state();
 
     // What can be observed:
     int bodies() const noexcept { return static_cast<int>(constants_.size()); }
@@ -64,6 +69,8 @@ public:
     double potential_energy() const noexcept;
     const JointSet& joints() const noexcept { return joints_; }
     JointSet& joints() noexcept { return joints_; }
+    /// Samples will read velocities or forces: where those live between the samples they are looked up for it.
+    void see_velocities() noexcept { velocities_seen_ = true; }
     void violation(int joint, double* out) const { joints_.violation(joint, live_.bodies, out); }
     double coordinate(int joint) const { return joints_.coordinate(joint, live_.bodies); }
     /// Force and torque on the second body at the joint in the last step [N, N m], world axes.
@@ -83,10 +90,45 @@ private:
         int too_fast = -1;      // the first body that turned too fast
         int not_solved = -1;    // a body of a system that could not be factored
         int contradicted = -1;  // a body held by rows that cannot hold together
+        // Velocities at mid-step:
+        bool velocity_ready = false;         // the velocities of the coming step are found already
+        LargeArray<BodyMomenta> before;      // those of the step before
+        std::vector<double> last_violation;  // per row, where the step before began
+        // Compositions:
+        double pending = 0.0;  // s: half a stage still to be kicked
+        int lost = -1;         // a body of rows that no motion satisfies
+        std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
+        std::vector<double> history;  // stages × three steps × rows: the rows' forces, N
     };
 
     void take_stages(const RigidScene& scene);
     void step();
+    void velocity_stage();
+
+    // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
+    void start_half_step();
+    void read_half_step();
+    void find_bias(double* bias) const;
+    bool move_all(double h);
+    void violations_at(const LargeArray<BodyState>& at, double* out) const;
+    double row_speed(int block, int row, bool solved) const;
+    void bend_rows_back();
+    void correct_curvature();
+
+    // rigid_composition.cpp: symmetric compositions of higher order
+    void start_composition();
+    void compose(std::int64_t steps);
+    void composed_step(double h, int depth);
+    bool composed_stage(double tau, double* history);
+    void kick_all(double span);
+    void push(const double* multipliers);
+    double violations_ahead(double tau);
+    void read_composition();
+
+    void assemble_blocks();
+    void fill_inertias();
+    void fill_block_momenta();
+    void take_block_solution();
     void apply_forces();
     void kick_free_bodies();
     void kick_free_body(int body) noexcept;
@@ -103,6 +145,9 @@ private:
         int block = 0;
     };
     Worst worst_row(std::span<const double> left) const;
+    bool settled(std::span<const double> left) const;
+    bool factor_and_solve();  // false when nothing it gives may be used
+    void solve_again();       // new right sides, same matrix
     void find_contradiction();
     void solve_mixed(bool touching);
     void integrate_body(int body);
@@ -110,6 +155,9 @@ private:
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
     Vec3 place(const End& end) const noexcept { return end.body < 0 ? end.point : position_of(end.body); }
+    const double* jacobian(int block, bool second) const noexcept {
+        return const_cast<RigidSystem*>(this)->jacobian(block, second);
+    }
     Vec3 kick(int body) const noexcept {  // change of velocity by forces in a step
         Vec3 dv = h_ * acceleration_[body];
         if (!force_.empty()) dv += (h_ / constants_[body].mass) * force_[body];
@@ -157,6 +205,12 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
     double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
+    // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
+    bool composed_ = false, half_step_ = false, velocities_seen_ = false;
+    LargeArray<BodyState> trial_;  // per body
+    std::vector<double> first_right_, violation_, bias_, multiplier_;
+    static constexpr int MOST_HALVINGS = 12;
+    LargeArray<BodyState> step_start_[MOST_HALVINGS];
     std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;
     StageClock* clock_ = nullptr;
 };

@@ -1,0 +1,108 @@
+"""An engine by its name: ours, one of `engine/peers/`, one a package announces, or module:attribute.
+
+    spook                      ours (also "engine", the older name)
+    mujoco, exudyn, …          another engine behind an adapter of ours, an optional extra
+    any other word             what an installed package announces as an entry point "spook_tracker.engines"
+    my_engine, my_engine:NAME  a module with simulate and build_info, or an `Adapter` called ENGINE or NAME
+
+The folder one stands in is looked at, too: a team's own engine needs no installation.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.protocol import Adapter, Configuration, run
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
+
+OURS = ("spook", "engine")
+GROUP = "spook_tracker.engines"
+EXTRAS: Mapping[str, str] = {"mujoco": "mujoco", "exudyn": "exudyn"}  # engine: the module its adapter needs
+
+
+class EngineMissing(EngineError):
+    """There is no such engine, or it is not installed; the message names the way out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """An adapter with the face of an engine: simulate, build_info and its configurations."""
+
+    adapter: Adapter
+    gating: bool = False  # whether its values decide an exit code
+
+    @property
+    def configurations(self) -> tuple[Configuration, ...]:
+        """Its settings; the first is its gate."""
+        return self.adapter.configurations
+
+    @property
+    def build_info(self) -> BuildInfo:
+        """Which version of it is installed."""
+        return self.adapter.build_info()
+
+    def simulate(
+        self, scene: Scene, *, observe: Mapping[str, Observable] | None = None, **options: Any
+    ) -> Result:
+        """`engine.simulate` with one option more: configuration."""
+        return run(self.adapter, scene, observe=observe or {}, **options)
+
+
+def find(name: str) -> Any:
+    """The engine of that name: our package, a Peer, or a module. Raises EngineMissing."""
+    if name in OURS:
+        return importlib.import_module("spook_tracker.engine")
+    if name in EXTRAS:
+        return Peer(_peer(name).ENGINE)
+    for point in entry_points(group=GROUP):
+        if point.name == name:
+            return _faced(_loaded(name, point.load))
+    module, _, attribute = name.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:  # the console script does not look where one stands
+        sys.path.insert(0, here)
+    found = _loaded(name, lambda: importlib.import_module(module))
+    if attribute:
+        found = _loaded(name, lambda: getattr(found, attribute))
+    return _faced(getattr(found, "ENGINE", found))
+
+
+def known() -> tuple[str, ...]:
+    """Names of the engines that can be asked for, installed or not."""
+    return ("spook", *EXTRAS, *sorted(point.name for point in entry_points(group=GROUP)))
+
+
+def _faced(found: Any) -> Any:
+    """Adapters get the face of an engine; whoever brings an engine of their own wants to be told."""
+    if isinstance(found, Adapter):
+        return Peer(found, gating=getattr(found, "gating", True))
+    return found
+
+
+def _peer(name: str) -> Any:
+    try:
+        return importlib.import_module(f"spook_tracker.engine.peers.{name}")
+    except ImportError as error:
+        raise EngineMissing(
+            f"engine {name!r} is not installed ({error}); install it with: pip install 'spook-tracker[{name}]'"
+        ) from None
+
+
+def _loaded(name: str, load: Any) -> Any:
+    try:
+        return load()
+    except (ImportError, AttributeError) as error:
+        names = ", ".join(known())
+        raise EngineMissing(
+            f"there is no engine {name!r} ({error}); name one of {names}, or a module, or module:attribute"
+        ) from None

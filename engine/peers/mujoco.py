@@ -1,0 +1,325 @@
+"""MuJoCo, by its Python package, stepped in its own loop.
+
+Joint coordinates where the joints make a tree (a rod between particles is one hinge if all stays in a plane,
+else two), equality constraints for what closes a loop. Forces are those of the step that ended, with Runge-Kutta
+of its last stage. A central is a Python callback: its errors are MuJoCo's, its run time is not.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from spook_tracker.engine.bodies import WORLD
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
+from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, model
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recorded_joints import joint_point, turned
+from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.result import Array
+from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+
+BLOCK = 1000  # steps between two looks at the clock
+BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+STIFF = 'solref="{h2!r} 1" solimp=".9999 .9999 .001 .5 2"'
+CAREFUL = 'cone="elliptic" impratio="100" noslip_iterations="10" tolerance="1e-12" iterations="200"'
+
+
+class MuJoCo:
+    """The adapter."""
+
+    name = "mujoco"
+    capabilities = Capabilities(
+        shapes=frozenset({Sphere, Box, Capsule, Plane}),
+        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),
+        forces=frozenset({CentralGravity, Load, Spring}),
+        shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
+        shows_force_of=frozenset({Distance, Ball, Hinge}),
+        friction=True,
+    )
+    configurations = (
+        Configuration(
+            name="rk4",
+            reason="joint coordinates, Runge-Kutta of order 4; contacts with elliptic cones, impratio 100, no-slip "
+            "sweeps and the stiffest safe reference (2 h): what the manual advises where accuracy is wanted",
+            expected_order=4.0,
+            options={"joints": True, "option": f'integrator="RK4" {CAREFUL}', "stiff": True},
+        ),
+        Configuration(
+            name="defaults",
+            reason="joint coordinates, semi-implicit Euler and soft contacts: what one gets without asking",
+            expected_order=1.0,
+            options={"joints": True, "option": 'integrator="Euler"', "stiff": False},
+        ),
+        Configuration(
+            name="equalities",
+            reason="free bodies held by equality constraints, as an engine of constraints has them; reference 2 h",
+            expected_order=1.0,
+            options={"joints": False, "option": f'integrator="Euler" {CAREFUL}', "stiff": True},
+        ),
+    )
+
+    def build_info(self) -> BuildInfo:
+        return BuildInfo(
+            name=self.name,
+            version=version("mujoco"),
+            git_hash="",
+            dirty=False,
+            commit_time="",
+            parents=(),
+            compiler="wheel from the package index",
+            flags="",
+        )
+
+    def record(self, task: Task) -> Recording:
+        mujoco.set_mju_user_warning(
+            lambda text: None
+        )  # said in the outcome, not in a log file where one stands
+        began = time.perf_counter()
+        run = _Run(task)
+        setup = time.perf_counter() - began
+        try:
+            return run.recording(setup)
+        finally:
+            mujoco.set_mjcb_passive(None)
+
+
+class _Run:
+    """One model with its data, and what is read off it."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, options = task, task.configuration.options
+        stiff = STIFF.format(h2=2.0 * task.time_step) if options["stiff"] else ""
+        self.made: Model = model(
+            task.scene,
+            joint_coordinates=options["joints"],
+            option=f'timestep="{task.time_step!r}" {options["option"]}',
+            geom=stiff,
+            equality=stiff,
+        )
+        try:
+            self.model = mujoco.MjModel.from_xml_string(self.made.xml)
+        except ValueError as error:
+            raise NotSupported(f"mujoco refuses the model: {' '.join(str(error).split())[:200]}") from None
+        self.data = mujoco.MjData(self.model)
+        self.ids = np.array([self._body(body.name) for body in task.scene.bodies])
+        self.roots = self.model.body_rootid[self.ids]
+        self._push()
+        self._start()
+
+    def _body(self, name: str) -> int:
+        return int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, name))
+
+    def _push(self) -> None:
+        fields = []
+        for force in self.task.scene.forces:
+            if isinstance(force, Load):
+                self.data.xfrc_applied[self._body(force.body)] += (*force.force, *force.torque)
+            elif isinstance(force, CentralGravity):
+                fields.append(force)
+        if fields:
+            mujoco.set_mjcb_passive(_attraction(self, fields))
+
+    def _start(self) -> None:
+        """Joint speeds from the bodies' velocities at the start."""
+        scene = self.task.scene
+        mujoco.mj_forward(self.model, self.data)
+        points, speeds, rows = set(self.made.point_bodies), [], []
+        for body in scene.bodies:
+            if getattr(body, "motion", "dynamic") != "dynamic":
+                continue
+            moving, turning = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+            mujoco.mj_jacBody(self.model, self.data, moving, turning, self._body(body.name))
+            rows.append(moving)
+            speeds.append(body.velocity)
+            if body.name not in points:
+                rows.append(turning)
+                speeds.append(body.angular_velocity)  # type: ignore[union-attr]
+        wanted = np.array(speeds, dtype=float).ravel()
+        if wanted.any():
+            self.data.qvel[:] = np.linalg.lstsq(np.concatenate(rows), wanted, rcond=None)[0]
+            mujoco.mj_forward(self.model, self.data)
+
+    def recording(self, setup: float) -> Recording:
+        samples = range(self.task.steps + 1) if self.task.every_step else (0, self.task.steps)
+        count, n = len(samples), len(self.ids)
+        keep = _Kept(count, n)
+        done, failure, status, spent = 0, "", "completed", 0.0
+        entered = time.perf_counter()
+        self._read(keep, 0, 0)
+        for place, sample in enumerate(samples[1:], start=1):
+            while done < sample and status == "completed":
+                block = min(BLOCK, sample - done)
+                began = time.perf_counter()
+                mujoco.mj_step(self.model, self.data, block)
+                spent += time.perf_counter() - began
+                done += block
+                status, failure = self._health(done, time.perf_counter() - entered)
+            if status != "completed":
+                break
+            self._read(keep, place, sample)
+        kept = keep.count
+        return Recording(
+            samples=np.array(samples[:kept], dtype=np.int64),
+            positions=keep.positions[:kept],
+            orientations=keep.orientations[:kept],
+            velocities=keep.velocities[:kept],
+            angular_velocities=keep.spins[:kept],
+            steps=done,
+            seconds=spent,
+            setup_seconds=setup,
+            constraint_forces={name: np.array(values) for name, values in keep.forces.items()},
+            contact_forces={pair: keep.pair(pair)[:kept] for pair in keep.pairs},
+            contact_count=keep.contacts[:kept],
+            penetration=keep.depths[:kept],
+            status=status,  # type: ignore[arg-type]
+            failure=failure,
+        )
+
+    def _health(self, step: int, spent: float) -> tuple[str, str]:
+        for kind in BAD:
+            if self.data.warning[getattr(mujoco.mjtWarning, kind)].number:
+                return "diverged", f"mujoco reset a state it calls bad ({kind[7:].lower()}) by step {step}"
+        limit = self.task.time_limit
+        if limit is not None and spent > limit:
+            return "timed_out", f"the time limit of {limit:g} s was reached before step {step + 1}"
+        return "completed", ""
+
+    def _read(self, keep: _Kept, place: int, sample: int) -> None:
+        m, d = self.model, self.data
+        if self.task.constraint_forces:
+            self._read_constraints(keep, sample)
+        if self.task.contacts and sample:
+            self._read_contacts(keep, place)
+        mujoco.mj_kinematics(m, d)
+        mujoco.mj_comPos(m, d)
+        mujoco.mj_comVel(m, d)
+        spin = d.cvel[self.ids, :3]
+        keep.positions[place] = where = d.xpos[self.ids]
+        keep.orientations[place] = d.xquat[self.ids]
+        keep.spins[place] = spin
+        keep.velocities[place] = d.cvel[self.ids, 3:] + np.cross(spin, where - d.subtree_com[self.roots])
+        keep.count = place + 1
+
+    def _read_constraints(self, keep: _Kept, sample: int) -> None:
+        scene, m, d = self.task.scene, self.model, self.data
+        if sample:
+            mujoco.mj_rnePostConstraint(m, d)
+        equalities = d.efc_type[: d.nefc] == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        rows, forces = d.efc_id[: d.nefc][equalities], d.efc_force[: d.nefc][equalities]
+        for constraint in scene.constraints:
+            if type(constraint) not in MuJoCo.capabilities.shows_force_of:  # type: ignore[operator]
+                continue
+            if not sample:
+                value: Any = 0.0 if isinstance(constraint, Distance) else np.zeros(6)
+            elif constraint.name in self.made.tree:
+                value = self._of_tree(constraint)
+            else:
+                mine = [forces[rows == k] for k in self.made.equalities[constraint.name]]
+                value = self._of_equality(constraint, mine)
+            keep.forces.setdefault(constraint.name, []).append(value)
+
+    def _of_tree(self, constraint: Distance | Joint) -> Any:
+        """The force that MuJoCo says a body exerts on its child, moved to the joint."""
+        d, child = self.data, self.made.tree[constraint.name]
+        body = self._body(child)
+        torque, force = d.cfrc_int[body, :3], d.cfrc_int[body, 3:]
+        second = constraint.between[1] == child
+        if isinstance(constraint, Distance):
+            other = constraint.between[0 if second else 1]
+            anchor = d.xpos[self._body(other)] if isinstance(other, str) else np.array(other)
+            rod = anchor - d.xpos[body]
+            return float(force @ rod / np.linalg.norm(rod))
+        at = self._carried(constraint, child)
+        torque = torque + np.cross(d.subtree_com[self.model.body_rootid[body]] - at, force)
+        return np.concatenate([force, torque]) * (1.0 if second else -1.0)
+
+    def _of_equality(self, constraint: Distance | Joint, rows: list[Array]) -> Any:
+        if isinstance(constraint, Distance):
+            return -float(rows[0][0]) if len(rows[0]) else 0.0
+        held = constraint.between[0] if constraint.between[0] != WORLD else constraint.between[1]
+        # MuJoCo's rows push its first body, which is `held`; a force is read as that on the second.
+        sign = 1.0 if held == constraint.between[1] else -1.0
+        arms = [np.zeros(3)]
+        if isinstance(constraint, Hinge):
+            body = self.task.scene.body(held)
+            turn = np.array(body.orientation)  # type: ignore[union-attr]
+            local = turned(turn * np.array([1.0, -1.0, -1.0, -1.0]), np.array(constraint.axis))
+            axis = turned(np.array(self.data.xquat[self._body(held)]), local)
+            arms = [-HALF_HINGE * axis, HALF_HINGE * axis]
+        total = np.zeros(6)
+        for row, arm in zip(rows, arms, strict=True):
+            if len(row):  # MuJoCo leaves out an equality that no joint can break
+                total += np.concatenate([row, np.cross(arm, row)])
+        return sign * total
+
+    def _carried(self, joint: Joint, name: str) -> Array:
+        """Where the joint's point, fixed to a body at the start, is now."""
+        body = self.task.scene.body(name)
+        turn = np.array(body.orientation)  # type: ignore[union-attr]
+        back = turn * np.array([1.0, -1.0, -1.0, -1.0])
+        local = turned(back, joint_point(self.task.scene, joint) - np.array(body.position))
+        index = self._body(name)
+        return np.asarray(self.data.xpos[index] + turned(np.array(self.data.xquat[index]), local))
+
+    def _read_contacts(self, keep: _Kept, place: int) -> None:
+        m, d = self.model, self.data
+        names = {int(self.ids[i]): body.name for i, body in enumerate(self.task.scene.bodies)}
+        keep.contacts[place] = d.ncon
+        wrench = np.zeros(6)
+        for k in range(d.ncon):
+            contact = d.contact[k]
+            keep.depths[place] = max(keep.depths[place], -contact.dist)
+            mujoco.mj_contactForce(m, d, k, wrench)
+            force = np.reshape(contact.frame, (3, 3)).T @ wrench[:3]  # on the second, along the normal
+            first, second = (names[int(m.geom_bodyid[g])] for g in (contact.geom1, contact.geom2))
+            keep.pair((first, second))[place] -= force
+
+
+class _Kept:
+    """Arrays that fill up as the run goes."""
+
+    def __init__(self, count: int, n: int) -> None:
+        self.count, self.length = 0, count
+        self.positions, self.velocities = np.empty((count, n, 3)), np.empty((count, n, 3))
+        self.spins, self.orientations = np.empty((count, n, 3)), np.empty((count, n, 4))
+        self.contacts, self.depths = np.zeros(count), np.zeros(count)
+        self.forces: dict[str, list[Any]] = {}
+        self.pairs: dict[tuple[str, str], Array] = {}
+
+    def pair(self, pair: tuple[str, str]) -> Array:
+        if pair not in self.pairs:
+            self.pairs[pair] = np.zeros((self.length, 3))
+        return self.pairs[pair]
+
+
+def _attraction(run: _Run, fields: list[CentralGravity]) -> Callable[[Any, Any], None]:
+    """Central gravity as a callback: a force at each body's centre."""
+    bodies = [
+        (run._body(body.name), float(body.mass or 0.0))
+        for body in run.task.scene.bodies
+        if getattr(body, "motion", "dynamic") == "dynamic"
+    ]
+
+    def pull(m: Any, d: Any) -> None:
+        for index, mass in bodies:
+            where = d.xipos[index]
+            for one in fields:
+                x, y, z = where[0] - one.centre[0], where[1] - one.centre[1], where[2] - one.centre[2]
+                size = -mass * one.strength / (x * x + y * y + z * z) ** 1.5
+                mujoco.mj_applyFT(
+                    m, d, np.array([size * x, size * y, size * z]), np.zeros(3), where, index, d.qfrc_passive
+                )
+
+    return pull
+
+
+ENGINE = MuJoCo()

@@ -1,0 +1,348 @@
+"""A scene as MuJoCo's XML: joint coordinates where the joints make a tree, equality constraints elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.forces import Spring
+from spook_tracker.engine.joints import Ball, Constraint, Distance, Hinge, Joint, Lock, Prismatic, Universal
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
+from spook_tracker.engine.result import Array
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+
+POINT_INERTIA = 1e-12  # kg m²: MuJoCo wants one of every moving body; a point mass has none
+HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it as equalities
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass
+class _Node:
+    """A body on its way into the tree: the joint that ties it to its parent, if any."""
+
+    body: Particle | RigidBody
+    index: int
+    parent: str | None = None  # None: free, or fixed
+    tie: Constraint | None = None
+    children: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Model:
+    """The XML, and which constraint became what."""
+
+    xml: str
+    tree: Mapping[str, str]  # constraint -> the body it ties to its parent
+    equalities: Mapping[str, tuple[int, ...]]  # constraint -> its equalities
+    point_bodies: tuple[str, ...]
+
+
+def numbers(values: Iterable[float]) -> str:
+    """As XML wants them, exact."""
+    return '"' + " ".join(repr(float(value)) for value in values) + '"'
+
+
+def model(scene: Scene, *, joint_coordinates: bool, option: str, geom: str, equality: str) -> Model:
+    """The whole model; `option`, `geom` and `equality` are XML attributes of the configuration."""
+    nodes = {body.name: _Node(body, index) for index, body in enumerate(scene.bodies)}
+    if joint_coordinates:
+        _grow(scene, nodes)
+    return _Writer(scene, nodes, geom, equality).write(option)
+
+
+def _fixed(body: Particle | RigidBody) -> bool:
+    return isinstance(body, RigidBody) and body.motion != "dynamic"
+
+
+def _grow(scene: Scene, nodes: dict[str, _Node]) -> None:
+    """Hang every body that joints reach from the world on the shortest way there; loops stay constraints."""
+    beside: dict[str, list[Constraint]] = {}
+    for constraint in scene.constraints:
+        if isinstance(constraint, Distance) and not _is_rod(scene, constraint):
+            continue
+        for end in constraint.between:
+            beside.setdefault(end if isinstance(end, str) else WORLD, []).append(constraint)
+    fixed = [name for name, node in nodes.items() if _fixed(node.body)]
+    reached, line = {WORLD, *fixed}, [WORLD, *fixed]
+    starts = iter(list(nodes))
+    while True:
+        while line:
+            parent = line.pop(0)
+            for constraint in beside.get(parent, ()):
+                names = [end if isinstance(end, str) else WORLD for end in constraint.between]
+                child = names[1] if names[0] == parent else names[0]
+                if child in reached:
+                    continue
+                reached.add(child)
+                line.append(child)
+                nodes[child].parent, nodes[child].tie = parent, constraint
+                if parent in nodes:
+                    nodes[parent].children.append(child)
+        free = next((name for name in starts if name not in reached), None)
+        if free is None:
+            return
+        reached.add(free)  # a body that flies free, and what hangs from it
+        line.append(free)
+
+
+def _is_rod(scene: Scene, rod: Distance) -> bool:
+    """Whether a distance is a rod between centres at its rest length, so that hinges can stand for it."""
+    ends = [scene.body(end) for end in rod.between if isinstance(end, str)]
+    length = scene.length(rod)
+    return all(isinstance(body, Particle) for body in ends) and (
+        rod.rest_length is None or abs(rod.rest_length - length) <= 1e-14 * length
+    )
+
+
+def _plane_of_motion(scene: Scene) -> Array | None:
+    """The normal of the plane in which all particles stay, if there is one."""
+    if scene.forces:
+        return None
+    points = [b.position for b in scene.bodies]
+    points += [end for c in scene.constraints for end in c.between if not isinstance(end, str)]
+    spread = [np.subtract(p, points[0]) for p in points[1:]]
+    spread += [np.array(b.velocity) for b in scene.bodies] + [np.array(scene.gravity)]
+    _, sizes, axes = np.linalg.svd(np.array(spread))
+    if sizes[0] == 0.0 or (len(sizes) > 2 and sizes[2] > 1e-12 * sizes[0]):
+        return None
+    return np.asarray(axes[2])
+
+
+class _Writer:
+    def __init__(self, scene: Scene, nodes: dict[str, _Node], geom: str, equality: str) -> None:
+        self.scene, self.nodes, self.geom, self.equality = scene, nodes, geom, equality
+        self.normal = _plane_of_motion(scene)
+        self.tree = {node.tie.name: name for name, node in nodes.items() if node.tie is not None}
+        self.equalities: dict[str, tuple[int, ...]] = {}
+        self.equality_lines: list[str] = []
+        self.tendon_lines: list[str] = []
+        self.world_sites: list[str] = []
+        self.sites: dict[str, list[str]] = {name: [] for name in nodes}
+        materials = {
+            b.material.friction for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None
+        }
+        self.one_friction = len(materials) <= 1
+        if not self.one_friction and len(scene.bodies) > 50:
+            raise NotSupported("mujoco does not support surfaces of different friction in a large scene")
+
+    def write(self, option: str) -> Model:
+        for constraint in self.scene.constraints:
+            if constraint.name not in self.tree:
+                self._hold(constraint)
+        for force in self.scene.forces:
+            if isinstance(force, Spring):
+                self._spring(force)
+        lines: list[str] = []
+        for name, node in self.nodes.items():
+            if node.parent in (None, WORLD):
+                self._branch(name, lines)
+        contact = self._contacts()
+        flag = "" if self.scene.contacts else '<flag contact="disable"/>'
+        xml = "\n".join(
+            [
+                '<mujoco><compiler angle="radian" autolimits="true"/>',
+                f'<size memory="200M"/><option gravity={numbers(self.scene.gravity)} {option}>{flag}</option>',
+                "<worldbody>",
+                *self.world_sites,
+                *lines,
+                "</worldbody>",
+                f"<tendon>{''.join(self.tendon_lines)}</tendon>" if self.tendon_lines else "",
+                f"<equality>{''.join(self.equality_lines)}</equality>" if self.equality_lines else "",
+                f"<contact>{contact}</contact>" if contact else "",
+                "</mujoco>",
+            ]
+        )
+        points = tuple(b.name for b in self.scene.bodies if isinstance(b, Particle))
+        return Model(xml, self.tree, self.equalities, points)
+
+    def _branch(self, top: str, lines: list[str]) -> None:
+        """A body with all that hangs from it, without recursion: chains may be long."""
+        stack: list[tuple[str, bool]] = [(top, False)]
+        while stack:
+            name, closing = stack.pop()
+            if closing:
+                lines.append("</body>")
+                continue
+            lines.append(self._body(self.nodes[name]))
+            stack.append((name, True))
+            stack += [(child, False) for child in reversed(self.nodes[name].children)]
+
+    def _frame(self, name: str | None) -> tuple[Array, Array]:
+        """Where a body's frame is at the start."""
+        if name is None or name == WORLD:
+            return np.zeros(3), UPRIGHT
+        body = self.nodes[name].body
+        turn = UPRIGHT if isinstance(body, Particle) else np.array(body.orientation)
+        return np.array(body.position), turn
+
+    def _body(self, node: _Node) -> str:
+        body = node.body
+        place, turn = self._frame(body.name)
+        above, above_turn = self._frame(node.parent)
+        at, q = turned_back(above_turn, place - above), product(conjugate(above_turn), turn)
+        text = f"<body name={quoteattr(body.name)} pos={numbers(at)} quat={numbers(q)}>"
+        if not _fixed(body):
+            inertia = (POINT_INERTIA,) * 3 if isinstance(body, Particle) else body.inertia
+            assert inertia is not None and body.mass is not None
+            text += self._joints(node, place, turn)
+            text += f'<inertial pos="0 0 0" mass="{body.mass!r}" diaginertia={numbers(inertia)}/>'
+        if isinstance(body, RigidBody) and body.shape is not None:
+            text += self._geom(body)
+        return text + "".join(self.sites[body.name])
+
+    def _joints(self, node: _Node, place: Array, turn: Array) -> str:
+        if node.tie is None:
+            if isinstance(node.body, RigidBody):
+                return "<freejoint/>"
+            return "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
+        tie, second = node.tie, node.tie.between[1] == node.body.name
+        if isinstance(tie, Distance):
+            anchor = np.array(self.scene.anchor(tie, 0 if second else 1))
+            axes, kind, at = self._rod_axes(anchor - place), "hinge", anchor
+        else:
+            at = joint_point(self.scene, tie)
+            kind = "slide" if isinstance(tie, Prismatic) else "ball" if isinstance(tie, Ball) else "hinge"
+            if isinstance(tie, Lock):
+                return ""
+            if isinstance(tie, Ball):
+                axes = [np.array([0.0, 0.0, 1.0])]
+            elif isinstance(tie, Universal):
+                axes = [np.array(tie.axis), np.array(tie.cross_axis)]
+                axes = axes if second else axes[::-1]
+            else:
+                axes = [np.array(tie.axis)]
+        where = numbers(turned_back(turn, at - place))
+        return "".join(
+            f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))}/>' for axis in axes
+        )
+
+    def _rod_axes(self, rod: Array) -> list[Array]:
+        if self.normal is not None:
+            return [self.normal]
+        least = np.eye(3)[int(np.argmin(np.abs(rod)))]
+        one = np.cross(rod, least)
+        two = np.cross(rod, one)
+        return [one / np.linalg.norm(one), two / np.linalg.norm(two)]
+
+    def _geom(self, body: RigidBody) -> str:
+        assert body.shape is not None
+        kind, size, q = _surface(body.shape)
+        friction = body.material.friction
+        return (
+            f'<geom name={quoteattr(body.name)} type="{kind}" size={numbers(size)} quat={numbers(q)} mass="0" '
+            f'condim="{3 if friction else 1}" friction="{friction!r} 0 0" {self.geom}/>'
+        )
+
+    def _site(self, end: str | None, point: Array, name: str) -> str:
+        """A named point of a body, or of the world, given where it is at the start."""
+        place, turn = self._frame(end)
+        site = f"<site name={quoteattr(name)} pos={numbers(turned_back(turn, point - place))}/>"
+        (self.world_sites if end is None else self.sites[end]).append(site)
+        return name
+
+    def _tendon(self, constraint: Distance | Spring, points: list[Array], attributes: str) -> str:
+        sites = "".join(
+            f"<site site={quoteattr(self._site(end if isinstance(end, str) else None, point, f'{constraint.name}/{k}'))}/>"
+            for k, (end, point) in enumerate(zip(constraint.between, points, strict=True))
+        )
+        self.tendon_lines.append(f"<spatial name={quoteattr(constraint.name)} {attributes}>{sites}</spatial>")
+        return constraint.name
+
+    def _spring(self, spring: Spring) -> None:
+        points = [np.array(self.scene.body(e).position if isinstance(e, str) else e) for e in spring.between]
+        self._tendon(
+            spring,
+            points,
+            f'stiffness="{spring.stiffness!r}" damping="{spring.viscosity!r}" springlength="{spring.rest_length!r}"',
+        )
+
+    def _hold(self, constraint: Constraint) -> None:
+        """A constraint as equality constraints."""
+        if isinstance(constraint, Distance):
+            points = [np.array(self.scene.anchor(constraint, k)) for k in (0, 1)]
+            self._tendon(constraint, points, "")
+            longer = 0.0
+            if constraint.rest_length is not None:
+                longer = constraint.rest_length - math.dist(*points)
+            line = f'<tendon tendon1={quoteattr(constraint.name)} polycoef="{longer!r} 0 0 0 0" {self.equality}/>'
+            self._add(constraint, [line])
+            return
+        at = joint_point(self.scene, constraint)
+        if isinstance(constraint, Lock):
+            self._add(constraint, [self._weld(constraint, at)])
+        elif isinstance(constraint, Ball):
+            self._add(constraint, [self._connect(constraint, at)])
+        elif isinstance(constraint, Hinge):
+            arm = HALF_HINGE * np.array(constraint.axis)
+            self._add(constraint, [self._connect(constraint, at - arm), self._connect(constraint, at + arm)])
+        else:
+            raise NotSupported(
+                f"mujoco has no equality constraint for the {constraint.kind} {constraint.name!r}"
+            )
+
+    def _add(self, constraint: Constraint, lines: list[str]) -> None:
+        first = len(self.equality_lines)
+        self.equality_lines += lines
+        self.equalities[constraint.name] = tuple(range(first, first + len(lines)))
+
+    def _ends(self, joint: Joint) -> tuple[str, str, str]:
+        """The attributes of an equality's two bodies, and the one whose frame its anchor is in."""
+        one, two = joint.between
+        if one == WORLD or (_fixed(self.nodes[one].body) and two != WORLD):
+            one, two = two, one
+        second = "" if two == WORLD else f" body2={quoteattr(two)}"
+        return f"body1={quoteattr(one)}{second}", one, two
+
+    def _connect(self, joint: Joint, at: Array) -> str:
+        bodies, one, _ = self._ends(joint)
+        place, turn = self._frame(one)
+        return f"<connect {bodies} anchor={numbers(turned_back(turn, at - place))} {self.equality}/>"
+
+    def _weld(self, joint: Joint, at: Array) -> str:
+        bodies, _, two = self._ends(joint)
+        place, turn = self._frame(two)
+        return f"<weld {bodies} anchor={numbers(turned_back(turn, at - place))} {self.equality}/>"
+
+    def _contacts(self) -> str:
+        """Pairs that must not touch, and pairs whose friction is not the larger of two."""
+        if not self.scene.contacts:
+            return ""
+        solid = {b.name: b for b in self.scene.bodies if isinstance(b, RigidBody) and b.shape is not None}
+        apart = {frozenset(pair) for pair in self.scene.no_contact}
+        apart |= {frozenset(c.between) for c in self.scene.constraints if isinstance(c, Joint)}
+        pairs = [tuple(sorted(pair)) for pair in apart if len(pair) == 2 and all(n in solid for n in pair)]
+        text = "".join(f"<exclude body1={quoteattr(a)} body2={quoteattr(b)}/>" for a, b in sorted(pairs))
+        if self.one_friction:
+            return text
+        for (a, one), (b, two) in combinations(solid.items(), 2):
+            if frozenset((a, b)) in apart or (_fixed(one) and _fixed(two)):
+                continue
+            mu = math.sqrt(one.material.friction * two.material.friction)
+            text += (
+                f'<pair geom1={quoteattr(a)} geom2={quoteattr(b)} condim="{3 if mu else 1}" '
+                f'friction="{mu!r} {mu!r} 0 0 0" {self.geom}/>'
+            )
+        return text
+
+
+def _surface(shape: Shape) -> tuple[str, tuple[float, ...], Any]:
+    """MuJoCo's name, size and turn of a shape."""
+    if isinstance(shape, Sphere):
+        return "sphere", (shape.radius,), UPRIGHT
+    if isinstance(shape, Box):
+        return "box", tuple(0.5 * edge for edge in shape.size), UPRIGHT
+    if isinstance(shape, Capsule):
+        return "capsule", (shape.radius, 0.5 * shape.length), UPRIGHT
+    assert isinstance(shape, Plane)
+    x, y, z = shape.normal
+    q = np.array([1.0 + z, -y, x, 0.0]) if z > -1.0 + 1e-12 else np.array([0.0, 1.0, 0.0, 0.0])
+    return "plane", (0.0, 0.0, 1.0), q / np.linalg.norm(q)

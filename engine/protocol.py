@@ -1,0 +1,312 @@
+"""Other engines behind the same questions: what an adapter says of its engine, and how one is found by name.
+
+An adapter is one module in `engine/peers/`, or anywhere else, with an object `ENGINE` of the type `Adapter`.
+It says what its engine can do (`Capabilities`) and in which settings (`Configuration`), and records a
+trajectory; every observable and reduction is computed from that (`engine.recording`). Whatever an engine lacks
+is *not supported*, by name, decided from scene and observables before anything runs: never zero, never a crash.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from spook_tracker.engine.bodies import Particle, RigidBody
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.compiler import NOTHING
+from spook_tracker.engine.errors import EngineError, MethodError
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import (
+    ConstraintForce,
+    ContactCount,
+    ContactForce,
+    JointCoordinate,
+    Observable,
+    Penetration,
+    Quantity,
+    Violation,
+)
+from spook_tracker.engine.recording import Recording, needs_every_step, observed
+from spook_tracker.engine.result import Result
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Compound, Shape
+
+RIGID = 1e-8  # m/N or rad/(N m): a softer row is a spring, which an engine must be able to hold as such
+_FROM_ENGINE: tuple[type[Quantity], ...] = (ConstraintForce, ContactForce, ContactCount, Penetration)
+
+
+class NotSupported(EngineError):
+    """The engine cannot be asked this; the message names what it lacks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capabilities:
+    """What an engine can be asked. What is not listed is not supported."""
+
+    shapes: frozenset[type[Shape]] = frozenset()  # that can touch
+    joints: frozenset[type[Constraint]] = frozenset()
+    forces: frozenset[type[CentralGravity | Load | Spring]] = frozenset()
+    shows: frozenset[type[Quantity]] = (
+        frozenset()
+    )  # of ConstraintForce, ContactForce, ContactCount, Penetration
+    shows_force_of: frozenset[type[Constraint]] | None = None  # None: of every joint, if of any
+    compliance: bool = False  # rows of a stated stiffness
+    friction: bool = False
+    restitution: bool = False
+    motors: bool = False
+    limits: bool = False
+    springs: bool = False  # in a joint
+    loops: bool = True  # closed chains of joints
+    kinematic: bool = False
+    particles: bool = True
+    rigid_bodies: bool = True
+    reversible: bool = False  # a run with the velocities turned round comes back
+    deterministic: bool = True  # equal input, equal bits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Configuration:
+    """One natural and accurate way to run an engine, with the reason for it. The first one is its gate."""
+
+    name: str
+    reason: str
+    expected_order: float | None = None  # of accuracy on smooth scenes
+    options: Mapping[str, Any] = field(default_factory=dict)
+    lacks: tuple[str, ...] = ()  # fields of Capabilities this configuration has not
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What an adapter is asked to record."""
+
+    scene: Scene
+    time_step: float  # s
+    steps: int
+    every_step: bool  # else only the start and the end
+    configuration: Configuration
+    constraint_forces: bool  # whether they are wanted
+    contacts: bool  # whether contact forces, counts or depths are wanted
+    time_limit: float | None  # s of wall time
+
+
+@runtime_checkable
+class Adapter(Protocol):
+    """What a module behind the protocol offers as ENGINE."""
+
+    name: str
+    capabilities: Capabilities
+    configurations: tuple[Configuration, ...]
+
+    def build_info(self) -> BuildInfo:
+        """Name and version of the engine that is installed."""
+        ...
+
+    def record(self, task: Task) -> Recording:
+        """Run the task in the engine's own loop where it has one. May raise NotSupported."""
+        ...
+
+
+def unsupported(
+    capabilities: Capabilities, scene: Scene, observe: Mapping[str, Observable]
+) -> tuple[str, ...]:
+    """What the engine lacks for this question, by name, each once; empty if it can be asked."""
+    return tuple(
+        dict.fromkeys((*_of_scene(capabilities, scene), *_of_observables(capabilities, scene, observe)))
+    )
+
+
+def _of_scene(can: Capabilities, scene: Scene) -> Iterator[str]:
+    touching = scene.contacts and _may_touch(scene)
+    for body in scene.bodies:
+        if isinstance(body, Particle):
+            if not can.particles:
+                yield "particles"
+            continue
+        if not can.rigid_bodies:
+            yield "rigid bodies"
+        if body.motion == "kinematic" and not can.kinematic:
+            yield "kinematic bodies"
+        if touching and body.shape is not None:
+            yield from _of_surface(can, body)
+    for constraint in scene.constraints:
+        yield from _of_constraint(can, constraint)
+    if not can.loops and _has_loop(scene):
+        yield "closed loops of joints"
+    for force in scene.forces:
+        if type(force) not in can.forces:
+            yield f"the force {_words(type(force))}"
+
+
+def _may_touch(scene: Scene) -> bool:
+    solid = [b for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None]
+    return len(solid) > 1 and any(b.motion == "dynamic" for b in solid)
+
+
+def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
+    shapes = body.shape.parts if isinstance(body.shape, Compound) else (body.shape,)
+    if isinstance(body.shape, Compound) and Compound not in can.shapes:
+        yield "the shape compound"
+    for part in shapes:
+        kind = type(part) if isinstance(part, Shape) else type(part.shape)  # type: ignore[union-attr]
+        if kind not in can.shapes:
+            yield f"the shape {_words(kind)}"
+    if body.material.friction and not can.friction:
+        yield "friction"
+    if body.material.restitution and not can.restitution:
+        yield "restitution"
+    if (body.material.compliance > RIGID or body.material.slip_compliance) and not can.compliance:
+        yield "compliance of a surface"
+
+
+def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
+    if type(constraint) not in can.joints:
+        yield f"the joint {_words(type(constraint))}"
+    soft = constraint.compliance
+    if max(soft if isinstance(soft, tuple) else (soft,)) > RIGID and not can.compliance:
+        yield "compliance of a joint"
+    if isinstance(constraint, AxialJoint):
+        for name in ("motor", "limit", "spring"):
+            if getattr(constraint, name) is not None and not getattr(can, f"{name}s"):
+                yield f"a {name} in a joint"
+
+
+def _has_loop(scene: Scene) -> bool:
+    """Whether some body is reached from the world, or from another body, in two ways."""
+    group: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while group.setdefault(name, name) != name:
+            name = group[name]
+        return name
+
+    fixed = {body.name for body in scene.bodies if isinstance(body, RigidBody) and body.motion != "dynamic"}
+    for constraint in scene.constraints:
+        ends = [e if isinstance(e, str) and e not in fixed else "world" for e in constraint.between]
+        first, second = root(ends[0]), root(ends[1])
+        if first == second:
+            return True
+        group[first] = second
+    return False
+
+
+def _of_observables(can: Capabilities, scene: Scene, observe: Mapping[str, Observable]) -> Iterator[str]:
+    for what in observe.values():
+        asked = what.quantity
+        if isinstance(asked, _FROM_ENGINE) and type(asked) not in can.shows:
+            yield f"the observable {_words(type(asked))}"
+        elif isinstance(asked, ConstraintForce) and can.shows_force_of is not None:
+            kinds = [type(c) for c in scene.constraints if asked.constraint in (None, c.name)]
+            for kind in kinds:
+                if kind not in can.shows_force_of and (asked.constraint or kind is Distance):
+                    yield f"the force of the joint {_words(kind)}"
+        # A name the scene has not is a mistake of the test, not a lack of the engine.
+        if isinstance(asked, Violation | ConstraintForce) and asked.constraint is not None:
+            scene.constraint(asked.constraint)
+        if isinstance(asked, JointCoordinate):
+            scene.constraint(asked.joint)
+
+
+def _words(kind: type) -> str:
+    """JointCoordinate -> joint coordinate."""
+    return "".join(f" {c.lower()}" if c.isupper() else c for c in kind.__name__).strip()
+
+
+def run(
+    adapter: Adapter,
+    scene: Scene,
+    *,
+    time_step: float,
+    duration: float | None = None,
+    steps: int | None = None,
+    configuration: str = "",
+    method: Method = PLAIN,
+    observe: Mapping[str, Observable] = NOTHING,
+    time_limit: float | None = None,
+    time_stages: bool = False,
+) -> Result:
+    """Put one scene to another engine: `simulate` with a configuration of that engine ("" is its first).
+
+    `method` is how SPOOK would do it and says nothing to another engine. Raises NotSupported before anything runs.
+    """
+    del method, time_stages
+    if not (math.isfinite(time_step) and time_step > 0.0):
+        raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
+    if (duration is None) == (steps is None):
+        raise MethodError("give either a duration or a number of steps")
+    count = round(duration / time_step) if duration is not None else int(steps or 0)
+    chosen = configuration_of(adapter, configuration)
+    refuse_unsupported(adapter, chosen, scene, observe)
+    asked = [type(what.quantity) for what in observe.values()]
+    task = Task(
+        scene=scene,
+        time_step=float(time_step),
+        steps=count,
+        every_step=needs_every_step(observe, count),
+        configuration=chosen,
+        constraint_forces=ConstraintForce in asked,
+        contacts=not {ContactForce, ContactCount, Penetration}.isdisjoint(asked),
+        time_limit=time_limit,
+    )
+    return _result(task, adapter.record(task), observe)
+
+
+def configuration_of(adapter: Adapter, name: str) -> Configuration:
+    """The configuration of that name; "" is the first."""
+    for configuration in adapter.configurations:
+        if name in ("", configuration.name):
+            return configuration
+    known = ", ".join(configuration.name for configuration in adapter.configurations)
+    raise MethodError(f"engine {adapter.name!r} has no configuration {name!r}; it has {known}")
+
+
+def refuse_unsupported(
+    adapter: Adapter, configuration: Configuration, scene: Scene, observe: Mapping[str, Observable]
+) -> None:
+    """Raise NotSupported, naming everything the engine lacks for this question."""
+    absent: dict[str, Any] = {
+        name: frozenset() if isinstance(getattr(adapter.capabilities, name), frozenset) else False
+        for name in configuration.lacks
+    }
+    can = replace(adapter.capabilities, **absent) if absent else adapter.capabilities
+    lacking = unsupported(can, scene, observe)
+    if lacking:
+        raise NotSupported(f"{adapter.name} ({configuration.name}) does not support {', '.join(lacking)}")
+
+
+def _result(task: Task, recording: Recording, observe: Mapping[str, Observable]) -> Result:
+    values, times = observed(task.scene, recording, observe, task.time_step)
+    final = np.concatenate(
+        [
+            recording.positions[-1],
+            recording.orientations[-1],
+            recording.velocities[-1],
+            recording.angular_velocities[-1],
+        ],
+        axis=1,
+    )
+    status, failure = recording.status, recording.failure
+    if status == "completed" and not np.isfinite(final).all():
+        status, failure = "not_finite", f"a value is not finite after step {recording.steps}"
+    return Result(
+        status=status,
+        failure=failure,
+        failed_body=None,
+        failed_step=None if status == "completed" else recording.steps,
+        time_step=task.time_step,
+        steps=recording.steps,
+        seconds=recording.seconds,
+        observables=values,
+        sample_times=times,
+        final_state={body.name: row for body, row in zip(task.scene.bodies, final, strict=True)},
+        counters={"steps": recording.steps},
+        state_hash=hashlib.sha256(np.ascontiguousarray(final).tobytes()).hexdigest()[:16],
+        stages=(),
+        stage_seconds={"setup": recording.setup_seconds},
+    )

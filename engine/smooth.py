@@ -1,0 +1,93 @@
+"""What a method beyond plain SPOOK asks of a scene: smoothness, and rows that are held. Refusals, by name."""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.forces import Spring
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
+from spook_tracker.engine.method import Method
+from spook_tracker.engine.scene import Scene
+
+ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}  # of a composition, by name
+RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
+
+
+def check_smooth(scene: Scene, method: Method) -> None:
+    """Compositions go back and forth in time and hold rows rigidly: refuse what that cannot do."""
+    if method.solver == "iterative" or method.string_stiffness:
+        raise MethodError("method: a composition needs the direct solver, without string stiffness")
+    for force in scene.forces:
+        if isinstance(force, Spring) and force.viscosity > 0.0:
+            raise MethodError(
+                f"method: a composition goes back in time, where the viscosity of spring {force.name!r} explodes"
+            )
+    known = {body.name: body for body in scene.bodies}
+    for row in scene.constraints:
+        _check_held(row, scene.length(row, known) if isinstance(row, Distance) else 0.0)
+
+
+def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
+    """What rigid bodies cannot do beyond plain SPOOK; `touching`: whether surfaces may ever meet."""
+    composed = method.composition != "none"
+    wanted = (
+        f"composition {method.composition!r}"
+        if composed
+        else "half_step_velocities"
+        if method.half_step_velocities
+        else f"corrections={method.corrections}"
+        if method.corrections
+        else None
+    )
+    if wanted is None:
+        return
+    if touching:
+        raise MethodError(
+            f"method: {wanted} needs a smooth scene, but surfaces may touch here, and a contact that opens or closes "
+            f"within a step leaves order 1, that of the plain method; leave it out, or give Scene contacts=False"
+        )
+    if method.solver != "direct":
+        raise MethodError(f"method: {wanted} needs the direct solver")
+    for joint in scene.constraints:
+        drive = _bounded(joint)
+        if drive is not None:
+            raise MethodError(
+                f"method: {wanted} needs rows that never let go, but {joint.name!r} has {drive}; order 1 is the "
+                f"highest there: leave it out"
+            )
+    if composed:
+        check_smooth(scene, method)
+
+
+def _bounded(joint: Constraint) -> str | None:
+    if not isinstance(joint, AxialJoint):
+        return None
+    if joint.limit is not None and joint.limit.lower < joint.limit.upper:
+        return "a limit"
+    if joint.motor is not None and joint.motor.max_force is not None and math.isfinite(joint.motor.max_force):
+        return "a motor of bounded force"
+    return None
+
+
+def _check_held(row: Constraint, length: float) -> None:
+    """`length` [m] at the start, of a distance."""
+    held = row.compliance if isinstance(row.compliance, tuple) else (row.compliance,)
+    if max(held) > RIGID:
+        raise MethodError(
+            f"method: a composition holds rows rigidly, but {row.name!r} has a compliance of "
+            f"{max(held):g} m/N; make it {RIGID:g} at most, or a Spring"
+        )
+    if isinstance(row, AxialJoint):
+        for drive in ("motor", "limit", "spring"):
+            if getattr(row, drive) is not None:
+                raise MethodError(
+                    f"method: a composition holds rows rigidly, but the {drive} of {row.name!r} drives one; use "
+                    f"half_step_velocities, of order 2, there"
+                )
+    rest = row.rest_length if isinstance(row, Distance) else None
+    if rest is not None and abs(length - rest) > 1e-9 * rest:
+        raise MethodError(
+            f"method: a composition holds rows rigidly, but {row.name!r} starts {length:g} m long instead of "
+            f"its rest length of {rest:g} m"
+        )

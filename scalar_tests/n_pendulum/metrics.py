@@ -1,0 +1,264 @@
+"""The numbers asked of the chain that falls from the level: units, limits, set points and where they come from, configuration by configuration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from spook_tracker.engine import PLAIN
+from spook_tracker.scalar_tests.case import Configuration, Ladder, Measurement, Metric
+from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, TIME_STEP, TWO_SUBSTEPS
+from spook_tracker.scalar_tests.n_pendulum.measure import (
+    HALF_STEP,
+    HALF_STEP_CURVED,
+    LONG_COUNT,
+    ORDER_4,
+    ORDER_6,
+    ORDER_8,
+    curved_twice,
+    length_error,
+    long_chain,
+    long_chain_curved,
+    plain,
+    run,
+    small_oscillations,
+    tip_error,
+    two_substeps,
+)
+
+
+def _length(role: Any, limit: float, source: str, set_point: tuple[float, float], why: str) -> Metric:
+    return Metric(
+        name="length_deviation",
+        description="largest |length − 1 m| of any of the 26 links in 22 s",
+        unit="%",
+        role=role,
+        limit=limit,
+        limit_source=source,
+        set_point=set_point,
+        set_point_source=why,
+        reference=0.0,
+        relative_tolerance=1e-4,
+    )
+
+
+def _around(value: float, relative: float) -> tuple[float, float]:
+    return (value * (1.0 - relative), value * (1.0 + relative))
+
+
+PROTOTYPE = "the method's own discrete solution: the prototype tests/oracle_chain.py, written from the equations alone"
+
+
+def _energy_at_10_s(limit: float, source: str) -> Metric:
+    return Metric(
+        name="energy_at_10_s",
+        description="E − E₀ after 10 s, of the fall to hanging: negative is a loss",
+        unit="%",
+        role="companion",
+        better="larger",
+        limit=limit,
+        limit_source=source,
+        reference=0.0,
+        relative_tolerance=1e-5,
+    )
+
+
+ENERGY_AT_10_S = _energy_at_10_s(
+    -21.1,
+    "plain SPOOK's own discrete solution loses 21.08 % (tests/oracle_chain.py), and no remedy may cost more: projecting "
+    "positions meets every length limit and loses 79 %",
+)
+
+ENERGY_AT_10_S_LONG = _energy_at_10_s(
+    -0.27,
+    "a chain of 400 still falls: reading velocities half a step old, h √(g/(l (N + 1))) = 0.26 %, and no more",
+)
+
+
+def _energy_at_the_end(set_point: tuple[float, float] | None = None) -> Metric:
+    return Metric(
+        name="energy_at_the_end",
+        description="E − E₀ after 22 s, of the fall to hanging; in curved configurations chaos decides its digits",
+        unit="%",
+        role="reported",
+        better="larger",
+        set_point=set_point,
+        set_point_source="" if set_point is None else PROTOTYPE,
+        reference=0.0,
+        tolerance=0.0 if set_point else 20.0,
+        relative_tolerance=1e-5,
+    )
+
+
+def _energy_gain(limit: float, source: str) -> Metric:
+    return Metric(
+        name="energy_gain",
+        description="largest E − E₀ in 22 s, of the fall to hanging: all the thesis counts",
+        unit="%",
+        role="companion",
+        better="smaller",
+        limit=limit,
+        limit_source=source,
+        reference=0.0,
+        relative_tolerance=1e-3,
+    )
+
+
+MEASUREMENTS = (
+    Measurement(
+        configuration="curved twice",
+        time_step=TIME_STEP,
+        metrics=(
+            _length("gate", 16.0, "thesis, section 4.2", _around(9.9950497, 1e-5), PROTOTYPE),
+            ENERGY_AT_10_S,
+            _energy_at_the_end(),
+            _energy_gain(1.79, PROTOTYPE + ", 1.782 %"),
+        ),
+        measure=curved_twice,
+        parameters={"N": COUNT},
+        note="curved constraints, two extra back-substitutions",
+    ),
+    Measurement(
+        configuration="plain",
+        time_step=TIME_STEP,
+        metrics=(
+            _length("companion", 40.0, "Fig 3.27 reads 30 to 40 %", _around(34.483031, 1e-6), PROTOTYPE),
+            Metric(
+                name="length_deviation_early",
+                description="the same in the first 4 s",
+                unit="%",
+                role="companion",
+                limit=16.0,
+                limit_source="thesis, section 4.2, read as a run of a few seconds",
+                set_point=_around(12.164069, 1e-6),
+                set_point_source=PROTOTYPE,
+                reference=0.0,
+                relative_tolerance=1e-6,
+            ),
+            Metric(
+                name="weakest_link",
+                description="the link that stretches most, counted from the pivot",
+                unit="1",
+                role="reported",
+                better="inside",
+                set_point=(25.0, 25.0),
+                set_point_source="the last but one, as in Fig 3.26",
+            ),
+            ENERGY_AT_10_S,
+            _energy_at_the_end((-35.9, -35.8)),
+            _energy_gain(0.243, PROTOTYPE + ", 0.2425 %"),
+        ),
+        measure=plain,
+        parameters={"N": COUNT},
+        note="the SPOOK step as it stands",
+    ),
+    Measurement(
+        configuration="two substeps",
+        time_step=TIME_STEP,
+        metrics=(
+            _length("companion", 16.0, "thesis, section 4.2", _around(13.044435, 1e-6), PROTOTYPE),
+            ENERGY_AT_10_S,
+            _energy_at_the_end(),
+            _energy_gain(0.218, PROTOTYPE + ", 0.2176 %"),
+        ),
+        measure=two_substeps,
+        parameters={"N": COUNT},
+        note="plain SPOOK in two steps of 1/120 s",
+    ),
+    *(
+        Measurement(
+            configuration=name,
+            time_step=TIME_STEP,
+            metrics=(
+                _length(
+                    "companion",
+                    16.0,
+                    "thesis, section 4.2, for 26 spheres",
+                    _around(value, 1e-5),
+                    PROTOTYPE,
+                ),
+                ENERGY_AT_10_S_LONG,
+                _energy_at_the_end(),
+                _energy_gain(0.27, ENERGY_AT_10_S_LONG.limit_source),
+            ),
+            measure=measure,
+            parameters={"N": LONG_COUNT},
+            note="400 spheres, where the thesis' engine exploded beyond 100",
+        )
+        for name, value, measure in (
+            ("eight substeps", 6.2903214, long_chain),
+            ("eight substeps, curved", 0.69675903, long_chain_curved),
+        )
+    ),
+    Measurement(
+        configuration="small motion",
+        time_step=TIME_STEP,
+        metrics=(
+            Metric(
+                name="frequency_error",
+                description="squared frequency of each mode over (g/l) x_i, minus one: the largest of 26",
+                unit="1",
+                role="companion",
+                limit=1e-8,
+                limit_source="compliance 1e-13 m/N lets tension settle over some steps, 1e-9 of it",
+                reference=0.0,
+                tolerance=1e-9,
+            ),
+        ),
+        measure=small_oscillations,
+        parameters={"N": COUNT},
+        note="the hanging chain, each of its 26 modes started by itself",
+    ),
+)
+
+LADDERS = (
+    Ladder(
+        name="tip",
+        description="distance of the last sphere from the DOP853 reference at 2 s",
+        unit="m",
+        time_steps=tuple(1.0 / n for n in (20, 30, 60, 120, 240, 480, 960, 1920, 3840)),
+        configurations=(
+            Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 240)),
+            Configuration(
+                name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 3840, 1 / 240)
+            ),
+            Configuration(
+                name="half-step, curved twice",
+                method=HALF_STEP_CURVED,
+                expected_order=2.0,
+                order_range=(1 / 3840, 1 / 240),
+            ),
+            Configuration(name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)),
+            Configuration(name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 240, 1 / 60)),
+            Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 60, 1 / 20)),
+        ),
+        error=tip_error,
+        run=run,
+        target_error=0.01,
+        target_seconds=5e-3,
+    ),
+    Ladder(
+        name="length",
+        description="largest deviation of any link over 2 s",
+        unit="%",
+        time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
+        configurations=(
+            Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 960, 1 / 120)),
+            Configuration(
+                name="two substeps",
+                method=TWO_SUBSTEPS,
+                expected_order=2.0,
+                order_range=(1 / 960, 1 / 120),
+            ),
+            Configuration(
+                name="curved twice",
+                method=CURVED_TWICE,
+                expected_order=4.0,
+                order_range=(1 / 960, 1 / 120),
+            ),
+        ),
+        error=length_error,
+        run=run,
+        target_error=0.01,
+        target_seconds=1e-2,
+    ),
+)

@@ -1,0 +1,147 @@
+"""Other engines behind the protocol: what they lack is named before anything runs, and names find them."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from spook_tracker import engine
+from spook_tracker.engine import (
+    Box,
+    ConstraintForce,
+    ContactForce,
+    Distance,
+    Final,
+    Hinge,
+    Lock,
+    Material,
+    MethodError,
+    Motor,
+    Particle,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Spring,
+)
+from spook_tracker.engine.find import EngineMissing, Peer, find
+from spook_tracker.engine.protocol import Capabilities, NotSupported, run, unsupported
+from tests.stepping_engine import ENGINE
+
+WEIGHT = Particle(name="weight", mass=2.0, position=(1.0, 0.0, 0.0))
+ROD = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=0.0)
+FALL = Scene(bodies=(WEIGHT,), gravity=(0.0, 0.0, -10.0))
+PENDULUM = Scene(bodies=(WEIGHT,), constraints=(ROD,), gravity=(0.0, 0.0, -10.0))
+
+
+def box(name: str, **options: object) -> RigidBody:
+    return RigidBody(name=name, mass=1.0, shape=Box((1.0, 1.0, 1.0)), **options)  # type: ignore[arg-type]
+
+
+def test_an_adapter_answers_in_each_of_its_configurations() -> None:
+    observe = {"end": Final(quantity=Position("weight"))}
+
+    late = run(ENGINE, FALL, time_step=0.1, duration=2.0, observe=observe)
+    middle = run(ENGINE, FALL, time_step=0.1, steps=20, configuration="middle", observe=observe)
+
+    assert late["end"][2] == pytest.approx(-21.0, abs=1e-12)  # ½ g t² + ½ g t h
+    assert middle["end"][2] == pytest.approx(-20.0, abs=1e-12)
+    assert late.steps == 20
+    assert late.state_hash != middle.state_hash
+
+
+def test_an_unknown_configuration_is_answered_with_those_there_are() -> None:
+    with pytest.raises(MethodError, match="late, middle"):
+        run(ENGINE, FALL, time_step=0.1, steps=1, configuration="best")
+
+
+@pytest.mark.parametrize(
+    ("scene", "lack"),
+    [
+        (PENDULUM, "the joint distance"),
+        (
+            replace(FALL, forces=(Spring(name="s", between=((0, 0, 0), "weight"), stiffness=1.0),)),
+            "force spring",
+        ),
+        (replace(PENDULUM, constraints=(replace(ROD, compliance=1e-3),)), "compliance of a joint"),
+        (
+            Scene(
+                bodies=(
+                    RigidBody(name="floor", motion="static", position=(0, 0, 0), shape=Plane()),
+                    box("a", position=(0, 0, 1), material=Material(friction=0.5, restitution=0.5)),
+                )
+            ),
+            "the shape plane, the shape box, friction, restitution",
+        ),
+    ],
+)
+def test_what_is_lacking_is_named_before_anything_runs(scene: Scene, lack: str) -> None:
+    class Unrunnable(type(ENGINE)):  # type: ignore[misc]
+        def record(self, task: object) -> None:
+            raise AssertionError("it ran")
+
+    with pytest.raises(NotSupported, match=lack):
+        run(Unrunnable(), scene, time_step=0.1, steps=1)
+
+
+def test_motors_loops_and_forces_that_are_not_shown() -> None:
+    hinge = Hinge(name="axle", between=("world", "a"), motor=Motor(speed=1.0))
+    lock = Lock(name="lock", between=("world", "a"))
+    scene = Scene(bodies=(box("a", position=(0, 0, 0)),), constraints=(hinge, lock))
+    can = Capabilities(joints=frozenset({Hinge, Lock}), shows=frozenset({ConstraintForce}), loops=False)
+    observe = {"f": Final(quantity=ConstraintForce("lock")), "c": Final(quantity=ContactForce("a"))}
+
+    lacking = unsupported(replace(can, shows_force_of=frozenset({Hinge})), scene, observe)
+
+    assert lacking == (
+        "a motor in a joint",
+        "closed loops of joints",
+        "the force of the joint lock",
+        "the observable contact force",
+    )
+    assert unsupported(replace(can, motors=True, loops=True), scene, {"f": observe["f"]}) == ()
+
+
+def test_a_body_alone_or_without_contacts_needs_no_shape() -> None:
+    alone = Scene(bodies=(box("a", position=(0, 0, 0)),))
+    two = Scene(bodies=(box("a", position=(0, 0, 0)), box("b", position=(3, 0, 0))), contacts=False)
+
+    assert unsupported(Capabilities(), alone, {}) == ()
+    assert unsupported(Capabilities(), two, {}) == ()
+    assert unsupported(Capabilities(), replace(two, contacts=True), {}) == ("the shape box",)
+
+
+def test_ours_is_found_by_either_name_and_by_its_module() -> None:
+    assert find("spook") is find("engine") is find("spook_tracker.engine") is engine
+
+
+def test_an_adapter_is_found_by_module_and_by_attribute(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = find("tests.stepping_engine")
+
+    assert isinstance(found, Peer)
+    assert found.adapter is ENGINE
+    assert find("tests.stepping_engine:ENGINE").adapter is ENGINE
+    assert found.build_info.version == "1.2.3"
+
+
+def test_an_engine_in_the_folder_one_stands_in_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "engine_of_a_team.py").write_text("from tests.stepping_engine import ENGINE\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    assert find("engine_of_a_team").adapter is ENGINE
+
+
+def test_a_missing_engine_is_answered_with_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.delitem(sys.modules, "spook_tracker.engine.peers.mujoco", raising=False)
+
+    with pytest.raises(EngineMissing, match=r"pip install 'spook-tracker\[mujoco\]'"):
+        find("mujoco")
+    with pytest.raises(EngineMissing, match="name one of spook, mujoco"):
+        find("no_such_engine_anywhere")

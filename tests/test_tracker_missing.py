@@ -1,0 +1,76 @@
+"""Asked for and not answered is missing; a gate that left the catalogue is red until somebody accepts it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
+
+from spook_tracker.tracker.judge.accepted import Accepted, read_accepted
+from spook_tracker.tracker.judge.lane import elsewhere, line_of
+from spook_tracker.tracker.judge.tonight import tonight
+from spook_tracker.tracker.website.publish import publish
+from tests.synthetic_history import DocumentHistory, sample, series
+from tests.test_tracker_one_judge import night, one
+
+GATE = series("gone", "m", role="gate", limit=1.0)
+COMPANION = series("t", "n", role="companion", limit=1.0)
+
+
+def found(runs: list[Any], accepted: tuple[Accepted, ...] = ()) -> dict[str, tuple[str, bool, bool]]:
+    told = tonight(DocumentHistory(runs), runs[-1], accepted)
+    return {finding.series: (finding.verdict.word, finding.red, finding.news) for finding in told}
+
+
+def both(number: int) -> Any:
+    return night(number, [*one(0.5), (GATE, sample(GATE, 0.5)), (COMPANION, sample(COMPANION, 0.5))])
+
+
+def test_a_gate_that_left_the_catalogue_is_removed_and_red_until_it_is_accepted(tmp_path: Path) -> None:
+    runs = [both(0), night(1, one(0.5)), night(2, one(0.5))]
+
+    assert found(runs[:2])[GATE.key] == ("removed", True, True)
+    assert found(runs)[GATE.key] == ("removed", True, False)
+    publish(DocumentHistory(runs), tmp_path / "public")
+    events = json.loads((tmp_path / "public" / "data" / "regressions.json").read_text())
+    assert {(e["series"], e["name"]) for e in events} == {(GATE.key, "removed"), (COMPANION.key, "missing")}
+    entry = tmp_path / "accepted.toml"
+    entry.write_text('[[accepted]]\nseries = "gone/*"\nremoved = true\nwho = "me"\nwhy = "asked elsewhere"\n')
+    assert found(runs, read_accepted(entry))[GATE.key][1] is False
+
+
+def test_a_value_that_its_test_no_longer_gives_is_missing_that_night() -> None:
+    runs = [both(0), night(1, [*one(0.5), (GATE, sample(GATE, 0.5))]), both(2)]
+
+    assert found(runs[:2])[COMPANION.key] == ("missing", True, True)
+    assert found(runs)[COMPANION.key][:2] == ("identical", False)
+
+
+def test_a_run_of_some_tests_misses_nothing_of_the_others() -> None:
+    part = replace(night(1, [*one(0.5), (COMPANION, sample(COMPANION, 0.5))]), trigger="manual")
+
+    assert set(found([both(0), part])) == {COMPANION.key, one(0.5)[0][0].key}
+
+
+def _branched() -> list[Any]:
+    """Main 0, 1, 2, and a branch from 0."""
+    runs = [night(n, one(value)) for n, value in ((0, 0.5), (1, 0.25), (2, 0.25), (3, 0.5))]
+    fork = runs[0].engine.git_hash
+    return [*runs[:3], replace(runs[3], engine=replace(runs[3].engine, parents=(fork,)))]
+
+
+def test_a_branch_is_judged_against_its_fork_point() -> None:
+    runs = _branched()
+
+    assert [run.id for run in line_of(runs, runs[3])] == [runs[0].id, runs[3].id]
+    assert found(runs)[one(0.5)[0][0].key][:2] == ("identical", False)
+
+
+def test_where_a_way_back_breaks_off_the_order_of_commits_has_to_do() -> None:
+    runs = _branched()
+    lost = replace(runs[3], engine=replace(runs[3].engine, parents=("e" * 40,)))
+
+    assert elsewhere(runs[:3], lost) == set()
+    assert len(line_of([*runs[:3], lost], lost)) == 4

@@ -1,0 +1,240 @@
+"""The histories to be judged: of one line of runs, with the series that are made from others.
+
+Run times of a ladder become one series per configuration, exact work one per configuration and counter. Both
+are made here and nowhere else, so that whoever judges a history judges them, too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any, Protocol
+
+import msgspec
+
+from spook_tracker.tracker.document.run_document import (
+    MapData,
+    Point,
+    Run,
+    Sample,
+    SeriesDefinition,
+    SeriesHistory,
+)
+from spook_tracker.tracker.document.wording import instant
+from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
+
+RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings
+
+
+class Records(Protocol):
+    """What is read of a history (tracker.store.history.History)."""
+
+    def runs(self, engine: str | None = None) -> Sequence[Any]: ...
+    def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
+    def samples(self, run_id: str) -> Samples: ...
+    def maps(self, run_id: str) -> Sequence[MapData]: ...
+
+
+def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
+    """The runs of its engine that come before a run in commit order and on its own branch, and the run itself.
+
+    A build with local changes or without a commit has no place in that order: it stands in nobody's history,
+    unless none of the engine's runs has a place; then time orders them.
+    """
+    of_engine = [other for other in runs if other.engine.name == run.engine.name]
+    place = next(i for i, other in enumerate(of_engine) if other.id == run.id)
+    versioned = any(_placed(other) for other in of_engine)
+    before = [other for other in of_engine[:place] if _placed(other) or not versioned]
+    if run.engine.git_hash:
+        aside = elsewhere(before, run)
+        before = [other for other in before if other.engine.git_hash not in aside]
+    return [*before, of_engine[place]]
+
+
+def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
+    """Commits among these runs that lie on another branch than a run's commit, as far as parents tell.
+
+    From both commits back along measured parents: a commit is elsewhere if both ways meet and it is on one
+    of them only. Where a way breaks off at a commit nobody measured, the order of commits has to do.
+    """
+    parents = {other.engine.git_hash: other.engine.parents for other in (*runs, run)}
+
+    def back(commit: str) -> set[str]:
+        seen: set[str] = set()
+        ahead = [commit]
+        while ahead:
+            here = ahead.pop()
+            if here in parents and here not in seen:
+                seen.add(here)
+                ahead.extend(parents[here])
+        return seen
+
+    mine = back(run.engine.git_hash)
+    return {
+        commit
+        for commit in parents
+        if commit not in mine and run.engine.git_hash not in (way := back(commit)) and mine & way
+    }
+
+
+def lines(runs: Sequence[Any]) -> list[list[Any]]:
+    """One line of runs per engine, up to its newest; first the engine of the newest run that was not imported."""
+    if not runs:
+        return []
+    own = [run for run in runs if run.trigger != "import"] or runs
+    first = max(own, key=_started).engine.name
+    engines = sorted(dict.fromkeys(run.engine.name for run in runs), key=lambda name: name != first)
+    return [_line([run for run in runs if run.engine.name == name]) for name in engines]
+
+
+def _line(runs: Sequence[Any]) -> list[Any]:
+    """The runs with a place in the commit order, and the newest one whatever it was built from.
+
+    This is what `latest` and `previous` choose from on the command line.
+    """
+    newest = max(runs, key=_started)
+    versioned = any(_placed(run) for run in runs)
+    return [run for run in runs if _placed(run) or run is newest or not versioned]
+
+
+def _started(run: Any) -> datetime:
+    return instant(run.started) or datetime.min.replace(tzinfo=UTC)
+
+
+def _placed(run: Any) -> bool:
+    return bool(run.engine.git_hash) and not run.engine.dirty
+
+
+def histories(
+    records: Records, runs: Sequence[Run], keys: Iterable[str] | None = None
+) -> dict[str, SeriesHistory]:
+    """The histories of all series (or those named) over these runs, the made ones among them."""
+    place = {run.id: run for run in runs}
+    recent = {run.id: records.samples(run.id) for run in runs[-RECENT:]}
+    found: dict[str, SeriesHistory] = {}
+    for key, stored in records.series(keys, evidence=False).items():
+        points = []
+        for run, sample, version in stored.points:
+            if run.id in place:
+                evidence = recent.get(run.id, {}).get(key)
+                points.append(Point(place[run.id], evidence[1] if evidence else sample, version))
+        if points:
+            found[key] = SeriesHistory(stored.definition, tuple(points))
+    found = with_missing(found, runs[-RECENT:], recent)
+    tests = None if keys is None else {key.partition("/")[0] for key in keys}
+    return found | run_times(found) | work(runs[-RECENT:], recent, tests)
+
+
+def work(
+    runs: Sequence[Run], measured: Mapping[str, Samples], tests: set[str] | None
+) -> dict[str, SeriesHistory]:
+    """The histories of exact work of these tests (all if None): tracker/judge/work.py."""
+    points: dict[str, list[Point]] = {}
+    newest: dict[str, SeriesDefinition] = {}
+    for run in runs:
+        counted = {
+            key: pair
+            for key, pair in measured.get(run.id, {}).items()
+            if tests is None or key.partition("/")[0] in tests
+        }
+        for key, (definition, sample) in with_work(counted, run.engine).items():
+            if definition.kind == "work":
+                newest[key] = definition
+                points.setdefault(key, []).append(Point(run, sample, definition.test_version))
+    return {key: SeriesHistory(newest[key], tuple(found)) for key, found in points.items()}
+
+
+def with_missing(
+    found: Mapping[str, SeriesHistory], runs: Sequence[Run], measured: Mapping[str, Samples]
+) -> dict[str, SeriesHistory]:
+    """The histories with a point for every value that was asked for and not answered.
+
+    A run asks for every value of the tests it measures, of the families (values, sweep, stability) it measures;
+    a nightly asks for the whole catalogue, so that a gate whose test is gone is removed, not forgotten. What is
+    read off the clock is not missed: a machine may be too busy for it.
+    """
+    place = {run.id: i for i, run in enumerate(runs)}
+    asked = [_asked(measured.get(run.id, {})) for run in runs]
+    whole = [getattr(run, "trigger", "") == "nightly" for run in runs]
+    told = {}
+    for key, series in found.items():
+        definition = series.definition
+        if definition.kind in ("time", "work"):
+            told[key] = series
+            continue
+        points = list(series.points)
+        answered = {point.run.id for point in points}
+        first = place.get(points[0].run.id, -1)
+        for i in range(first + 1, len(runs)):
+            if runs[i].id in answered or runs[i].engine.name != points[0].run.engine.name:
+                continue
+            family = FAMILIES[definition.kind]
+            gone = definition.test not in asked[i].get(family, ())
+            if gone and not (whole[i] and definition.role == "gate" and asked[i].get(family)):
+                continue
+            why = "removed from the catalogue" if gone else "asked for and not answered"
+            lost = Sample(
+                series=key, value="nan", outcome="missing", passed=False, set_point_held=False, failure=why
+            )
+            points.append(Point(runs[i], lost, definition.test_version))
+        if len(points) > len(series.points):
+            order = {point.run.id: i for i, point in enumerate(series.points)}
+            points.sort(key=lambda p: (place.get(p.run.id, -1), order.get(p.run.id, -1)))
+        told[key] = SeriesHistory(definition, tuple(points))
+    return told
+
+
+def _asked(samples: Samples) -> dict[str, set[str]]:
+    """The tests a run measured, by family."""
+    asked: dict[str, set[str]] = {}
+    for definition, _ in samples.values():
+        asked.setdefault(FAMILIES[definition.kind], set()).add(definition.test)
+    return asked
+
+
+def run_times(found: Mapping[str, SeriesHistory]) -> dict[str, SeriesHistory]:
+    """One series of run time for each ladder configuration: the geometric mean over the rungs timed last.
+
+    Nights that did not time all of these rungs are left out: means over other rungs say nothing.
+    """
+    ladders: dict[str, list[SeriesHistory]] = {}
+    for series in found.values():
+        definition = series.definition
+        if definition.kind == "ladder" and any(p.sample.timing for p in series.points):
+            key = f"{definition.test}/{definition.configuration}/{definition.metric}:run-time"
+            ladders.setdefault(key, []).append(series)
+    return {key: _run_time(key, rungs) for key, rungs in ladders.items()}
+
+
+def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
+    timed = [[point for point in rung.points if point.sample.timing] for rung in rungs]
+    order: dict[str, int] = {}
+    for rung in sorted(rungs, key=lambda r: -len(r.points)):
+        for point in rung.points:
+            order.setdefault(point.run.id, len(order))
+    newest = max((points[-1].run.id for points in timed), key=order.__getitem__)
+    chosen = [points for points in timed if points[-1].run.id == newest]
+    by_run: dict[str, list[Point]] = {}
+    for points in chosen:
+        for point in points:
+            by_run.setdefault(point.run.id, []).append(point)
+    first = rungs[0].definition
+    definition = msgspec.structs.replace(
+        first, key=key, metric=f"{first.metric}:run-time", description=f"run time of {first.description}",
+        unit="s", kind="time", better="smaller", time_step=None, role="reported", limit=None, set_point=None,
+        reference=None,
+    )  # fmt: skip
+    told = []
+    for found in by_run.values():
+        if len(found) == len(chosen):
+            seconds = geometric_mean(min(p.sample.timing.seconds) for p in found if p.sample.timing)
+            sample = Sample(series=key, value=seconds, outcome="value", passed=True, set_point_held=True)
+            told.append(Point(found[0].run, sample, found[0].test_version))
+    return SeriesHistory(definition, tuple(sorted(told, key=lambda point: order[point.run.id])))
+
+
+def geometric_mean(values: Iterable[float]) -> float:
+    """The mean of logarithms, as a value."""
+    logs = [math.log(value) for value in values]
+    return math.exp(sum(logs) / len(logs))

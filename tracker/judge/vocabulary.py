@@ -1,0 +1,88 @@
+"""What things are called: every word a verdict may have, every class of a night, every name of an event.
+
+One table each, and no other place says these words. Commands, pages, feed, badge, JUnit and Markdown take from
+here the word, its mark, whether it is red and how bad it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Word = Literal[
+    "missing",
+    "removed",
+    "regressed",
+    "non_deterministic",
+    "accepted",
+    "expected",
+    "not_comparable",
+    "fixed",
+    "improved",
+    "changed",
+    "new",
+    "not_measured",
+    "same",
+    "identical",
+]
+Class = Literal["fail", "watch", "accepted", "none", "pass", "followed"]
+State = Literal["green", "detected", "accepted", "recovered", "suspected"]
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """How a word is shown."""
+
+    mark: str
+    red: bool = False  # somebody has to look
+    quiet: bool = False  # not worth a line among changes
+
+
+WORDS: dict[Word, Said] = {  # the worst first
+    "missing": Said("✗", red=True),
+    "removed": Said("✗", red=True),
+    "regressed": Said("✗", red=True),
+    "non_deterministic": Said("✗", red=True),
+    "accepted": Said("!"),
+    "expected": Said("!"),
+    "not_comparable": Said("?"),
+    "fixed": Said("✓"),
+    "improved": Said("✓"),
+    "changed": Said("·"),
+    "new": Said("·"),
+    "not_measured": Said("·", quiet=True),
+    "same": Said("=", quiet=True),
+    "identical": Said("=", quiet=True),
+}
+RED = frozenset(word for word, said in WORDS.items() if said.red)
+QUIET = frozenset(word for word, said in WORDS.items() if said.quiet)
+WORD_RANK = {word: rank for rank, word in enumerate(WORDS)}
+
+CLASSES: dict[Class, tuple[str, str, str]] = {  # the worst first: mark, word, what it means
+    "fail": ("✗", "FAIL", "a limit broken, or no value"),
+    "watch": ("!", "WATCH", "limits kept; a set point left, or worse than before"),
+    "accepted": ("!", "ACCEPTED", "worse, and accepted by somebody who says why"),
+    "none": ("·", "NO DATA", "not run"),
+    "pass": ("✓", "PASS", "every limit kept, every set point held"),
+    "followed": ("·", "FOLLOWED", "no expectation: only a change is told"),
+}
+CLASS_RANK = {name: rank for rank, name in enumerate(CLASSES)}
+CALLED_WORSE = {  # what a growth of badness is called, by the kind of series
+    "break_point": "less stable",
+    "ladder": "less accurate",
+    "order": "further from its order",
+    "time": "slower",
+    "work": "more work",
+}
+STATES: dict[State, str] = {
+    "green": "",
+    "detected": "✗ red",
+    "accepted": "! accepted",
+    "recovered": "✓ recovered",
+    "suspected": "? suspected",
+}
+
+
+def spaced(word: str) -> str:
+    """A word of a table as a reader wants it: not_comparable is "not comparable"."""
+    return word.replace("_", " ")

@@ -1,0 +1,159 @@
+"""What the command line does, as functions: measure, record, compare, judge, publish, and a whole night.
+
+>>> from spook_tracker import tracker
+>>> document = tracker.run(["pendulum"])                              # doctest: +SKIP
+>>> tracker.record(document, "sqlite:///tracker.db")                  # doctest: +SKIP
+>>> with tracker.History.open("sqlite:///tracker.db") as history:     # doctest: +SKIP
+...     tracker.compare(history, "previous", "latest").exit_code
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.comparison_document import CompareDocument
+from spook_tracker.tracker.judge.series_history import Told
+from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.store.history import History
+
+__all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish", "record", "run"]
+
+
+def run(
+    tests: Iterable[str] = (), *, watch: Callable[[Any], None] | None = None, **asked: Any
+) -> RunDocument:
+    """Put the questions (all, or those named) to the engine; nothing is recorded.
+
+    `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
+    tracker.measure.run.Questions (catalogue, engine, limit).
+    """
+    from spook_tracker.tracker.measure.run import Questions, Request
+    from spook_tracker.tracker.measure.run import run as measure
+
+    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit") if name in asked}
+    request = Request(tests=tuple(tests), **asked)
+    return measure(Questions(**where), request, watch or (lambda progress: None))
+
+
+def record(document: RunDocument, database: str) -> bool:
+    """Store a run; False if it was there already."""
+    from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.record import record as store
+
+    with session_on(database) as session:
+        return store(session, document)
+
+
+def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
+    """What changed between two versions, each named as on the command line."""
+    from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
+    from spook_tracker.tracker.judge.work import with_work
+
+    old, new = history.resolve(before), history.resolve(after)
+    earlier, later = (
+        ComparedRun(
+            side=side_of(run),
+            samples=with_work(history.samples(run.id), run.engine),
+            maps=history.maps(run.id),
+        )
+        for run in (old, new)
+    )
+    return compare_in(history, (old, earlier), (new, later), accepted)
+
+
+def judge(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
+    """What became of a recorded run, against everything measured before it; red first."""
+    from spook_tracker.tracker.judge.tonight import tonight
+
+    return tonight(history, history.resolve(run), accepted)
+
+
+def trend(
+    history: History, test: str, metric: str | None = None, accepted: Sequence[Accepted] = ()
+) -> list[Told]:
+    """The series of a test (or of a key), or of one of its metrics, every night judged; UnknownName if none."""
+    import difflib
+
+    from spook_tracker.tracker.document.errors import UnknownName
+    from spook_tracker.tracker.judge.lane import histories, lines
+    from spook_tracker.tracker.judge.series_history import judge_all
+
+    stem = test.removesuffix(":run-time")
+    keys = [key for key in history.series_keys() if key == test or key.startswith(f"{stem}/")]
+    if not keys:
+        near = difflib.get_close_matches(test, {key.partition("/")[0] for key in history.series_keys()}, n=3)
+        hint = f"did you mean {' or '.join(near)}?" if near else "`tracker db stats` shows what is recorded"
+        raise UnknownName(f"nothing is recorded of a test {test!r}; {hint}")
+    found: dict[str, SeriesHistory] = {}
+    for line in lines(history.runs()):
+        found = found or histories(history, line, keys)
+    if stem != test:
+        found = {key: series for key, series in found.items() if key == test}
+    if metric is not None:
+        known = sorted({s.definition.metric for s in found.values()})
+        found = {key: s for key, s in found.items() if s.definition.metric == metric}
+        if not found:
+            raise UnknownName(f"{test} has no metric {metric!r}; it has {', '.join(known)}")
+    return list(judge_all(found, accepted).values())
+
+
+def publish(history: History, out: Path, accepted: Sequence[Accepted] = ()) -> Any:
+    """Build the website in a folder; returns how many files were written (tracker.website.publish.Report)."""
+    from spook_tracker.tracker.website.publish import publish as build
+
+    return build(history, out, accepted)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NightlyReport:
+    """One night: what was measured, what became of it, and what was published."""
+
+    document: RunDocument
+    findings: list[Finding]
+    published: Any
+    notes: tuple[str, ...] = ()  # entries of accepted.toml that do nothing
+
+    @property
+    def red(self) -> bool:
+        """Whether somebody has to look: the judge decides, and nobody else."""
+        return any(finding.red for finding in self.findings)
+
+
+def nightly(
+    database: str,
+    out: Path,
+    *,
+    accepted: Sequence[Accepted] = (),
+    watch: Callable[[Any], None] | None = None,
+    tell: Callable[[Any], None] = lambda news: None,
+    **asked: Any,
+) -> NightlyReport:
+    """Measure everything, record it, judge it against the history, publish the website.
+
+    The database is opened first: no night is measured in vain. `tell` is called with the run document and
+    with the findings as soon as they are there. `asked` as for `run`.
+    """
+    from spook_tracker.tracker.judge.accepted import unused
+    from spook_tracker.tracker.judge.series_history import night_of
+    from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.record import record as store
+    from spook_tracker.tracker.store.retention import drop_old_figures
+
+    with session_on(database) as session:
+        document = run(watch=watch, trigger="nightly", **asked)
+        store(session, document)
+        tell(document)
+        history = History(session)
+        findings = judge(history, document.id, accepted)
+        tell(findings)
+        names = {finding.series for finding in findings} | set(history.series_keys())
+        notes = unused(accepted, names, night_of(history.run(document.id)))
+        drop_old_figures(session, history)  # once they have been compared
+    with History.open(database) as history:
+        published = publish(history, out, accepted)
+    return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

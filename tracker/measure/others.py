@@ -1,0 +1,87 @@
+"""Our questions put to an engine that has configurations of its own.
+
+A question is a metric at a time step with its parameters. It is asked once in each of the engine's
+configurations, whatever configuration of ours asks it first. What judges SPOOK's method goes: set points, the
+limits of companions, orders of accuracy. The limit of a gate is a fact about the world and stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from spook_tracker.engine.method import PLAIN
+from spook_tracker.engine.protocol import Configuration
+from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric, ScalarTest
+
+
+def asked_of(
+    tests: Mapping[str, ScalarTest], configurations: Sequence[Configuration], gating: bool
+) -> dict[str, ScalarTest]:
+    """The catalogue as another engine is asked it: no figures and no stability studies, they are SPOOK's."""
+    return {
+        name: replace(
+            test,
+            measurements=tuple(_measurements(test, configurations, gating)),
+            ladders=tuple(_ladder(ladder, one) for ladder in test.ladders for one in configurations),
+            figures=(),
+            stability=(),
+        )
+        for name, test in tests.items()
+    }
+
+
+def in_configuration(measure: Any, configuration: str, simulate: Any, *rest: Any) -> Any:
+    """Call a test's function with `simulate` bound to a configuration of the engine."""
+    return measure(partial(simulate, configuration=configuration), *rest)
+
+
+def _measurements(
+    test: ScalarTest, configurations: Sequence[Configuration], gating: bool
+) -> Iterator[Measurement]:
+    asked: set[tuple[object, ...]] = set()
+    for measurement in sorted(test.measurements, key=_after_gates):
+        fresh = []
+        for metric in measurement.metrics:
+            question = (metric.name, measurement.time_step, *sorted(measurement.parameters.items()))
+            if question not in asked:
+                asked.add(question)
+                fresh.append(metric)
+        if not fresh:
+            continue
+        for position, one in enumerate(configurations):
+            yield replace(
+                measurement,
+                configuration=one.name,
+                metrics=tuple(_metric(metric, gating and position == 0) for metric in fresh),
+                measure=partial(in_configuration, measurement.measure, one.name),
+                note=one.reason,
+            )
+
+
+def _after_gates(measurement: Measurement) -> bool:
+    return all(metric.role != "gate" for metric in measurement.metrics)
+
+
+def _metric(metric: Metric, gates: bool) -> Metric:
+    gate = metric.role == "gate"
+    return replace(
+        metric,
+        role="gate" if gate and gates else "reported",
+        limit=metric.limit if gate else None,
+        limit_source=metric.limit_source if gate else "",
+        set_point=None,
+        set_point_source="",
+    )
+
+
+def _ladder(ladder: Ladder, one: Configuration) -> Ladder:
+    return replace(
+        ladder,
+        configurations=(case.Configuration(name=one.name, method=PLAIN, expected_order=None),),
+        error=partial(in_configuration, ladder.error, one.name),
+        run=partial(in_configuration, ladder.run, one.name),
+    )
