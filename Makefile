@@ -5,14 +5,16 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help wasm three-scene nightly test check bench mutants package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
+	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
+	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
 	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
@@ -23,6 +25,8 @@ help:
 nightly: install
 	$(BIN)/tracker nightly --db $(DB) --out $(OUT)
 
+# Each worker has a core of its own: linear algebra with threads beside them only waits for them.
+test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	$(BIN)/pytest -q -n auto --dist loadfile
 
@@ -46,8 +50,14 @@ release:
 mutants: develop
 	$(BIN)/python bench/mutants.py
 
+mutation: develop
+	$(BIN)/python bench/mutation.py
+
 bench: develop
 	$(BIN)/python bench/run.py
+
+bench-heaps: develop
+	$(BIN)/python bench/bench_heaps.py
 
 # Where clang-19 and its WebAssembly libraries are; .ci/install-system gets them on Debian.
 wasm: develop

@@ -38,8 +38,24 @@ Role = Literal["gate", "companion", "reported"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """What is measured, whoever is asked: the question's own part of a metric.
+
+    `limit` is the printed or physical one, shown for every engine; None where only a method's own limit exists.
+    """
+
+    name: str
+    description: str
+    unit: str
+    better: Better
+    reference: float | None
+    limit: float | tuple[float, float] | None
+    limit_source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """One scalar of a test: a series over versions.
+    """One scalar of a test: a series over versions. A quantity, and what the SPOOK engine's configuration owes it.
 
     gate       decides green or red by `limit`
     companion  keeps the gate honest; its `limit` and `set_point` are ours
@@ -58,11 +74,27 @@ class Metric:
     better: Better = "smaller_magnitude"
     limit: float | tuple[float, float] | None = None
     limit_source: str = ""  # "thesis, section 3.5" or the derivation
+    every_engine: bool = (
+        False  # the limit is printed or physical; else it is what this method owes, and nobody else
+    )
     set_point: tuple[float, float] | None = None
     set_point_source: str = ""
     reference: float | None = None  # the right value, where one exists
     tolerance: float = 0.0
     relative_tolerance: float = 1e-9
+
+    @property
+    def quantity(self) -> Quantity:
+        """The part that any engine can be asked."""
+        return Quantity(
+            name=self.name,
+            description=self.description,
+            unit=self.unit,
+            better=self.better,
+            reference=self.reference,
+            limit=self.limit if self.every_engine else None,
+            limit_source=self.limit_source if self.every_engine else "",
+        )
 
     def passes(self, value: float) -> bool:
         """Whether the value keeps the limit; NaN and infinities never do. No limit: any finite value."""
@@ -102,6 +134,19 @@ class Measurement:
         default_factory=dict
     )  # what else makes it another series: N, mass
     note: str = ""  # what this configuration is, in one sentence
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """A question without a method: quantities of one scene at one time step, for any engine's own configurations.
+
+    `measure(simulate)` passes this engine's options on as `method`; another engine's `simulate` has its own instead.
+    """
+
+    time_step: float  # s
+    parameters: Mapping[str, float]
+    quantities: tuple[Quantity, ...]
+    measure: Callable[[Simulate], Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,6 +281,29 @@ class ScalarTest:
     stability: tuple[StabilityStudy, ...] = ()
     misprints: tuple[str, ...] = ()  # where a reader comparing with the thesis would stumble
     seven: bool = False  # one of the thesis' seven continuous tests
+
+    def questions(self) -> tuple[Asked, ...]:
+        """What is asked apart from how: each quantity once for every time step and parameters.
+
+        Our configurations ask the same more than once; the one that has a printed limit, or else stands first, counts.
+        """
+        seen: set[tuple[object, ...]] = set()
+        found = []
+        printed_first = sorted(self.measurements, key=lambda m: not any(q.every_engine for q in m.metrics))
+        for measurement in printed_first:
+            place = (measurement.time_step, *sorted(measurement.parameters.items()))
+            new = [metric.quantity for metric in measurement.metrics if (place, metric.name) not in seen]
+            seen.update((place, quantity.name) for quantity in new)
+            if new:
+                found.append(
+                    Asked(
+                        time_step=measurement.time_step,
+                        parameters=measurement.parameters,
+                        quantities=tuple(new),
+                        measure=measurement.measure,
+                    )
+                )
+        return tuple(found)
 
     def metrics(self) -> tuple[tuple[Measurement, Metric], ...]:
         """Every metric with the measurement it belongs to, gates first."""

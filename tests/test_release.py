@@ -144,7 +144,7 @@ def test_drift_against_a_release_end_to_end(clone: Clone) -> None:
     def night(error: float) -> subprocess.CompletedProcess[str]:
         parents = clone.git("rev-parse", "HEAD^")
         return clone.run(
-            sys.executable, "-m", "spook_tracker", "nightly", "--workers", "1", "--db", "history.db", "--out", "public",
+            sys.executable, "-m", "spook_tracker", "nightly", "--workers", "0", "--db", "history.db", "--out", "public",
             PYTHONPATH=str(ROOT / "tests"), TRACKER_ENGINE="toy_engine", TRACKER_CATALOGUE="toy_creep:CATALOGUE",
             TOY_VERSION=clone.version(), TOY_HASH=clone.git("rev-parse", "HEAD"), TOY_PARENT=parents,
             TOY_TIME=clone.git("log", "-1", "--format=%cI"), TOY_ERROR=repr(error), COLUMNS="160",

@@ -145,3 +145,50 @@ def test_every_figure_of_the_thesis_with_data_is_redrawn() -> None:
     }
 
     assert drawn == wanted
+
+
+@every_test
+def test_what_is_asked_does_not_depend_on_our_configurations(name: str, test: ScalarTest) -> None:
+    """Each quantity once for every time step and parameters; nothing of ours but the printed limit is in it."""
+    questions = test.questions()
+    asked = [
+        (question.time_step, *sorted(question.parameters.items()), quantity.name)
+        for question in questions
+        for quantity in question.quantities
+    ]
+    places = {
+        (measurement.time_step, *sorted(measurement.parameters.items()), metric.name)
+        for measurement, metric in test.metrics()
+    }
+
+    assert len(asked) == len(set(asked))
+    assert set(asked) == places
+    assert all(
+        quantity.limit is None or quantity.limit_source for q in questions for quantity in q.quantities
+    )
+
+
+def test_the_pendulum_is_asked_once_with_the_printed_limit_and_without_our_set_points() -> None:
+    (question,) = CATALOGUE["pendulum"].questions()
+    limits = {quantity.name: quantity.limit for quantity in question.quantities}
+
+    assert limits == {
+        "length_deviation": 0.004,
+        "energy_deviation": None,
+        "energy_at_the_end": None,
+        "tension_at_the_bottom": None,
+        "period_error": None,
+    }
+
+
+def test_printed_limits_are_for_every_engine() -> None:
+    gates = [
+        metric
+        for test in CATALOGUE.values()
+        if test.seven
+        for _, metric in test.metrics()
+        if metric.role == "gate"
+    ]
+
+    assert len(gates) >= 7
+    assert all(metric.every_engine for metric in gates)

@@ -57,7 +57,7 @@ def measure(monkeypatch: pytest.MonkeyPatch, *options: str, **toy: str) -> Resul
     with monkeypatch.context() as patch:
         for name, value in toy.items():
             patch.setenv(f"TOY_{name}", value)
-        return tracker("run", "--workers", "1", *options)
+        return tracker("run", "--workers", "0", *options)
 
 
 @pytest.fixture
@@ -308,12 +308,12 @@ def test_the_database_can_be_checked_copied_and_counted(two_versions):
 
 
 def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypatch):
-    first = tracker("nightly", "--workers", "1", "--out", "public")
+    first = tracker("nightly", "--workers", "0", "--out", "public")
     monkeypatch.setenv("TOY_HASH", BAD)
     monkeypatch.setenv("TOY_PARENT", GOOD)
     monkeypatch.setenv("TOY_VERSION", "1.1.0")
     monkeypatch.setenv("TOY_ERROR", "0.0005")  # inside limit and set point, but worse
-    second = tracker("nightly", "--quick", "--workers", "1", "--out", "public")
+    second = tracker("nightly", "--quick", "--workers", "0", "--out", "public")
 
     assert first.exit_code == 0
     assert Path("public/index.html").is_file()
@@ -332,7 +332,7 @@ def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypa
 
 def test_plain_letters_do_where_the_terminal_has_no_others(monkeypatch):
     done = subprocess.run(
-        [sys.executable, "-m", "spook_tracker", "run", "--no-record", "--workers", "1"],
+        [sys.executable, "-m", "spook_tracker", "run", "--no-record", "--workers", "0"],
         capture_output=True,
         check=False,
         env={

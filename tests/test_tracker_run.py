@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from spook_tracker.tracker.document.run_document import RunDocument, from_number
+from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.run import Questions, Request, RunError, ci_address, run
 
 SOURCE = Questions(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
@@ -20,7 +21,7 @@ def _toys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def alone(**options) -> RunDocument:
-    return run(SOURCE, Request(workers=1, **options))
+    return run(SOURCE, Request(workers=0, **options))
 
 
 def by_key(document: RunDocument):
@@ -84,6 +85,24 @@ def test_native_code_that_dies_loses_its_own_answers_only(monkeypatch):
     assert (sample.outcome, sample.failure) == ("crashed", "the engine's process died while answering")
 
 
+def test_whatever_hangs_is_timed_out_and_everything_else_is_answered(monkeypatch):
+    """Measurement, figure, ladder, study: each loses its own answer, and none changes its definition."""
+    asked = {"figures": True, "sweep": True, "stability": True, "repeats": 1}
+    healthy = alone(**asked)
+    monkeypatch.setenv("TOY_FAULT", "hang")
+    with monkeypatch.context() as quick:
+        quick.setattr(ladders, "timed_series", lambda *a: [])
+        quick.setattr(ladders, "saved_by_leaving_out", lambda *a: {})
+        document = run(SOURCE, Request(workers=4, time_limit=0.3, **asked))
+
+    samples = by_key(document)
+    assert {s.outcome for s in samples.values()} == {"timed_out"}
+    assert samples["fall/plain/position_error/h=0.01"].failure.startswith("no answer within 0.3 s")
+    assert document.figures[0].note.startswith("could not be drawn: no answer within")
+    versions = {s.key: s.test_version for s in healthy.series}
+    assert all(s.test_version == versions[s.key] for s in document.series if s.key in versions)
+
+
 def test_out_of_limit_keeps_its_value(monkeypatch):
     monkeypatch.setenv("TOY_ERROR", "-0.5")
     sample = by_key(alone())["fall/plain/position_error/h=0.01"]
@@ -136,7 +155,7 @@ def test_a_failed_rung_is_a_point_of_its_own_class(monkeypatch):
 
 def test_progress_names_every_test_once_it_is_finished():
     seen = []
-    run(SOURCE, Request(workers=1), watch=seen.append)
+    run(SOURCE, Request(workers=0), watch=seen.append)
 
     assert [(p.done, p.total) for p in seen] == [(1, 2), (2, 2)]
     assert [p.test for p in seen if p.finished] == ["fall", "stand"]

@@ -136,16 +136,22 @@ def nightly(
     """Measure everything, record it, judge it against the history, publish the website.
 
     The database is opened first: no night is measured in vain. `tell` is called with the run document and
-    with the findings as soon as they are there. `asked` as for `run`.
+    with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded as far as
+    it came (Interrupted says which run), neither judged nor published.
     """
     from spook_tracker.tracker.judge.accepted import unused
     from spook_tracker.tracker.judge.series_history import night_of
+    from spook_tracker.tracker.measure.run import Interrupted
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
 
     with session_on(database) as session:
-        document = run(watch=watch, trigger="nightly", **asked)
+        try:
+            document = run(watch=watch, trigger="nightly", **asked)
+        except Interrupted as ended:
+            ended.recorded = store(session, ended.document)
+            raise
         store(session, document)
         tell(document)
         history = History(session)

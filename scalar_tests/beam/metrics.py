@@ -25,6 +25,7 @@ def _deviation_metric(role: str, limit: float | None, source: str, set_point: fl
         role=role,  # type: ignore[arg-type]
         limit=limit,
         limit_source=source,
+        every_engine=source.startswith("thesis"),
         set_point=(-set_point, set_point),
         set_point_source="rigid locks leave rounding only: a few units in the last place of the height",
         reference=0.0,

@@ -38,6 +38,7 @@ def _length(role: Any, limit: float, source: str, value: float) -> Metric:
         role=role,
         limit=limit,
         limit_source=source,
+        every_engine=source.startswith("thesis"),
         set_point=_around(value, 1e-6 if value > 1e-4 else 1e-4),  # the smallest is rounding to seven digits
         set_point_source=PROTOTYPE,
         reference=0.0,

@@ -17,6 +17,8 @@ from typing import Literal, TextIO
 
 import click
 
+import spook_tracker.tracker.document.outside as outside
+
 PIPE_WIDTH = 120  # columns, where no terminal says otherwise
 PLAIN = str.maketrans(
     {
@@ -63,6 +65,7 @@ def is_terminal(stream: TextIO) -> bool:
 def say(text: str = "", err: bool = False) -> None:
     """Print, in plain letters where the stream's encoding has no others, without colour in a pipe."""
     stream = sys.stderr if err else sys.stdout
+    text = outside.inert(text)
     try:
         text.encode(stream.encoding or "utf-8")
     except (UnicodeEncodeError, LookupError):

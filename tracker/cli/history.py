@@ -65,11 +65,18 @@ def compare(
 
     levels = accepted_levels(accepted)
     with history_of(database) as history:
+        if form == "table" and {before, after} <= {run.engine.name for run in history.runs()}:
+            import spook_tracker.tracker.cli.rank as ranking
+
+            say("\n".join(ranking.table_lines(history, (before, after))))  # two engines: nobody regressed
+            return
         document = compared(history, before, after, levels)
     if form == "json":
         import msgspec
 
-        click.echo(msgspec.json.format(msgspec.json.encode(document), indent=1).decode())
+        import spook_tracker.tracker.document.outside as outside
+
+        click.echo(outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()))
     elif form == "junit":
         from spook_tracker.tracker.cli.report_junit import junit_of_comparison
 

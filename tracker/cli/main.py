@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+import spook_tracker.tracker.cli.rank as ranking
+import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -15,7 +17,10 @@ from spook_tracker.tracker.cli.options import (
     database_option,
     example,
     limit_option,
+    recorded,
+    refuse_unwritable,
     source_options,
+    terminated_is_interrupted,
     workers_option,
 )
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
@@ -82,6 +87,7 @@ def run_command(
     json_file: Path | None,
     junit_file: Path | None,
     workers: int,
+    time_limit: float,
     engine: str,
     limit: float | None,
     catalogue: str,
@@ -90,7 +96,10 @@ def run_command(
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
-    request = Request(tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers)
+    refuse_unwritable(json_file, junit_file)
+    request = Request(
+        tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
+    )
     names = engine.split(",")
     red = False
     for name in names:
@@ -130,6 +139,7 @@ def nightly(
     out: Path,
     quick: bool,
     workers: int,
+    time_limit: float,
     accepted: Path | None,
     json_file: Path | None,
     junit_file: Path | None,
@@ -143,10 +153,13 @@ def nightly(
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.website.folder import refuse_unusable
 
+    refuse_unwritable(json_file, junit_file)
+    refuse_unusable(out)
     first, *others = engine.split(",")
     for other in others:
-        asked = Request(sweep=not quick, workers=workers, trigger="nightly")
+        asked = Request(sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly")
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:
@@ -155,11 +168,12 @@ def nightly(
 
             say("\n".join(finding_lines(news, f"{out}/")))
             return
+        recorded(news.id)
         _print_run(news, everything=False)
         if json_file:
             _write(json_file, _json(news))
 
-    with watching("measuring") as step:
+    with watching("measuring") as step, terminated_is_interrupted():
         report = night(
             database,
             out,
@@ -173,6 +187,7 @@ def nightly(
             sweep=not quick,
             stability=not quick,
             workers=workers,
+            time_limit=time_limit,
         )
     for sentence in report.notes:
         say(f"note: {sentence}")
@@ -210,6 +225,35 @@ def publish(out: Path, accepted: Path | None, database: str) -> None:
         _say_published(build(history, out, accepted_levels(accepted)), out)
 
 
+@main.command(epilog=example("tracker report --pdf night.pdf"))
+@click.option("--pdf", type=click.Path(dir_okay=False, path_type=Path), help="Print the night as PDF (A4).")
+@click.option("--html", type=click.Path(dir_okay=False, path_type=Path), help="Write it as one HTML file.")
+@accepted_option
+@database_option
+def report(pdf: Path | None, html: Path | None, accepted: Path | None, database: str) -> None:
+    """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
+    import tempfile
+
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.website.printed import one_file, print_pdf
+
+    if pdf is None and html is None:
+        raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
+    with History.open(database) as history:
+        text = one_file(history, accepted_levels(accepted))
+    if html is not None:
+        _write(html, text)
+        say(f"wrote {html}")
+    if pdf is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            page = Path(folder) / "night.html"
+            page.write_text(text, encoding="utf-8")
+            print_pdf(page, pdf)
+        say(f"wrote {pdf}")
+
+
 @main.command(epilog=example("tracker serve public --port 8000"))
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option(
@@ -240,26 +284,45 @@ def serve(folder: Path, port: int) -> None:
             click.echo()
 
 
-for command in (compare, judge_command, trend, list_tests, show, explain, export, import_files, db, schema):
+for command in (
+    releases.backfill,
+    ranking.rank,
+    compare,
+    judge_command,
+    trend,
+    list_tests,
+    show,
+    explain,
+    export,
+    import_files,
+    db,
+    schema,
+):
     main.add_command(command)
 
 
 def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Questions, run
+    from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
     source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
     if database is None:
-        with watching("measuring") as step:
+        with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record
 
     with session_on(database) as session:
-        with watching("measuring") as step:
-            document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        try:
+            with watching("measuring") as step, terminated_is_interrupted():
+                document = run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
+        except Interrupted as ended:
+            record(session, ended.document)
+            ended.recorded = True
+            raise
         record(session, document)
+    recorded(document.id)
     return document
 
 
@@ -285,7 +348,9 @@ def _say_published(report: Any, out: Path) -> None:
 def _json(document: Any) -> str:
     import msgspec
 
-    return msgspec.json.format(msgspec.json.encode(document), indent=1).decode() + "\n"
+    import spook_tracker.tracker.document.outside as outside
+
+    return outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
 
 
 def _write(file: Path, text: str) -> None:

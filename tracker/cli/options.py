@@ -7,8 +7,11 @@ no data, unreadable database; 3 not comparable. Only click is imported here, so 
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -16,6 +19,7 @@ import click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+MOST = 600  # characters of a complaint
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
 
 
@@ -65,14 +69,26 @@ def limit_option(command: Command) -> Command:
 
 
 def workers_option(command: Command) -> Command:
-    """How many processes measure values; run times are always taken alone."""
-    return click.option(
-        "--workers",
-        default=2,
-        show_default=True,
-        type=click.IntRange(1, 256),
-        help="Processes that measure values.",
-    )(command)
+    """How many processes measure values, and how long one may take; run times are always taken alone."""
+    for option in (
+        click.option(
+            "--time-limit",
+            metavar="SECONDS",
+            default=1200.0,
+            show_default=True,
+            type=click.FloatRange(0.1, 1e6),
+            help="For one piece of work; what takes longer is ended and recorded as timed out.",
+        ),
+        click.option(
+            "--workers",
+            default=2,
+            show_default=True,
+            type=click.IntRange(0, 256),
+            help="Processes that measure values, each watched; 0: this one, where nothing can be ended.",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 ACCEPTED = "accepted.toml"
@@ -98,6 +114,7 @@ class OneLineErrors(click.Group):
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> NoReturn:
         options["standalone_mode"] = False
+        _recorded.clear()
         try:
             code = super().main(args, *rest, **options)
         except click.ClickException as error:
@@ -106,8 +123,10 @@ class OneLineErrors(click.Group):
             )
             complain(f"{error.format_message()} (see: {command} --help)")
             code = UNUSABLE
-        except (click.Abort, KeyboardInterrupt):
-            complain("interrupted; nothing of this command was recorded")
+        except (click.Abort, KeyboardInterrupt) as error:
+            kept = _recorded[-1] if _recorded else "nothing of this command was recorded"
+            ended = error.__cause__ or error  # click makes an Abort of every interruption
+            complain(str(ended) if getattr(ended, "recorded", False) else f"interrupted; {kept}")
             code = UNUSABLE
         except BrokenPipeError:
             sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - nobody reads any more
@@ -134,6 +153,50 @@ def _unusable(error: Exception) -> int:
     return UNUSABLE
 
 
+_recorded: list[str] = []  # what this command has recorded: an interruption after that must not deny it
+
+
+def recorded(run_id: str) -> None:
+    """Remember that a run is stored, whatever happens to the command from now on."""
+    _recorded.append(f"run {run_id} is recorded (see: tracker compare previous {run_id})")
+
+
+@contextmanager
+def terminated_is_interrupted() -> Iterator[None]:
+    """SIGTERM ends this the way Ctrl-C does: in order, with what is finished kept."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only there can signals be handled
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def refuse_unwritable(*files: Path | None) -> None:
+    """TrackerError if a file cannot be written: asked before anything is measured, not after."""
+    from spook_tracker.tracker.document.errors import TrackerError
+
+    for file in files:
+        if file is None:
+            continue
+        folder = file.absolute().parent
+        if file.is_dir():
+            raise TrackerError(f"{file} is a folder; name a file")
+        if not folder.is_dir():
+            raise TrackerError(f"the folder of {file} does not exist; make it first")
+        if not os.access(file if file.exists() else folder, os.W_OK):
+            raise TrackerError(f"{file} cannot be written; check its permissions")
+
+
 def complain(sentence: str) -> None:
-    """One line on standard error."""
-    click.echo("tracker: " + " ".join(sentence.split()), err=True)
+    """One line on standard error, which repeats only so much of what it was given."""
+    import spook_tracker.tracker.document.outside as outside
+
+    line = outside.clean(" ".join(sentence.split()))
+    click.echo("tracker: " + (line if len(line) <= MOST else f"{line[: MOST - 1]}…"), err=True)

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.cli.report_compare import red_line
 from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
@@ -18,8 +19,8 @@ ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def legal(text: str) -> str:
-    """Text that XML 1.0 can hold."""
-    return ILLEGAL.sub("\N{REPLACEMENT CHARACTER}", text)
+    """Text that XML 1.0 can hold, with nothing in it that cannot be seen."""
+    return ILLEGAL.sub("\N{REPLACEMENT CHARACTER}", outside.clean(text))
 
 
 def junit_of_run(run: RunDocument) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, sparkline, table, width
+from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.change_points import change_points
@@ -20,10 +20,10 @@ def trend_lines(told: Told, last: int = 10) -> list[str]:
     values = [j.night.value for j in judged]
     unit = "" if definition.unit in ("", "1") else f" {definition.unit}"
     lines = [
-        click.style(told.key, bold=True),
-        f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {limit(definition)})",
+        click.style(clean(told.key), bold=True),
+        f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {clean(limit(definition))})",
     ]
-    lines += [f"  {line}" for line in changes(definition, judged)]
+    lines += [f"  {clean(line)}" for line in changes(definition, judged)]
     rows = [
         (
             j.night.run.started[:10],

@@ -258,6 +258,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     figures: tuple[FigureData, ...] = ()
     maps: tuple[MapData, ...] = ()
     trajectories: tuple[Trajectory, ...] = ()
+    partial: bool = False  # interrupted: only what was finished by then
 
 
 class Run(Protocol):

@@ -8,17 +8,17 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-import unicodedata
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.document.run_document import EngineVersion, SeriesDefinition
 
+clean = outside.clean  # the website takes it from here
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")
 RESERVED = {"con", "prn", "aux", "nul", *(f"com{i}" for i in range(10)), *(f"lpt{i}" for i in range(10))}
 GITHUB_RUN = re.compile(r"(https://github\.com/[\w.-]+/[\w.-]+)/actions/runs/\d+")
-INVISIBLE = {"Cc", "Cf", "Cs", "Co"}  # control, format (direction overrides), surrogate, private use
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -131,16 +131,6 @@ def margin(definition: SeriesDefinition, value: float) -> Margin:
     if share < 1e-2:
         return Margin(f"{-math.log10(share):.1f} decades inside", share)
     return Margin(f"{number(100 * share, 3)} % of the limit", share)
-
-
-def clean(text: str) -> str:
-    """Text from outside with what cannot be seen made visible: control and direction characters."""
-    if text.isprintable():
-        return text
-    return "".join(
-        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(c) in INVISIBLE and c not in "\n\t" else c
-        for c in text
-    )
 
 
 def opening(text: str) -> str:

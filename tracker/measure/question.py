@@ -78,13 +78,25 @@ class Outcome:
     failure: str = ""
 
 
+class NoAnswer(Exception):
+    """Nobody will answer any more: the process was lost. `outcome` says how."""
+
+    def __init__(self, outcome: OutcomeClass, failure: str) -> None:
+        super().__init__(failure)
+        self.outcome = outcome
+
+
 def ask(question: Callable[[], Any]) -> Outcome:
     """Call a test's function; any exception becomes an outcome with one sentence."""
     try:
         return Outcome(question())
     except SimulationFailed as failure:
         status = failure.result.status
-        return Outcome(None, status if status != "completed" else "crashed", sentence(str(failure)))
+        if status == "completed" or status == "unsettled":  # both kept their values
+            return Outcome(None, "crashed", sentence(str(failure)))
+        return Outcome(None, status, sentence(str(failure)))
+    except NoAnswer as lost:
+        return Outcome(None, lost.outcome, str(lost))
     except NotSupported as lack:
         return Outcome(None, "not_supported", sentence(str(lack)))
     except ZeroDivisionError:
@@ -229,10 +241,15 @@ def draw(name: str, figure: Figure, simulate: Simulate) -> FigureData:
     )
 
 
-def study(name: str, test: ScalarTest, question: StabilityStudy, simulate: Simulate) -> Measured | MapData:
-    """A break point as a series of its own, or a map; a failed study is a break point that failed."""
+def study(
+    name: str, test: ScalarTest, question: StabilityStudy, simulate: Simulate, lost: Outcome | None = None
+) -> Measured | MapData:
+    """A break point as a series of its own, or a map; a failed study is a break point that failed.
+
+    `lost` is what came of asking elsewhere, where the process was lost: then nobody is asked here.
+    """
     witness = Witness(simulate)
-    answer = ask(lambda: question.study(witness))
+    answer = lost or ask(lambda: question.study(witness))
     found = answer.value
     if isinstance(found, StabilityMap):
         return _map(name, question, found)

@@ -1,7 +1,7 @@
 """Put every question of a catalogue to an engine and return the answers as one run document.
 
-Values come from a pool of processes, each test's work in pieces, so that one long question does not hold up
-the rest and a crash of native code costs one piece. Run times are taken afterwards, alone on the machine.
+Values come from several processes, each test's work in pieces, so that one long question does not hold up the
+rest, and a hang, a crash or greed for memory costs one piece. Run times are taken afterwards, alone on the machine.
 The catalogue and the engine are named as "module:attribute", so that every process can find them itself.
 """
 
@@ -10,20 +10,18 @@ from __future__ import annotations
 import difflib
 import importlib
 import os
-import signal
 import uuid
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from multiprocessing import get_context
 from typing import Any, Literal
+
+import msgspec
 
 import spook_tracker.tracker.measure.others as others
 import spook_tracker.tracker.measure.trajectory as motion
+import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
@@ -41,6 +39,7 @@ from spook_tracker.tracker.measure.cards import engine_version, test_card
 from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.question import (
     Measured,
+    NoAnswer,
     Outcome,
     Witness,
     draw,
@@ -53,7 +52,6 @@ from spook_tracker.tracker.measure.question import (
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
 PEER_TIME_LIMIT = 10.0  # s of wall time per simulation of an engine that is only shown
-CRASH = "the engine's process died while answering"
 
 
 class RunError(TrackerError):
@@ -78,6 +76,8 @@ class Questions:
             raise RunError(
                 f"there is no catalogue {self.catalogue!r} ({error}); name one as module:NAME"
             ) from None
+        if not isinstance(found, Mapping) or not all(isinstance(test, ScalarTest) for test in found.values()):
+            raise RunError(f"{self.catalogue!r} is no catalogue: a mapping from name to ScalarTest")
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
         return others.asked_of(found, configurations, engine.gating) if configurations else found
@@ -116,7 +116,9 @@ class Request:
     sweep: bool = False
     stability: bool = False
     trigger: Trigger = "manual"
-    workers: int = 2
+    workers: int = 2  # processes, each watched; 0: in this one, where nothing can be ended
+    time_limit: float = crew.Limits.seconds  # s for one piece of work
+    memory_limit: int = crew.Limits.memory  # bytes for one piece of work
     repeats: int = 5  # of each timing
 
 
@@ -158,37 +160,80 @@ def select(catalogue: Mapping[str, ScalarTest], names: Iterable[str]) -> dict[st
     return {name: test for name, test in catalogue.items() if not wanted or name in wanted}
 
 
+class Interrupted(KeyboardInterrupt):
+    """The run was interrupted. `document` holds the tests that were finished by then, as a partial run."""
+
+    def __init__(self, document: RunDocument, asked: int) -> None:
+        done = f"{len(document.tests)} of {asked} tests were finished"
+        super().__init__(f"interrupted; {done} and are recorded as partial run {document.id}")
+        self.document = document
+        self.asked = asked  # number of tests
+        self.recorded = False  # until somebody does
+
+
 def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
-    """Everything asked for at the engine's present version on this machine. Raises RunError only."""
+    """Everything asked for at the engine's present version on this machine.
+
+    RunError if it cannot be started; Interrupted, with what was finished, if the user or the system ends it.
+    """
     started = _now()
     tests = select(source.tests(), request.tests)
-    simulate, engine = source.simulate(), source.module()
-    version = engine_version(engine)
+    source.simulate()  # an engine without it is refused before anything is measured
+    version = engine_version(source.module())
     tasks = list(_tasks(tests, request))
-    parts = dict(_perform_all(source, tasks, tests, request.workers, watch))
+    parts: dict[int, tuple[Any, ...]] = {}
+    timed: Timed = ([], {})
+    try:
+        for task, part in _perform_all(source, tasks, tests, request, watch):
+            parts[task.position] = part
+        if request.sweep:
+            timed = _timed(source, request, tests, _errors(tasks, parts))
+    except KeyboardInterrupt:
+        unfinished = {task.test for task in tasks if task.position not in parts}
+        finished = {name: test for name, test in tests.items() if name not in unfinished}
+        if not finished:
+            raise
+        tasks = [task for task in tasks if task.test in finished]
+        document = _document(source, request, started, version, finished, tasks, parts, timed)
+        raise Interrupted(msgspec.structs.replace(document, partial=True), len(tests)) from None
+    return _document(source, request, started, version, tests, tasks, parts, timed)
+
+
+def _errors(tasks: Iterable[Task], parts: Mapping[int, tuple[Any, ...]]) -> Errors:
+    return {
+        (task.test, task.index[0], task.index[1]): parts[task.position][0]
+        for task in tasks
+        if task.kind == "ladder"
+    }
+
+
+def _document(
+    source: Questions,
+    request: Request,
+    started: str,
+    version: EngineVersion,
+    tests: Mapping[str, ScalarTest],
+    tasks: Iterable[Task],
+    parts: Mapping[int, tuple[Any, ...]],
+    timed: Timed,
+) -> RunDocument:
+    """The answers in the order of the questions, whatever order they came in."""
     measured: list[tuple[SeriesDefinition, Sample]] = []
     figures: list[FigureData] = []
     maps: list[MapData] = []
     trajectories: list[Trajectory] = []
-    errors: dict[tuple[str, int, int], ladders.ErrorPoints] = {}
-    for task in tasks:
-        for part in parts[task.position]:
-            if isinstance(part, FigureData):
-                figures.append(part)
-            elif isinstance(part, MapData):
-                maps.append(part)
-            elif isinstance(part, Trajectory):
-                trajectories.append(part)
-            elif isinstance(part, ladders.ErrorPoints):
-                errors[(task.test, task.index[0], task.index[1])] = part
-            else:
-                measured.extend(part)
-    saved: Mapping[str, Mapping[str, float]] = {}
-    if request.sweep:
-        measured += ladders.timed_series(tests, errors, simulate, request.repeats)
-        if not hasattr(engine, "configurations"):
-            saved = ladders.saved_by_leaving_out(tests, simulate)
+    for part in (part for task in tasks for part in parts[task.position]):
+        if isinstance(part, FigureData):
+            figures.append(part)
+        elif isinstance(part, MapData):
+            maps.append(part)
+        elif isinstance(part, Trajectory):
+            trajectories.append(part)
+        elif not isinstance(part, ladders.ErrorPoints):  # those are among the timed series
+            measured.extend(part)
+    measured += timed[0]
     _refuse_doubles(series.key for series, _ in measured)
+    engine = source.module()
     return RunDocument(
         schema_version=1,
         id=(identity := str(uuid.uuid4())),
@@ -200,7 +245,7 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
         ci_address=ci_address(os.environ),
         engine=version,
         machine=machine(),
-        tests=tuple(test_card(name, test, engine, saved.get(name, {})) for name, test in tests.items()),
+        tests=tuple(test_card(name, test, engine, timed[1].get(name, {})) for name, test in tests.items()),
         series=tuple(series for series, _ in measured),
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
@@ -249,89 +294,77 @@ def perform(source: Questions, task: Task) -> tuple[Any, ...]:
 
 
 def _perform_all(
-    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int, watch: Watch
-) -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """Results by position, as they come; a dead process loses only the piece that killed it."""
+    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Request, watch: Watch
+) -> Iterator[tuple[Task, tuple[Any, ...]]]:
+    """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer."""
     left = {name: sum(task.test == name for task in tasks) for name in tests}
-    for done, (task, parts) in enumerate(_answers(source, tasks, tests, workers), start=1):
+    found: Iterator[tuple[Task, Any]] = ((task, perform(source, task)) for task in tasks)
+    if request.workers:
+        limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
+        found = crew.answers(partial(perform, source), tasks, request.workers, limits)
+    for done, (task, parts) in enumerate(found, start=1):
+        if isinstance(parts, crew.Lost):
+            parts = _lost(task, tests[task.test], parts)
         left[task.test] -= 1
         bad = tuple(
             s.key for p in parts if isinstance(p, tuple) for s, m in p if not m.passed and s.role == "gate"
         )
         watch(Progress(done, len(tasks), task.test, left[task.test] == 0, bad))
-        yield task.position, parts
+        yield task, parts
 
 
-def _answers(
-    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], workers: int
-) -> Iterator[tuple[Task, tuple[Any, ...]]]:
-    if workers <= 1:
-        yield from ((task, perform(source, task)) for task in tasks)
-        return
-    waiting = list(tasks)
-    answered: set[int] = set()
-    with _pool(workers) as pool:
-        for task, parts in _gather(pool, source, waiting):
-            if parts is not None:
-                answered.add(task.position)
-                yield task, parts
-    for task in (task for task in waiting if task.position not in answered):
-        with _pool(1) as pool:  # alone, so that only the culprit is lost
-            ((_, parts),) = _gather(pool, source, [task])
-        yield task, parts if parts is not None else _crashed(task, tests[task.test])
+Errors = Mapping[tuple[str, int, int], ladders.ErrorPoints]
+Timed = tuple[list[tuple[SeriesDefinition, Sample]], Mapping[str, Mapping[str, float]]]
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(
-        max_workers=workers, mp_context=get_context("spawn"), initializer=_begin_quietly
-    )
+def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int]) -> Timed:
+    """Run times of every ladder, and what leaving stages out saves, in this process."""
+    names, errors, repeats = piece
+    tests, simulate = select(source.tests(), names), source.simulate()
+    timed = ladders.timed_series(tests, errors, simulate, repeats)
+    stages_can_be_forced = not hasattr(source.module(), "configurations")  # ours only
+    return timed, ladders.saved_by_leaving_out(tests, simulate) if stages_can_be_forced else {}
 
 
-def _begin_quietly() -> None:
-    """A worker says what it has to say in samples: no warnings on the terminal, no trace when interrupted."""
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _timed(source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors) -> Timed:
+    """Run times, taken by one process while no other works; without them if that one is lost."""
+    piece = (tuple(tests), errors, request.repeats)
+    if not request.workers:
+        return perform_timing(source, piece)
+    seconds = request.time_limit * max(1, sum(len(test.ladders) for test in tests.values()))
+    limits = crew.Limits(seconds=seconds, memory=request.memory_limit)
+    ((_, timed),) = crew.answers(partial(perform_timing, source), [piece], 1, limits)
+    if isinstance(timed, crew.Lost):
+        lost = timed
+
+        def gone(*arguments: Any, **options: Any) -> Any:
+            raise NoAnswer(lost.outcome, lost.failure)
+
+        return ladders.timed_series(tests, errors, gone, request.repeats), {}
+    found: Timed = timed
+    return found
 
 
-def _gather(
-    pool: Executor, source: Questions, tasks: Iterable[Task]
-) -> Iterator[tuple[Task, tuple[Any, ...] | None]]:
-    futures: dict[Future[tuple[Any, ...]], Task] = {}
-    try:
-        for task in tasks:
-            futures[pool.submit(perform, source, task)] = task
-    except BrokenProcessPool:
-        pass  # what was not submitted is asked again, alone
-    for future in as_completed(futures):
-        try:
-            yield futures[future], future.result()
-        except BrokenProcessPool:
-            yield futures[future], None
+def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> tuple[Any, ...]:
+    """What is recorded for a piece of work without an answer."""
 
+    def gone(*arguments: Any, **options: Any) -> Any:
+        raise NoAnswer(lost.outcome, lost.failure)
 
-def _crashed(task: Task, test: ScalarTest) -> tuple[Any, ...]:
-    """What is recorded for a piece of work that took its process down."""
     first = task.index[0]
+    outcome = Outcome(None, lost.outcome, lost.failure)
     if task.kind == "measure":
         measurement = test.measurements[first]
-        lost = []
-        for metric in measurement.metrics:
-            series = metric_series(task.test, test, measurement, metric)
-            outcome = Outcome(None, "crashed", CRASH)
-            lost.append((series, judged_sample(series.key, metric, outcome, Witness(_dead))))
-        return (tuple(lost),)
+        series = [(m, metric_series(task.test, test, measurement, m)) for m in measurement.metrics]
+        return (tuple((s, judged_sample(s.key, m, outcome, Witness(gone))) for m, s in series),)
     if task.kind == "figure":
-        return (draw(task.test, test.figures[first], _dead),)
+        return (draw(task.test, replace(test.figures[first], draw=gone), gone),)
     if task.kind == "trajectory":
         return ()
     if task.kind == "study":
-        return (study(task.test, test, test.stability[first], _dead),)
-    rungs = test.ladders[first]
-    return (ladders.error_points(rungs, rungs.configurations[task.index[1]], _dead),)
-
-
-def _dead(*arguments: Any, **options: Any) -> Any:
-    raise RuntimeError(CRASH)
+        return (study(task.test, test, test.stability[first], gone, outcome),)
+    rungs = replace(test.ladders[first], error=gone)
+    return (ladders.error_points(rungs, rungs.configurations[task.index[1]], gone),)
 
 
 def _refuse_doubles(keys: Iterable[str]) -> None:

@@ -136,9 +136,12 @@ class History:
         """The run as one document, equal to the one that was recorded."""
         run = self.run(run_id)
         stored = self._session.execute(
-            select(models.Run.idempotency_key, models.Run.schema_version, models.Run.series_list_id).where(
-                models.Run.key == run.key
-            )
+            select(
+                models.Run.idempotency_key,
+                models.Run.schema_version,
+                models.Run.series_list_id,
+                models.Run.partial,
+            ).where(models.Run.key == run.key)
         ).one()
         listed = self._session.execute(
             select(models.SeriesListItem.definition_id)
@@ -165,6 +168,7 @@ class History:
             figures=self.figures(run_id),
             maps=self.maps(run_id),
             trajectories=self.trajectories(run_id),
+            partial=stored.partial,
         )
 
     def _read_runs(self) -> tuple[RunInfo, ...]:

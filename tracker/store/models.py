@@ -231,6 +231,7 @@ class Run(Base):
     test_cards_id: Mapped[int] = _reference("test_cards.id", "wording of the tests")
     series_list_id: Mapped[int] = _reference("series_list.id", "definitions used")
     gates: Mapped[int] = mapped_column(BigInteger, comment="number of gate samples")
+    partial: Mapped[bool] = mapped_column(comment="interrupted: only what was finished by then")
     gates_passed: Mapped[int] = mapped_column(
         BigInteger, comment="gate samples inside their limit that night"
     )

@@ -83,6 +83,7 @@ def _store(session: Session, run: RunDocument) -> bool:
             "tracker_version": run.tracker_version,
             "ci_address": run.ci_address,
             "schema_version": run.schema_version,
+            "partial": run.partial,
             "engine_version_id": engine["id"],
             "machine_id": machine["id"],
             "test_cards_id": cards["id"],

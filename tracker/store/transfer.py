@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 from sqlalchemy.orm import Session
 
+import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
@@ -32,7 +33,8 @@ class Imported:
 
 def encoded(run: RunDocument) -> bytes:
     """The document as JSON, one line for each part, with a line feed at the end."""
-    return msgspec.json.format(msgspec.json.encode(checked(run)), indent=1) + b"\n"
+    text = msgspec.json.format(msgspec.json.encode(checked(run)), indent=1).decode()
+    return outside.escaped(text).encode() + b"\n"
 
 
 def write_document(run: RunDocument, path: Path) -> None:

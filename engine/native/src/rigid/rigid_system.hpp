@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
@@ -44,11 +45,13 @@ public:
     Health health() const;
     void save() {
         saved_share_ = redundant_.share();
-        saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_, saved_contacts_ = contacts_;
+        saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_;
+        if (contacts_) saved_contacts_ = contacts_->memory();
     }
     void restore() {
         redundant_.restore(matrix_, saved_share_);
-        live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_, contacts_ = saved_contacts_;
+        live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_;
+        if (contacts_) contacts_->remember(saved_contacts_);
     }
     /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
     std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
@@ -57,6 +60,14 @@ public:
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
     void count(RunReport& report, std::int64_t steps) const;
+    /// The first step with a solve that left its rows further from their law than the method allows, the body it
+    /// concerns, and the largest such residual of the run.
+    struct Unsettled {
+        int body = -1;
+        std::int64_t step = 0;  // of h, counted from 1
+        double residual = 0.0;  // m/s
+    };
+    const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
 
     // What can be observed:
@@ -90,6 +101,8 @@ private:
         int too_fast = -1;      // the first body that turned too fast
         int not_solved = -1;    // a body of a system that could not be factored
         int contradicted = -1;  // a body held by rows that cannot hold together
+        std::int64_t step = 0;  // steps of h done
+        Unsettled unsettled;
         // Velocities at mid-step:
         bool velocity_ready = false;         // the velocities of the coming step are found already
         LargeArray<BodyMomenta> before;      // those of the step before
@@ -137,7 +150,8 @@ private:
     void fill_momenta(bool forces);
     void fill_rows();
     void impact();
-    void take_velocities(bool angular_too);
+    void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
+    void note_unsettled(int body, double residual);
     void solve_block();
     struct
         Worst {  // row residual, its block, and the largest speed that rows and forces ask for, m/s or rad/s
@@ -155,14 +169,17 @@ private:
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
     Vec3 place(const End& end) const noexcept { return end.body < 0 ? end.point : position_of(end.body); }
+    double share(int body) const noexcept { return share_.empty() ? 1.0 : share_[body]; }
     const double* jacobian(int block, bool second) const noexcept {
         return const_cast<RigidSystem*>(this)->jacobian(block, second);
     }
     Vec3 kick(int body) const noexcept {  // change of velocity by forces in a step
         Vec3 dv = h_ * acceleration_[body];
         if (!force_.empty()) dv += (h_ / constants_[body].mass) * force_[body];
-        return dv;
+        return share_.empty() ? dv : share_[body] * dv;
     }
+    Vec3 twist(int body) const noexcept { return share(body) * h_ * constants_[body].torque; }
+    void lead_events();
 
     // The scene.
     StageList stages_;
@@ -201,7 +218,9 @@ private:
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_, saved_mixed_;
     PivotSolver pivot_;
-    std::optional<ContactStage> contacts_, fresh_contacts_, saved_contacts_;
+    std::optional<ContactStage> contacts_, fresh_contacts_;
+    ContactStage::Memory saved_contacts_;
+    std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
     double residual_ = 0.0;  // largest an iterative solve stopped at, m/s

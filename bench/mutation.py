@@ -1,0 +1,128 @@
+"""`make mutation`: change the judge's rules one at a time, and see that its tests notice; prints the score.
+
+Each mutant is a copy of the sources with one text replaced. It is killed if the tests of the judge fail, and it
+survives if they pass: then a rule stands in the code that nobody holds to. `python bench/mutation.py NAME …`
+runs only those named. Ends with 1 if one survives, or no longer applies.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+JUDGE = "tracker/judge"
+TESTS = (
+    "tests/test_judge_rules.py", "tests/test_tracker_verdict.py", "tests/test_tracker_noise.py",
+    "tests/test_tracker_compare.py", "tests/test_tracker_analyse.py", "tests/test_tracker_accepted.py",
+)  # fmt: skip
+RUN = "import sys; sys.path[:0] = sys.argv[1:3]; import pytest; sys.exit(pytest.main(sys.argv[3:]))"
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One rule changed."""
+
+    name: str
+    file: str
+    old: str  # occurs once
+    new: str
+
+
+def mutant(name: str, file: str, old: str, new: str) -> Mutant:
+    return Mutant(name, f"{JUDGE}/{file}.py", old, new)
+
+
+MUTANTS = (
+    mutant("three-sigmas", "noise", "SIGMAS = 4.0", "SIGMAS = 3.0"),
+    mutant("short-window", "noise", "WINDOW = 30 ", "WINDOW = 8 "),
+    mutant("long-window", "noise", "WINDOW = 30 ", "WINDOW = 60 "),
+    mutant("noise-times-level", "noise", "for value in finite) / abs(level)", "for value in finite) * abs(level)"),
+    mutant("no-floor", "noise", "max(FLOOR, SIGMAS * noise)", "SIGMAS * noise"),
+    mutant("low-floor", "noise", "FLOOR = 0.05", "FLOOR = 0.03"),
+    mutant("noise-from-four", "noise", "FEWEST = 5", "FEWEST = 4"),
+    mutant("lenient-start", "noise", "FEW_NIGHTS_FLOOR = 0.5", "FEW_NIGHTS_FLOOR = 0.6"),
+    mutant("one-night-confirms", "noise", "len(suspects) > 1 or", "len(suspects) > 0 or"),
+    mutant("no-normal", "noise", "NORMAL = 1.4826", "NORMAL = 1.0"),
+    mutant("larger-is-not-better", "noise", "return -change if larger_is_better else change", "return change"),
+    mutant("no-creep", "noise", "if change <= threshold:\n        return None", "return None"),
+    mutant("bounded-is-growing", "verdict", '"bounded": 1, "growing": 2', '"bounded": 1, "growing": 1'),
+    mutant("unknown-cell-is-best", "verdict", "CELL_RANK.get(cell, len(CELL_RANK))", "CELL_RANK.get(cell, 0)"),
+    mutant("diverged-is-not-finite", "verdict", '"diverged": 3,\n    "crashed"', '"diverged": 2,\n    "crashed"'),
+    mutant("timed-out-is-not-finite", "verdict", '"timed_out": 3', '"timed_out": 2'),
+    mutant("missing-is-crashed", "verdict", '"missing": 4', '"missing": 3'),
+    mutant("out-of-limit-is-value", "verdict", '"out_of_limit": 1', '"out_of_limit": 0'),
+    mutant("deep-inside-is-shallow", "verdict", "DEEP_INSIDE = 1e-3", "DEEP_INSIDE = 1e-1"),
+    mutant("zero-may-go-far", "verdict", "EXACT_ZERO = 1e-6", "EXACT_ZERO = 1e-3"),
+    mutant("missing-is-fine", "vocabulary", '"missing": Said("✗", red=True)', '"missing": Said("✗")'),
+    mutant("contradiction-is-fine", "vocabulary", '"non_deterministic": Said("✗", red=True)', '"non_deterministic": Said("✗")'),
+    mutant("dirty-is-clean", "compare", 'clean = before.git_hash != "" and not before.dirty and not after.dirty', 'clean = before.git_hash != ""'),
+    mutant("any-commit-is-the-same", "compare", "return clean and (before.engine", "return clean or (before.engine"),
+    mutant("history-dirty-is-clean", "series_history", 'clean = old.git_hash != "" and not old.dirty and not new.dirty', 'clean = old.git_hash != ""'),
+    mutant("history-any-commit-is-the-same", "series_history", "return clean and (old.name", "return clean or (old.name"),
+)  # fmt: skip
+
+
+def applied(found: Mutant, text: str) -> str:
+    """The text with the rule changed; ValueError if it is not there exactly once."""
+    if text.count(found.old) != 1:
+        raise ValueError(
+            f"{found.name}: {found.old!r} is in {found.file} {text.count(found.old)} times, not once"
+        )
+    return text.replace(found.old, found.new)
+
+
+def copied(folder: Path) -> None:
+    """The sources and tests, with the engine that is built."""
+    from spook_tracker.engine import _core
+
+    only = shutil.ignore_patterns("native", "__pycache__", "*.so")
+    for name in ("engine", "scalar_tests", "tracker", "migrations", "site", "tests"):
+        shutil.copytree(ROOT / name, folder / name, ignore=only)
+    shutil.copytree(ROOT / "spook_tracker", folder / "spook_tracker", symlinks=True)
+    shutil.copy(str(_core.__file__), folder / "engine")
+    shutil.copy(ROOT / "pyproject.toml", folder)
+
+
+def killed(found: Mutant | None) -> bool:
+    """Whether the judge's tests fail for this mutant. None: the sources as they are."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copied(folder)
+        if found is not None:
+            file = folder / found.file
+            file.write_text(applied(found, file.read_text()))
+        tests = [test for test in TESTS if (folder / test).is_file()]
+        arguments = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]
+        command = [sys.executable, "-S", "-B", "-c", RUN, name, sysconfig.get_path("purelib"), *arguments]
+        environment = os.environ | {"HYPOTHESIS_STORAGE_DIRECTORY": name}
+        done = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
+        if done.returncode not in (0, 1):
+            raise RuntimeError(done.stdout[-2000:] + done.stderr[-2000:])
+        return done.returncode == 1
+
+
+def main(names: list[str]) -> int:
+    chosen = [found for found in MUTANTS if not names or found.name in names]
+    if killed(None):
+        print("the tests fail without any change; nothing can be said")
+        return 1
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        results = list(pool.map(killed, chosen))
+    for found, dead in zip(chosen, results, strict=True):
+        print(f"{'killed  ' if dead else 'SURVIVED'}  {found.name:32} {found.file}")
+    print(f"\n{sum(results)} of {len(results)} mutants killed")
+    return 0 if all(results) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

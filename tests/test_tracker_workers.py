@@ -1,0 +1,132 @@
+"""Workers are watched: a hang, a death, greed for memory cost one piece; nothing outlives its supervisor."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import spook_tracker.tracker.measure.workers as crew
+
+ROOT = Path(__file__).resolve().parents[1]
+SOON = 60.0  # s: what takes longer hangs, on a machine however busy
+
+
+def work(piece: str) -> str:
+    """What a worker does with a piece: its name says what happens."""
+    if piece.startswith("hang"):
+        while True:  # in Python, where no watchdog of the engine sees it
+            pass
+    if piece.startswith("die"):
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if piece.startswith("hog"):
+        return str(len(bytearray(64 << 30)))
+    if piece.startswith("raise"):
+        raise ValueError(piece)
+    return piece.upper()
+
+
+def told(pieces: list[str], workers: int = 2, **limits: float) -> dict[str, object]:
+    return dict(crew.answers(work, pieces, workers, crew.Limits(**limits)))
+
+
+def test_every_piece_is_answered_once():
+    pieces = [f"piece {n}" for n in range(20)]
+
+    assert told(pieces) == {piece: piece.upper() for piece in pieces}
+    assert told([]) == {}
+
+
+def test_who_hangs_dies_or_is_greedy_costs_its_own_piece():
+    found = told(["a", "hang", "b", "die", "c", "hog", "d"], seconds=1.0)
+
+    assert {piece: answer for piece, answer in found.items() if isinstance(answer, str)} == {
+        "a": "A", "b": "B", "c": "C", "d": "D"
+    }  # fmt: skip
+    assert found["hang"] == crew.Lost("timed_out", "no answer within 1 s, so its process was ended")
+    assert found["die"] == crew.Lost("crashed", "the engine's process died while answering")
+    assert found["hog"] == crew.Lost("crashed", "the piece of work ran out of memory")
+
+
+def test_an_error_of_ours_is_raised_and_ends_everything():
+    with pytest.raises(ValueError, match="raise it"):
+        told(["raise it", "hang"])
+
+
+def children(of: int) -> set[int]:
+    found = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(of)], capture_output=True, text=True, check=False
+    )
+    return {int(word) for word in found.stdout.split()}
+
+
+def alive(pids: set[int]) -> set[int]:
+    """Those that run: a zombie has ended and waits to be counted."""
+    states = {}
+    for pid in pids:
+        try:
+            states[pid] = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            states[pid] = "gone"
+    return {pid for pid, state in states.items() if state not in ("gone", "Z", "X")}
+
+
+def until(condition, limit: float = SOON) -> bool:
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_leaving_early_ends_the_workers():
+    told(["a"])
+    before = children(os.getpid())  # the one that Python keeps to count what processes share
+    asked = crew.answers(work, ["a", "hang", "hang on"], 2, crew.Limits())
+    next(asked)
+    working = alive(children(os.getpid()) - before)
+
+    asked.close()
+
+    assert working
+    assert not alive(working)
+
+
+HANGING = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import spook_tracker.tracker.measure.workers as crew
+from tests.test_tracker_workers import work
+if __name__ == "__main__":
+    for answer in crew.answers(work, ["a", "b", "hang", "hang on"], 2, crew.Limits()):
+        print(answer, flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_nobody_outlives_a_supervisor_that_is_killed(how: signal.Signals, tmp_path: Path):
+    program = tmp_path / "hanging.py"
+    program.write_text(HANGING)
+    process = subprocess.Popen(
+        [sys.executable, str(program), str(ROOT)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert process.stdout is not None
+    with process.stdout:
+        process.stdout.readline(), process.stdout.readline()  # both workers are at work, or about to
+        assert until(lambda: len(children(process.pid)) >= 2)
+        family = children(process.pid)
+
+        process.send_signal(how)
+        process.wait(timeout=SOON)
+
+    assert until(lambda: not alive(family)), "workers are left behind"

@@ -1,0 +1,47 @@
+"""Text from outside on its way out: to terminals, to the logs of CI services, into JSON.
+
+Names, units and failure texts come from other people's files. What a terminal or a log would obey instead of
+showing is made visible; in JSON it is written as an escape, so that nothing is lost.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+INVISIBLE = {"Cc", "Cf", "Cs", "Co"}  # control, format (direction overrides), surrogate, private use
+UNSEEN = re.compile(
+    "[\x7f-\x9f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f]"
+)
+COLOUR = re.compile("(\x1b\\[(?:0|1|2|3[0-7]|9[0-7])m)")  # what we write ourselves
+COMMAND = re.compile(r"(?m)^((?:\s|\x1b\[\d+m)*)(?=::|##\[)")  # a line that a CI service would run
+
+
+def clean(text: str) -> str:
+    """Text from outside with what cannot be seen made visible: control and direction characters."""
+    if text.isprintable():
+        return text
+    return "".join(
+        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(c) in INVISIBLE and c not in "\n\t" else c
+        for c in text
+    )
+
+
+def inert(text: str) -> str:
+    """Lines that a terminal only shows and no CI service runs; our own colours stay."""
+    if not text.isprintable():
+        text = "".join(part if COLOUR.fullmatch(part) else clean(part) for part in COLOUR.split(text))
+    return COMMAND.sub("\\1\N{REPLACEMENT CHARACTER}", text)
+
+
+def escaped(json: str) -> str:
+    """The same JSON, with characters that cannot be seen as escapes: a reader of the file is not misled."""
+
+    def escape(found: re.Match[str]) -> str:
+        code = ord(found[0])
+        if code < 0x10000:
+            return f"\\u{code:04x}"
+        code -= 0x10000
+        return f"\\u{0xD800 + (code >> 10):04x}\\u{0xDC00 + (code & 0x3FF):04x}"
+
+    return UNSEEN.sub(escape, json)

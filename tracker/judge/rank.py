@@ -1,0 +1,122 @@
+"""Engines beside each other on the same questions: nothing is red, somebody is ahead.
+
+Read from the ladders: an engine's error at h = 1/60 and the run time it needs for a given error, each in the
+configuration that does it best. Run times of different machines are not set against each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from spook_tracker.tracker.document.order import time_at_error
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, from_number
+
+ERRORS = (1e-2, 1e-4, 1e-6)
+STEP = 1.0 / 60.0  # s
+Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
+Rungs = list[tuple[SeriesDefinition, Sample]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """One engine on one scene. A `configuration` of "" means that none gave a value."""
+
+    test: str
+    ladder: str
+    unit: str
+    engine: str
+    error: float | None  # magnitude at h = 1/60, the best configuration
+    configuration: str
+    seconds: tuple[float | None, ...]  # to reach each of ERRORS, the best configuration
+    outcome: str  # "value", or what became of the rung at h = 1/60 in every configuration
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lead:
+    """Who reaches an error sooner, and by what factor; where only one reaches it, the factor is infinite."""
+
+    test: str
+    ladder: str
+    error: float
+    unit: str
+    ahead: str
+    factor: float
+
+
+def standings(engines: Mapping[str, Samples]) -> list[Standing]:
+    """Every engine on every ladder that at least one of them was asked, scene by scene."""
+    groups = {name: _ladders(samples) for name, samples in engines.items()}
+    places = dict.fromkeys(place for found in groups.values() for place in found)
+    return [
+        _standing(place, name, found.get(place, {})) for place in places for name, found in groups.items()
+    ]
+
+
+def leads(found: Sequence[Standing], before: str, after: str) -> list[Lead]:
+    """Two engines at equal error: scene by scene, who is ahead and by what factor."""
+    by_place: dict[tuple[str, str], dict[str, Standing]] = {}
+    for one in found:
+        by_place.setdefault((one.test, one.ladder), {})[one.engine] = one
+    told: list[Lead] = []
+    for (test, ladder), pair in by_place.items():
+        if before not in pair or after not in pair:
+            continue
+        for error, first, second in zip(ERRORS, pair[before].seconds, pair[after].seconds, strict=True):
+            if first is None and second is None:
+                continue
+            unit = pair[before].unit
+            mine, theirs = (math.inf if t is None else t for t in (first, second))
+            ahead, factor = (before, theirs / mine) if mine <= theirs else (after, mine / theirs)
+            told.append(Lead(test=test, ladder=ladder, error=error, unit=unit, ahead=ahead, factor=factor))
+    return told
+
+
+def _ladders(samples: Samples) -> dict[tuple[str, str, str], dict[str, Rungs]]:
+    """(test, ladder, unit) -> configuration -> rungs."""
+    found: dict[tuple[str, str, str], dict[str, Rungs]] = {}
+    for definition, sample in samples.values():
+        if definition.kind == "ladder" and definition.time_step is not None:
+            place = (definition.test, definition.metric.split(":")[1], definition.unit)
+            found.setdefault(place, {}).setdefault(definition.configuration, []).append((definition, sample))
+    return found
+
+
+def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[str, Rungs]) -> Standing:
+    test, ladder, unit = place
+    best, chosen, outcomes = math.inf, "", []
+    for name, rungs in configurations.items():
+        for definition, sample in rungs:
+            assert definition.time_step is not None
+            if not math.isclose(definition.time_step, STEP, rel_tol=1e-9):
+                continue
+            outcomes.append(sample.outcome)
+            if sample.outcome == "value" and abs(from_number(sample.value)) < best:
+                best, chosen = abs(from_number(sample.value)), name
+    outcome = "value" if chosen else (outcomes[0] if outcomes else "not asked")
+    return Standing(
+        test=test,
+        ladder=ladder,
+        unit=unit,
+        engine=engine,
+        error=best if chosen else None,
+        configuration=chosen,
+        seconds=tuple(_soonest(configurations, error) for error in ERRORS),
+        outcome=outcome,
+    )
+
+
+def _soonest(configurations: Mapping[str, Rungs], error: float) -> float | None:
+    """Least run time at which some configuration reaches the error."""
+    times = []
+    for rungs in configurations.values():
+        timed = [
+            (min(sample.timing.seconds), abs(from_number(sample.value)))
+            for _, sample in rungs
+            if sample.outcome == "value" and sample.timing is not None and sample.timing.seconds
+        ]
+        reached = time_at_error([t for t, _ in timed], [e for _, e in timed], error)
+        if reached is not None and math.isfinite(reached):
+            times.append(reached)
+    return min(times, default=None)

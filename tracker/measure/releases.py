@@ -1,0 +1,126 @@
+"""Released versions of another engine, each in a folder of its own, asked the same questions.
+
+A release is installed beside this environment, not into it: `pip install --target` into a folder that comes
+first on the path of the process that measures. What a release needs of others is taken from here, unless it
+does not start with it; then it gets a NumPy of its own time.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from spook_tracker.engine.find import EXTRAS
+from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.run_document import RunDocument
+
+OLD_NUMPY = "numpy<2"
+INSTALL_LIMIT, START_LIMIT = 600.0, 120.0  # s
+
+
+class ReleaseError(TrackerError):
+    """Releases cannot be listed or installed; one sentence that names what to do."""
+
+
+def released(engine: str) -> tuple[str, ...]:
+    """The versions pip can install here, oldest first."""
+    package = _package(engine)
+    done = _pip("index", "versions", package)
+    found = re.search(r"Available versions: (.+)", done.stdout)
+    if done.returncode or not found:
+        raise ReleaseError(f"pip finds no versions of {package}: {_last(done.stderr)}")
+    return tuple(reversed([version.strip() for version in found[1].split(",")]))
+
+
+def choose(known: Sequence[str], wanted: Sequence[str], newest: int | None) -> tuple[str, ...]:
+    """Those asked for, in release order; all if none is named. Raises ReleaseError for an unknown one."""
+    for version in wanted:
+        if version not in known:
+            raise ReleaseError(f"there is no release {version!r} to install here; the newest is {known[-1]}")
+    chosen = [version for version in known if version in wanted] if wanted else list(known)
+    return tuple(chosen[-newest:] if newest else chosen)
+
+
+def install(engine: str, version: str, folder: Path) -> Path:
+    """The folder that holds the release; what is there already is used again. Raises ReleaseError."""
+    place = folder / f"{engine}-{version}"
+    if (place / "works").exists():
+        return place
+    package = f"{_package(engine)}=={version}"
+    for extra in ((), (OLD_NUMPY,)):
+        done = _pip(
+            "install",
+            "--target",
+            str(place),
+            "--upgrade",
+            "--no-deps",
+            "--only-binary",
+            ":all:",
+            package,
+            *extra,
+        )
+        if done.returncode:
+            raise ReleaseError(f"{package} cannot be installed: {_last(done.stderr)}")
+        started = _python(place, "-c", f"from spook_tracker.engine.find import find; find({engine!r})")
+        if started.returncode == 0:
+            (place / "works").touch()
+            return place
+    raise ReleaseError(f"{package} is installed but does not start: {_last(started.stderr)}")
+
+
+def measure_release(
+    engine: str, place: Path, tests: Sequence[str], limit: float | None, catalogue: str, workers: int
+) -> RunDocument:
+    """One run of a release, measured in a process that sees it first. Raises ReleaseError."""
+    file = place / "run.json"
+    file.unlink(missing_ok=True)
+    asked = ["run", *tests, "--engine", engine, "--catalogue", catalogue, "--no-record", "--json", str(file)]
+    asked += ["--workers", str(workers), *([] if limit is None else ["--limit", str(limit)])]
+    done = _python(place, "-m", "spook_tracker", *asked, limit=None)
+    if not file.exists():
+        raise ReleaseError(f"{place.name} could not be measured: {_last(done.stderr)}")
+    return msgspec.json.decode(file.read_bytes(), type=RunDocument)
+
+
+def _package(engine: str) -> str:
+    if engine not in EXTRAS:
+        raise ReleaseError(
+            f"releases of {engine!r} are not known; engines with releases: {', '.join(EXTRAS)}"
+        )
+    return EXTRAS[engine]
+
+
+def _pip(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *arguments]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=INSTALL_LIMIT)
+    except subprocess.TimeoutExpired:
+        raise ReleaseError(f"pip took longer than {INSTALL_LIMIT:g} s for {arguments[-1]}") from None
+
+
+def _python(
+    place: Path, *arguments: str, limit: float | None = START_LIMIT
+) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([str(place), *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        return subprocess.run(
+            [sys.executable, *arguments],
+            env={**os.environ, "PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            timeout=limit,
+        )
+    except subprocess.TimeoutExpired:
+        raise ReleaseError(f"{place.name} did not start within {START_LIMIT:g} s") from None
+
+
+def _last(text: str) -> str:
+    """The last line a program said before it gave up."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return lines[-1][:200] if lines else "it said nothing"

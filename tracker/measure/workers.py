@@ -1,0 +1,181 @@
+"""Processes that do pieces of work, each watched: whoever hangs, dies or takes too much memory costs its piece.
+
+A worker has one piece at a time and a pipe of its own, so it is always known whose piece is lost. Nothing
+outlives the supervisor: leaving `answers` by whatever way kills every worker at once, and a worker whose
+supervisor is gone (killed, even) ends itself.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import connection as waiting
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, Generic, Literal, TypeVar
+
+START_LIMIT = 120.0  # s in which a new process has read its program, on a machine however busy
+DIED = "the engine's process died while answering"
+
+Piece = TypeVar("Piece")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What one piece of work may take."""
+
+    seconds: float = 1200.0  # of wall time
+    memory: int = 4 << 30  # bytes more than the process has at its start; 0: no limit
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A piece without an answer: how it ended, and one sentence."""
+
+    outcome: Literal["crashed", "timed_out"]
+    failure: str
+
+
+def answers(
+    perform: Callable[[Piece], Any], pieces: Sequence[Piece], workers: int, limits: Limits
+) -> Iterator[tuple[Piece, Any]]:
+    """Every piece with what `perform` made of it, or Lost, as they come. What `perform` raises is raised.
+
+    `perform` and the pieces are sent to processes, so both must be picklable; `workers` is at least 1.
+    """
+    left = deque(pieces)
+    crew: list[_Worker[Piece]] = []
+    try:
+        while left or crew:
+            while left and len(crew) < workers:
+                crew.append(_Worker(perform, limits))
+                crew[-1].give(left.popleft())
+            soonest = min(worker.deadline for worker in crew) - time.monotonic()
+            waiting.wait([worker.pipe for worker in crew], timeout=max(0.0, soonest))
+            for worker in list(crew):
+                answer = worker.look()
+                if answer is None:
+                    continue
+                piece = worker.piece
+                if left and not isinstance(answer, Lost):
+                    worker.give(left.popleft())
+                else:
+                    crew.remove(worker)
+                    worker.end()
+                yield piece, answer
+    finally:
+        for worker in crew:
+            worker.process.kill()
+        for worker in crew:
+            worker.end()
+
+
+class _Worker(Generic[Piece]):
+    """The supervisor's end of one process."""
+
+    piece: Piece
+
+    def __init__(self, perform: Callable[[Piece], Any], limits: Limits) -> None:
+        context = get_context("spawn")
+        self.limits = limits
+        self.pipe, theirs = context.Pipe()
+        end, self.lifeline = context.Pipe(duplex=False)
+        arguments = (perform, theirs, end, limits.memory, os.getpid())
+        self.process = context.Process(target=_serve, args=arguments, daemon=True)
+        self.process.start()
+        theirs.close()
+        end.close()
+        self.deadline = time.monotonic() + START_LIMIT
+
+    def give(self, piece: Piece) -> None:
+        self.piece = piece
+        with suppress(OSError):  # it is dead already, which the next look will find
+            self.pipe.send(piece)
+
+    def look(self) -> Any:
+        """The answer, if there is one by now; Lost if there will be none; None while it is at work."""
+        try:
+            while self.pipe.poll():
+                kind, content = self.pipe.recv()
+                if kind == "begun":
+                    self.deadline = time.monotonic() + self.limits.seconds
+                elif kind == "raised":
+                    raise content
+                else:
+                    self.deadline = time.monotonic() + self.limits.seconds
+                    return content
+        except (EOFError, OSError):
+            return Lost("crashed", DIED)
+        if time.monotonic() < self.deadline:
+            return None
+        return Lost("timed_out", f"no answer within {self.limits.seconds:g} s, so its process was ended")
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.join()
+        self.process.close()
+        self.pipe.close()
+        self.lifeline.close()
+
+
+def _serve(
+    perform: Callable[[Any], Any], pipe: Connection, lifeline: Connection, memory: int, parent: int
+) -> None:
+    """The life of a worker: a piece, its answer, the next piece."""
+    _never_outlive(lifeline, parent)
+    warnings.simplefilter("ignore")  # what a worker has to say, it says in samples
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides what an interruption means
+    _bound_memory(memory)
+    while True:
+        try:
+            piece = pipe.recv()
+        except (EOFError, OSError):
+            return
+        pipe.send(("begun", None))
+        try:
+            answer = ("answer", perform(piece))
+        except MemoryError:
+            answer = ("answer", Lost("crashed", "the piece of work ran out of memory"))
+        except Exception as error:
+            answer = ("raised", error)
+        pipe.send(answer)
+
+
+def _never_outlive(lifeline: Connection, parent: int) -> None:
+    """End this process with its supervisor: the kernel sees to it on Linux, a thread elsewhere."""
+
+    def watch() -> None:
+        with suppress(EOFError, OSError):
+            lifeline.recv_bytes()  # nothing is ever sent: it returns when the other end is gone
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+    if sys.platform == "linux":  # the thread cannot run while native code keeps the interpreter
+        import ctypes
+
+        die_with_parent = 1  # PR_SET_PDEATHSIG
+        ctypes.CDLL(None).prctl(die_with_parent, int(signal.SIGKILL))
+        if os.getppid() != parent:
+            os._exit(1)
+
+
+def _bound_memory(more: int) -> None:
+    """Let this process take `more` bytes than it has now; beyond that, asking for memory fails."""
+    if not more or sys.platform != "linux":
+        return
+    import resource
+
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    wanted = pages * resource.getpagesize() + more
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if hard == resource.RLIM_INFINITY or wanted < hard:
+        resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
