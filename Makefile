@@ -5,12 +5,13 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help wasm three-scene nightly test check bench mutants mutation package release site serve clean require install develop native-tests FORCE
+.PHONY: help wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
+	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
@@ -23,6 +24,8 @@ help:
 nightly: install
 	$(BIN)/tracker nightly --db $(DB) --out $(OUT)
 
+# Each worker has a core of its own: linear algebra with threads beside them only waits for them.
+test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	$(BIN)/pytest -q -n auto --dist loadfile
 
@@ -51,6 +54,9 @@ mutation: develop
 
 bench: develop
 	$(BIN)/python bench/run.py
+
+bench-heaps: develop
+	$(BIN)/python bench/bench_heaps.py
 
 # Where clang-19 and its WebAssembly libraries are; .ci/install-system gets them on Debian.
 wasm: develop

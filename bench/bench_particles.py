@@ -159,3 +159,4 @@ if __name__ == "__main__":
     against_the_number_of_links()
     against_methods()
     print("\nevery limit kept" if kept else "\nA LIMIT IS NOT KEPT")
+    sys.exit(0 if kept else 1)

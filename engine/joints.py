@@ -80,6 +80,7 @@ class Limit:
     upper: float
     compliance: float = 1e-8  # m/N or rad/(N m)
     damping: float | None = None  # s
+    restitution: float = 0.0  # 0 … 1, of the speed at which the limit is met
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
@@ -87,6 +88,10 @@ class Limit:
         object.__setattr__(self, "compliance", check.not_negative("limit", "compliance", self.compliance))
         if self.damping is not None:
             object.__setattr__(self, "damping", check.not_negative("limit", "damping", self.damping))
+        restitution = check.not_negative("limit", "restitution", self.restitution)
+        if restitution > 1.0:
+            raise SceneError(f"limit: restitution must lie between 0 and 1, not {restitution:g}")
+        object.__setattr__(self, "restitution", restitution)
         if self.lower > self.upper:
             raise SceneError(f"limit: lower {self.lower:g} lies above upper {self.upper:g}")
 

@@ -25,6 +25,9 @@ class Method:
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
     iterations, residual_tolerance   when an iterative solve stops
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
+    impacts            simultaneous: touching bodies take part in a blow; successive: it passes through them one
+                       after the other, so that the last ball of a touching row leaves
+    unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled"
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
     force_stages       stages to keep although the scene does not need them, to measure what they cost
@@ -40,6 +43,8 @@ class Method:
     iterations: int = 50
     residual_tolerance: float = 1e-10
     friction: Literal["cone", "box", "scaled_box"] = "cone"
+    impacts: Literal["simultaneous", "successive"] = "simultaneous"
+    unsettled_residual: float = 0.1
     refinements: int = 1
     floor: float = 1e-12
     force_stages: tuple[str, ...] = ()
@@ -58,6 +63,10 @@ class Method:
             refuse("composition", "none, order4, order6 or order8")
         if self.solver not in ("direct", "iterative", "hybrid"):
             refuse("solver", "direct, iterative or hybrid")
+        if self.impacts not in ("simultaneous", "successive"):
+            refuse("impacts", "simultaneous or successive")
+        if not self.unsettled_residual > 0.0:
+            refuse("unsettled_residual", "above 0")
         if not isinstance(self.iterations, int) or self.iterations < 1:
             refuse("iterations", "a whole number from 1")
         if not self.residual_tolerance >= 0.0:

@@ -123,7 +123,7 @@ class Program:
     def run(self, steps: int, time_limit: float | None = None, time_stages: bool = False) -> Result:
         """Run from the start for that many steps, natively and with the GIL released.
 
-        `time_limit` [s] of wall time ends the run as "timed_out" (looked at between blocks of steps);
+        `time_limit` [s] of wall time ends the run as "timed_out", within a step, too;
         `time_stages` measures seconds by stage, which slows the run down.
         """
         for name, what in self._observe.items():
@@ -146,7 +146,7 @@ class Program:
         failed_body = self._bodies[body] if body >= 0 else None
         return Result(
             status=status,
-            failure=_failure(status, failed_body, step, time_limit, report["reason"]),
+            failure=_failure(status, failed_body, step, time_limit, report["reason"], report["residual"]),
             failed_body=failed_body,
             failed_step=step if step >= 0 else None,
             time_step=self.time_step,
@@ -163,7 +163,14 @@ class Program:
         )
 
 
-def _failure(status: str, body: str | None, step: int, time_limit: float | None, reason: str) -> str:
+def _failure(
+    status: str, body: str | None, step: int, time_limit: float | None, reason: str, residual: float
+) -> str:
+    if status == "unsettled":
+        return (
+            f"unsettled since step {step}: rows of body {body!r} are off by up to {residual:.3g} m/s; "
+            "use more iterations, smaller time steps or the direct solver"
+        )
     if reason:
         return f"in step {step} body {body!r} {reason}"
     if status == "diverged":

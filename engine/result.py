@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from spook_tracker.engine.errors import EngineError
 
-Status = Literal["completed", "diverged", "not_finite", "timed_out"]
+Status = Literal["completed", "unsettled", "diverged", "not_finite", "timed_out"]
 Array = npt.NDArray[np.float64]
 
 
@@ -20,9 +20,12 @@ class Result:
     """One run of a scene.
 
     `result["name"]` is an observable (a NumPy array, 0-dimensional for scalars) and raises SimulationFailed
-    if the run did not complete; `partial` holds what was seen until then. `sample_times["name"]` are the
+    if the run broke off; `partial` holds what was seen until then. `sample_times["name"]` are the
     times [s] of a trace. `final_state` maps body name to (13,) position,
     orientation, velocity, angular velocity.
+    An "unsettled" run did all its steps, but in some of them the solver left more than
+    `Method.unsettled_residual`: values are kept, `failure` says where, `residual` how much; a later step rests
+    on a wrong one.
     `counters` are exact integers, equal on every machine: steps, rows_assembled, block_operations, ...
     `state_hash` is a hash of the bits of the final state.
     """
@@ -41,10 +44,10 @@ class Result:
     state_hash: str
     stages: tuple[str, ...]
     stage_seconds: Mapping[str, float] = field(default_factory=dict)
-    residual: float = 0.0  # largest row residual [m/s] the iterative solver stopped at in the last step
+    residual: float = 0.0  # largest row residual [m/s] a solve stopped at
 
     def __getitem__(self, name: str) -> Any:
-        if self.status != "completed":
+        if self.status not in ("completed", "unsettled"):
             raise SimulationFailed(self)
         if name not in self.observables:
             asked = ", ".join(sorted(self.observables)) or "nothing"

@@ -131,6 +131,8 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "floor": method.floor,
             "solver": method.solver,
             "friction": method.friction,
+            "impacts": method.impacts,
+            "unsettled_residual": method.unsettled_residual,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "composition": ORDERS[method.composition],
@@ -231,6 +233,7 @@ def _drives(scene: Scene, step: float) -> dict[str, Any]:
                     "upper": limit.upper,
                     "compliance": limit.compliance,
                     "damping": _or(limit.damping, 2.0 * step),
+                    "restitution": limit.restitution,
                 }
             )
         if (spring := joint.spring) is not None:

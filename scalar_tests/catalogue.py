@@ -25,6 +25,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "oscillator_filter": "oscillator.filter",
     # what it asks for next
     "bouncing_ball": "bouncing_ball",
+    "blow": "blow",
     "rotating_box": "rotating_box",
     "swinging_door": "swinging_door",
     "lock_ring": "lock_ring",

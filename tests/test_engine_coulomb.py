@@ -302,6 +302,9 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
             total[j] -= force
             if not force.any():
                 continue
+            # A pair that meets within the step has the normal of that moment, which no sample shows.
+            if (x[i][2] if b == "plane" else np.linalg.norm(x[i] - x[j]) - radius) > radius + 1e-9:
+                continue
             # The engine takes a contact at the middle of the gap.
             if b == "plane":
                 normal, arm = np.array((0.0, 0.0, 1.0)), (x[i][2] + radius) / 2.0

@@ -137,7 +137,7 @@ def test_impacts_among_many_bodies_keep_momentum_and_gain_no_energy(psi: float) 
     }
     result = simulate(Scene(bodies=tuple(bodies)), time_step=1 / 240, steps=480, observe=observe)
 
-    assert result.counters["contacts"] > 10
+    assert result.counters["contacts"] > 5  # pairs that meet, not those that might
     assert np.abs(result["p"] - result["p"][0]).max() < 1e-11 * 9.0
     assert np.abs(result["l"] - result["l"][0]).max() < (1e-11 if psi > 0.0 else 0.01)
     assert np.diff(result["e"]).max() < 1e-6 * result["e"][0]

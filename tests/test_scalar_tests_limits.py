@@ -13,7 +13,7 @@ import pytest
 
 from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import double_pendulum
+from spook_tracker.scalar_tests import cantilever, double_pendulum, motor
 from spook_tracker.scalar_tests.beam import scene as beam
 from spook_tracker.scalar_tests.case import Measurement, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -202,6 +202,27 @@ def test_damping_leaves_the_continuum_as_far_as_the_map_does() -> None:
 
     assert metric.passes(value) and metric.holds_set_point(value)
     assert metric.limit == pytest.approx(value, rel=1e-3)
+
+
+def test_the_motor_leads_by_the_sum_of_the_turns_of_its_steps() -> None:
+    """A step turns by 2 asin(h w/2) with √(1 − h² w²/4) w = ω, the speed after it."""
+    h = motor.TIME_STEP
+    speed = np.minimum(
+        motor.TORQUE / motor.INERTIA * h * np.arange(1, round(motor.DURATION / h) + 1), motor.SPEED
+    )
+    turned = float(np.sum(2.0 * np.arcsin(np.sqrt(0.5 * (1.0 - np.sqrt(1.0 - (h * speed) ** 2))))))
+    lead = (turned - float(motor.exact_angle(motor.DURATION))) / motor.LEAD - 1.0
+    metric = next(m for m in measurement("motor", "bounded").metrics if m.name == "angle_lead")
+
+    assert metric.passes(lead) and metric.holds_set_point(lead), lead
+    assert metric.limit == pytest.approx(lead, rel=0.01)
+
+
+def test_a_cantilever_of_pieces_differs_from_the_elastica_by_its_own_statics() -> None:
+    metric = next(m for m in measurement("cantilever", "dynamic").metrics if m.name == "tip_against_elastica")
+    statics = cantilever.chain_tip(80) / cantilever.elastica_tip() - 1.0
+
+    assert metric.limit == pytest.approx(statics + 1e-7, rel=0.01)
 
 
 # --- what a gate would catch that can hardly fail ---------------------------------------------------------

@@ -18,6 +18,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     limit_option,
     recorded,
+    refuse_unwritable,
     source_options,
     terminated_is_interrupted,
     workers_option,
@@ -95,6 +96,7 @@ def run_command(
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
+    refuse_unwritable(json_file, junit_file)
     request = Request(
         tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
     )
@@ -151,10 +153,13 @@ def nightly(
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.website.folder import refuse_unusable
 
+    refuse_unwritable(json_file, junit_file)
+    refuse_unusable(out)
     first, *others = engine.split(",")
     for other in others:
-        asked = Request(sweep=not quick, workers=workers, trigger="nightly")
+        asked = Request(sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly")
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:

@@ -178,6 +178,22 @@ def terminated_is_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+def refuse_unwritable(*files: Path | None) -> None:
+    """TrackerError if a file cannot be written: asked before anything is measured, not after."""
+    from spook_tracker.tracker.document.errors import TrackerError
+
+    for file in files:
+        if file is None:
+            continue
+        folder = file.absolute().parent
+        if file.is_dir():
+            raise TrackerError(f"{file} is a folder; name a file")
+        if not folder.is_dir():
+            raise TrackerError(f"the folder of {file} does not exist; make it first")
+        if not os.access(file if file.exists() else folder, os.W_OK):
+            raise TrackerError(f"{file} cannot be written; check its permissions")
+
+
 def complain(sentence: str) -> None:
     """One line on standard error, which repeats only so much of what it was given."""
     import spook_tracker.tracker.document.outside as outside

@@ -92,7 +92,9 @@ def ask(question: Callable[[], Any]) -> Outcome:
         return Outcome(question())
     except SimulationFailed as failure:
         status = failure.result.status
-        return Outcome(None, status if status != "completed" else "crashed", sentence(str(failure)))
+        if status == "completed" or status == "unsettled":  # both kept their values
+            return Outcome(None, "crashed", sentence(str(failure)))
+        return Outcome(None, status, sentence(str(failure)))
     except NoAnswer as lost:
         return Outcome(None, lost.outcome, str(lost))
     except NotSupported as lack:

@@ -72,6 +72,16 @@ def replacing(out: Path) -> Iterator[Folder]:
         shutil.rmtree(new, ignore_errors=True)
 
 
+def refuse_unusable(out: Path) -> None:
+    """FolderError if no website can be put there: asked before a night is measured, not after."""
+    _known(out)
+    place = out.absolute().parent
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK):
+        raise FolderError(f"the website cannot be written to {out}: {place} is no folder one may write to")
+
+
 def digest(*parts: bytes) -> str:
     """What a file was made from, in sixteen hexadecimal digits."""
     made = hashlib.sha256()

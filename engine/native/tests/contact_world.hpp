@@ -52,7 +52,13 @@ public:
         for (std::size_t k = 0; k < bodies.size(); ++k)
             if (bodies[k].mass > 0.0) system.mass.push_back(mass_block(bodies[k], poses[k].rotation));
         const bool touching = stage.detect(poses, velocity, free_velocity);
-        if (touching && stage.impact_needed()) {
+        std::vector<double> lead(bodies.size(), 0.0);
+        for (std::size_t k = 0; k < bodies.size(); ++k)
+            if (touching && bodies[k].mass > 0.0) {
+                lead[k] = stage.lead(static_cast<int>(k));
+                for (int i = 0; i < 3; ++i) velocity[k][i] += lead[k] * h * gravity[i];
+            }
+        while (touching && stage.impact_needed()) {
             momenta(velocity);
             stage.impact(system);
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
@@ -63,7 +69,8 @@ public:
                 free_velocity[k] = velocity[k];
             }
         for (std::size_t k = 0; k < bodies.size(); ++k)
-            for (int i = 0; i < 3 && bodies[k].mass > 0.0; ++i) free_velocity[k][i] += h * gravity[i];
+            for (int i = 0; i < 3 && bodies[k].mass > 0.0; ++i)
+                free_velocity[k][i] += (1.0 - lead[k]) * h * gravity[i];
         if (touching) {
             momenta(free_velocity);
             stage.solve(system, velocity);

@@ -73,7 +73,7 @@ void read_limits(const nb::dict& limits, RigidScene& scene) {
     Columns table(limits, "limits");
     const Numbers joint = table.numbers("joint"), lower = table.numbers("lower"),
                   upper = table.numbers("upper"), compliance = table.numbers("compliance"),
-                  damping = table.numbers("damping");
+                  damping = table.numbers("damping"), restitution = table.numbers("restitution");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& spec = scene.joints.at(joint.index(i));
         spec.has_limit = true;
@@ -81,6 +81,7 @@ void read_limits(const nb::dict& limits, RigidScene& scene) {
         spec.limit_upper = upper[i];
         spec.limit_compliance = compliance[i];
         spec.limit_damping = damping[i];
+        spec.limit_restitution = restitution[i];
     }
     table.expect_all_read();
 }
@@ -155,6 +156,8 @@ RigidMethod to_method(const nb::dict& method) {
     options.read_kind("friction", out.friction);
     options.read("iterations", out.iterations);
     options.read("residual_tolerance", out.residual_tolerance);
+    options.read_kind("impacts", out.impacts);
+    options.read("unsettled_residual", out.unsettled_residual);
     options.read("composition", out.composition);
     options.read("half_step_velocities", out.half_step_velocities);
     options.read("corrections", out.corrections);

@@ -40,6 +40,13 @@ Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
     bounds_.resize(bounded_.size());
 }
 
+std::vector<char> Detection::balls() const {
+    std::vector<char> ball(dynamic_.size(), 1);
+    for (const Collider& c : colliders_)
+        if (c.shape.kind != ShapeKind::sphere || norm(c.part.position) > 0.0) ball[c.body] = 0;
+    return ball;
+}
+
 bool Detection::may_touch(int i, int j) const noexcept {
     const int a = colliders_[i].body, b = colliders_[j].body;
     if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;
@@ -48,9 +55,8 @@ bool Detection::may_touch(int i, int j) const noexcept {
     return !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
 }
 
-void Detection::add(int i, int j, double margin, std::vector<Contact>& out) const {
-    if (i > j) std::swap(i, j);
-    const Manifold manifold = collide(colliders_[i].shape, poses_[i], colliders_[j].shape, poses_[j], margin);
+void Detection::add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const {
+    const auto [i, j] = pair;
     for (int k = 0; k < manifold.count; ++k) {
         const ContactPoint& point = manifold.points[k];
         const std::uint64_t key = (static_cast<std::uint64_t>(i) << (collider_bits + feature_bits)) |
@@ -59,9 +65,20 @@ void Detection::add(int i, int j, double margin, std::vector<Contact>& out) cons
     }
 }
 
-void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,
-                       std::vector<Contact>& out) {
-    out.clear();
+void Detection::touch(IndexPair pair, double margin, std::vector<Contact>& out) const {
+    const auto [i, j] = pair;
+    add(pair, collide(colliders_[i].shape, poses_[i], colliders_[j].shape, poses_[j], margin), out);
+}
+
+void Detection::touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
+                      std::vector<Contact>& out) const {
+    const Collider &a = colliders_[pair.first], &b = colliders_[pair.second];
+    add(pair, collide(a.shape, placed(first, a.part), b.shape, placed(second, b.part), margin), out);
+}
+
+const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
+                                              const std::vector<double>& margin) {
+    near_.clear();
     for (std::size_t k = 0; k < colliders_.size(); ++k)
         poses_[k] = placed(bodies[colliders_[k].body], colliders_[k].part);
     for (std::size_t k = 0; k < bounded_.size(); ++k) {
@@ -69,18 +86,26 @@ void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double
         bounds_[k] = bounds(c.shape, poses_[bounded_[k]], margin[c.body]);
     }
     overlapping_pairs(bounds_, pairs_);
-    for (auto [p, q] : pairs_) {
-        const int i = bounded_[p], j = bounded_[q];
-        if (may_touch(i, j)) add(i, j, margin[colliders_[i].body] + margin[colliders_[j].body], out);
-    }
-    for (int plane : planes_)
+    for (auto [p, q] : pairs_)
+        if (may_touch(bounded_[p], bounded_[q])) near_.emplace_back(bounded_[p], bounded_[q]);
+    for (int plane : planes_) {
+        const Vec3 normal = poses_[plane].rotation * colliders_[plane].shape.normal;
         for (int k : bounded_) {
             if (!may_touch(plane, k)) continue;
             const double sum = margin[colliders_[plane].body] + margin[colliders_[k].body];
-            const Vec3 normal = poses_[plane].rotation * colliders_[plane].shape.normal;
             if (dot(normal, poses_[k].position - poses_[plane].position) <= reach(colliders_[k].shape) + sum)
-                add(plane, k, sum, out);
+                near_.emplace_back(std::min(plane, k), std::max(plane, k));
         }
+    }
+    std::sort(near_.begin(), near_.end());
+    return near_;
+}
+
+void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,
+                       std::vector<Contact>& out) {
+    out.clear();
+    for (const IndexPair& pair : near(bodies, margin))
+        touch(pair, margin[colliders_[pair.first].body] + margin[colliders_[pair.second].body], out);
     std::sort(out.begin(), out.end(), [](const Contact& a, const Contact& b) { return a.key < b.key; });
 }
 

@@ -40,12 +40,24 @@ public:
     void detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,
                 std::vector<Contact>& out);
 
+    /// The same in two calls, for a stage that looks at pairs: the colliders that may come as near as that, as
+    /// indices (i, j), i < j, in ascending order; then the points of one pair, in order of feature.
+    const std::vector<IndexPair>& near(const std::vector<Pose>& bodies, const std::vector<double>& margin);
+    void touch(IndexPair pair, double margin, std::vector<Contact>& out) const;
+    /// As touch(), with the bodies of the pair elsewhere.
+    void touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
+               std::vector<Contact>& out) const;
+    const Collider& collider(int index) const noexcept { return colliders_[index]; }
+
     /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.
     const std::vector<double>& radius() const noexcept { return radius_; }
 
+    /// Per body: whether a sphere round its centre is all its surface, so that its orientation does not matter.
+    std::vector<char> balls() const;
+
 private:
     bool may_touch(int i, int j) const noexcept;
-    void add(int i, int j, double margin, std::vector<Contact>& out) const;
+    void add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const;
 
     std::vector<Collider> colliders_;  // by body
     std::vector<char> dynamic_;
@@ -55,7 +67,7 @@ private:
     bool possible_ = false;
     std::vector<Pose> poses_;
     std::vector<Bounds> bounds_;
-    std::vector<IndexPair> pairs_;
+    std::vector<IndexPair> pairs_, near_;
 };
 
 }  // namespace spook

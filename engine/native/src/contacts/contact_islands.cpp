@@ -60,6 +60,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         place[b] = static_cast<int>(parts[island].mass.size());
         parts[island].mass.push_back(system.mass[b]);
         parts[island].momentum.push_back(system.momentum[b]);
+        parts[island].velocity.push_back(system.velocity[b]);
     }
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];

@@ -3,138 +3,57 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contacts/contact_geometry.hpp"
 #include "linear/regularisation.hpp"
 
 namespace spook {
 
 namespace {
 
-Vec3 linear(const Vec6& v) noexcept { return {v[0], v[1], v[2]}; }
-Vec3 angular(const Vec6& v) noexcept { return {v[3], v[4], v[5]}; }
-Vec6 row(Vec3 direction, Vec3 arm) noexcept {
-    const Vec3 moment = cross(arm, direction);
-    return {direction.x, direction.y, direction.z, moment.x, moment.y, moment.z};
-}
-
-/// The world axis x (or y, for surfaces that face along x) laid into the tangent plane.
-Vec3 world_tangent(Vec3 normal) noexcept {
-    const Vec3 axis = std::abs(normal.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-    const Vec3 t = axis - dot(axis, normal) * normal;
-    return (1.0 / norm(t)) * t;
-}
-
-double speed_between(const std::vector<Vec6>& from, const std::vector<Vec6>& to, int body) noexcept {
-    return norm(linear(to[body]) - linear(from[body]));
-}
-
-constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
+constexpr double closed = 1e-9;  // of the larger body's radius: a depth that is rounding
+constexpr int late_rounds = 3;   // of solves that set others in motion towards a third
 
 }  // namespace
 
 ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials,
-                           std::vector<int> unknown, const ContactOptions& options)
+                           std::vector<int> unknown, const ContactOptions& options,
+                           std::vector<IndexPair> joints)
     : detection_(std::move(detection)),
       materials_(std::move(materials)),
       unknown_(std::move(unknown)),
-      options_(options) {
+      options_(options),
+      joints_(std::move(joints)) {
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
     }
-    margin_.assign(unknown_.size(), 0.0);
-    prescribed_.assign(unknown_.size(), Vec6{});
+    const std::size_t bodies = unknown_.size();
+    margin_.assign(bodies, 0.0);
+    prescribed_.assign(bodies, Vec6{});
+    jointed_.assign(bodies, 0);
+    supported_.assign(bodies, 0);
+    depth_.assign(bodies, 0.0);
+    lead_.assign(bodies, 0.0);
+    event_time_.assign(bodies, -1.0);
+    ball_ = detection_.balls();
+    for (const auto& [a, b] : joints_)
+        for (const int body : {a, b})
+            if (body >= 0) jointed_[body] = 1;
 }
 
-double ContactStage::relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity,
+double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                               bool only_prescribed) const {
-    const Contact& contact = contacts_[k];
-    double sum = 0.0;
+    const Contact& contact = point.contact;
+    double total = 0.0;
     if (!only_prescribed || unknown_[contact.first] < 0)
-        sum += dot(row(direction, points_[k].first_arm), velocity[contact.first]);
+        total += dot(contact_row(direction, point.first_arm), velocity[contact.first]);
     if (!only_prescribed || unknown_[contact.second] < 0)
-        sum -= dot(row(direction, points_[k].second_arm), velocity[contact.second]);
-    return sum;
+        total -= dot(contact_row(direction, point.second_arm), velocity[contact.second]);
+    return total;
 }
 
-bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
-                          const std::vector<Vec6>& free_velocity) {
-    const double h = options_.time_step;
-    const std::vector<double>& radius = detection_.radius();
-    for (std::size_t b = 0; b < margin_.size(); ++b) {
-        const double speed = std::max(norm(linear(velocity[b])), norm(linear(free_velocity[b])));
-        const double spin = std::max(norm(angular(velocity[b])), norm(angular(free_velocity[b])));
-        margin_[b] = h * (speed + spin * radius[b]) + 1e-9 * radius[b];
-        prescribed_[b] = unknown_[b] < 0 ? velocity[b] : Vec6{};
-    }
-    correction_.clear();
-    impact_needed_ = false;
-    detection_.detect(poses, margin_, contacts_);
-    drop_unreachable(velocity, free_velocity);
-    if (contacts_.empty()) {
-        touches_.clear();
-        return false;
-    }
-    counters_.contacts += contacts_.size();
-
-    points_.resize(contacts_.size());
-    std::size_t old = 0;  // both lists are in order of key
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const Contact& contact = contacts_[k];
-        Point& point = points_[k];
-        point = {};
-        point.material = combined(materials_[contact.first], materials_[contact.second]);
-        point.first_arm = contact.point.position - poses[contact.first].position;
-        point.second_arm = contact.point.position - poses[contact.second].position;
-        point.tangent = world_tangent(contact.point.normal);
-        while (old < touches_.size() && touches_[old].contact.key < contact.key) ++old;
-        if (old < touches_.size() && touches_[old].contact.key == contact.key) {
-            point.before = touches_[old].normal;
-            std::copy_n(touches_[old].tangent, 2, point.tangent_before);
-        }
-        const double gap = contact.point.gap;
-        point.approach = relative(k, contact.point.normal, velocity, false);
-        const double free_approach = relative(k, contact.point.normal, free_velocity, false);
-        point.push = free_approach - point.approach;
-        const double psi = point.material.restitution, speed = -point.approach;
-        point.bounce = -1.0;
-        if (is_closed(k)) {
-            point.bounce = speed > 0.0 ? psi : 0.0;
-        } else if (speed > 0.0 && psi > 0.0 && gap + h * free_approach < 0.0) {
-            const double left =
-                psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
-            if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
-        }
-        const double kick = speed_between(velocity, free_velocity, contact.first) +
-                            speed_between(velocity, free_velocity, contact.second);
-        const double rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
-        point.rounding = rounding;
-        if (point.bounce > 0.0 && speed > rounding) impact_needed_ = true;
-    }
-    touches_.assign(contacts_.size(), {});
-    for (std::size_t k = 0; k < contacts_.size(); ++k) touches_[k].contact = contacts_[k];
-    return true;
-}
-
-void ContactStage::drop_unreachable(const std::vector<Vec6>& velocity,
-                                    const std::vector<Vec6>& free_velocity) {
-    const std::vector<double>& radius = detection_.radius();
-    auto speed = [&](int body, Vec3 n) {
-        const double spin = std::max(norm(angular(velocity[body])), norm(angular(free_velocity[body])));
-        return std::max(std::abs(dot(n, linear(velocity[body]))),
-                        std::abs(dot(n, linear(free_velocity[body])))) +
-               spin * radius[body];
-    };
-    std::erase_if(contacts_, [&](const Contact& contact) {
-        const double size = std::max(radius[contact.first], radius[contact.second]);
-        const Vec3 n = contact.point.normal;
-        return contact.point.gap >
-               options_.time_step * (speed(contact.first, n) + speed(contact.second, n)) + closed * size;
-    });
-}
-
-RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {
-    const Contact& contact = contacts_[k];
-    const Point& point = points_[k];
+RowBlock ContactStage::row_block(const Point& point, bool tangents) const {
+    const Contact& contact = point.contact;
     RowBlock block;
     block.first = unknown_[contact.first];
     block.second = unknown_[contact.second];
@@ -142,27 +61,31 @@ RowBlock ContactStage::row_block(std::size_t k, bool tangents) const {
     const Vec3 directions[3] = {contact.point.normal, point.tangent,
                                 cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
-        if (block.first >= 0) block.first_jacobian[i] = row(directions[i], point.first_arm);
-        if (block.second >= 0) block.second_jacobian[i] = row(-directions[i], point.second_arm);
-        block.right[i] = -relative(k, directions[i], prescribed_, true);
+        if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
+        if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
+        block.right[i] = -relative(point, directions[i], prescribed_, true);
     }
     block.lower[0] = 0.0;
     return block;
 }
 
 FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
-                                 IslandSolver& islands) {
+                                 IslandSolver& islands, FrictionModel model) {
     const ContactOptions& o = options_;
+    if (o.solver == SolverKind::direct && system.velocity.size() == system.mass.size() &&
+        still_right(system, points, model))
+        return {};
     const FrictionReport report = islands.run(
-        system, points, [&o](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
+        system, points,
+        [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
             switch (o.solver) {
                 case SolverKind::iterative:
-                    return solve_iterative(island, own, o.friction, o.iterations, o.residual_tolerance);
+                    return solve_iterative(island, own, model, o.iterations, o.residual_tolerance);
                 case SolverKind::hybrid:
-                    return solve_hybrid(island, own, o.friction, solver, o.iterations, o.residual_tolerance);
+                    return solve_hybrid(island, own, model, solver, o.iterations, o.residual_tolerance);
                 case SolverKind::direct: break;
             }
-            return solve_friction_direct(island, own, o.friction, solver);
+            return solve_friction_direct(island, own, model, solver);
         });
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;
@@ -171,146 +94,149 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
     return report;
 }
 
-double ContactStage::kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const {
-    double twice = 0.0;
-    for (std::size_t b = 0; b < velocity.size(); ++b)
-        for (int i = 0; i < 6; ++i) {
-            double momentum = 0.0;
-            for (int j = 0; j < 6; ++j) momentum += system.mass[b][6 * i + j] * velocity[b][j];
-            twice += momentum * velocity[b][i];
-        }
-    return 0.5 * twice;
+/// What is left of the step after a point's event, s.
+double ContactStage::time_left(const Point& point) const noexcept {
+    const double h = options_.time_step;
+    return point.event ? std::max(h - point.strike, 1e-3 * h) : h;
 }
 
-void ContactStage::impact(MixedSystem& system) {
-    ++counters_.impacts;
-    MixedSystem hit;
-    hit.mass = system.mass;
-    hit.momentum = system.momentum;
-    hit.rows = system.rows;
-    for (RowBlock& block : hit.rows)
-        for (int i = 0; i < block.size; ++i) {
-            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
-            block.multiplier[i] = 0.0;
-            if (below && above) block.right[i] = 0.0;
-            else if (above && block.lower[i] == 0.0) block.right[i] = std::min(block.right[i], 0.0);
-            else if (below && block.upper[i] == 0.0) block.right[i] = std::max(block.right[i], 0.0);
-            else block.lower[i] = block.upper[i] = 0.0;
-        }
-    std::vector<std::size_t> who;
-    bool pushed_by_motion = false;
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        if (points_[k].bounce < 0.0) continue;
-        RowBlock block = row_block(k, false);
-        pushed_by_motion = pushed_by_motion || block.right[0] != 0.0;
-        block.right[0] += std::max(0.0, -points_[k].bounce * points_[k].approach);
-        block.state[0] = points_[k].approach < 0.0 ? RowState::free : RowState::at_lower;
-        hit.rows.push_back(block);
-        who.push_back(k);
+double ContactStage::explained_depth(const Point& point) const noexcept {
+    const double carried = std::max(0.0, point.before) / options_.time_step;
+    return 2.0 * point.material.compliance * carried + closed * size(point.contact);
+}
+
+/// The resting row of a point; the tangents' bounds are left to the friction law.
+RowBlock ContactStage::resting_row(Point& point) const {
+    const double h = options_.time_step, gap = point.contact.point.gap;
+    const SurfaceMaterial& material = point.material;
+    const Regularisation row = regularise(material.compliance, material.damping, h);
+    RowBlock block = row_block(point, material.friction > 0.0);
+    point.approach = relative(point, point.contact.point.normal, velocity_, false);
+    point.push = relative(point, point.contact.point.normal, kick_, false);
+    // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
+    if (point.approach < -point.rounding) point.approach = 0.0;
+    const bool touching = is_closed(point.contact);
+    if (point.event)  // another point of a pair that meets may still be open
+        block.right[0] -= touching ? 0.0 : gap / time_left(point);
+    else
+        block.right[0] += !touching ? -gap / h
+                                    : -row.violation_gain * std::max(gap, -explained_depth(point)) +
+                                          row.upsilon * point.approach;
+    block.softness[0] = row.softness;
+    const bool pressed = point.before > 0.0 || point.strike >= 0.0 ||
+                         (point.before < 0.0 && (touching || gap + h * (point.approach + point.push) < 0.0));
+    block.state[0] = pressed ? RowState::free : RowState::at_lower;
+    block.multiplier[0] = std::max(0.0, point.before);
+    if (block.size == 3) {
+        block.softness[1] = block.softness[2] = material.slip_compliance / h;
+        for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangent_before[i - 1];
     }
-    const std::size_t joints = system.rows.size();
-    std::vector<FrictionPoint> none;
-    std::vector<Vec6> before = hit.momentum;
-    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
-    run(hit, none, impact_solver_);
-
-    // Newton's law with different restitutions at once can raise the energy; blend with the plastic impact then.
-    const double limit = kinetic_energy(hit, before);
-    if (!pushed_by_motion && kinetic_energy(hit, hit.velocity) > limit * (1.0 + 1e-14)) {
-        MixedSystem plastic = hit;
-        for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
-        run(plastic, none, impact_solver_);
-        double low = 0.0, high = 1.0;
-        std::vector<Vec6> blend(before.size());
-        auto mix = [&](double s) {
-            for (std::size_t b = 0; b < blend.size(); ++b)
-                for (int i = 0; i < 6; ++i)
-                    blend[b][i] = plastic.velocity[b][i] + s * (hit.velocity[b][i] - plastic.velocity[b][i]);
-        };
-        for (int halving = 0; halving < 50; ++halving) {
-            mix(0.5 * (low + high));
-            (kinetic_energy(hit, blend) <= limit ? low : high) = 0.5 * (low + high);
-        }
-        mix(low);
-        hit.velocity = blend;
-        for (std::size_t k = joints; k < hit.rows.size(); ++k)
-            hit.rows[k].multiplier[0] = plastic.rows[k].multiplier[0] +
-                                        low * (hit.rows[k].multiplier[0] - plastic.rows[k].multiplier[0]);
-    }
-    system.velocity = hit.velocity;
-    for (std::size_t j = 0; j < who.size(); ++j) touches_[who[j]].impact = hit.rows[joints + j].multiplier[0];
-}
-
-bool ContactStage::is_closed(std::size_t k) const noexcept {
-    const Contact& contact = contacts_[k];
-    const double size = std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
-    return contact.point.gap <= closed * size;
-}
-
-double ContactStage::explained_depth(std::size_t k) const noexcept {
-    const Contact& contact = contacts_[k];
-    const double carried = std::max(0.0, points_[k].before) / options_.time_step;
-    const double size = std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
-    return 2.0 * points_[k].material.compliance * carried + closed * size;
+    return block;
 }
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
-    const double h = options_.time_step;
     const std::size_t joints = system.rows.size();
+    velocity_ = velocity;
     std::vector<FrictionPoint> friction;
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        Point& point = points_[k];
-        const SurfaceMaterial& material = point.material;
-        const Regularisation row = regularise(material.compliance, material.damping, h);
-        RowBlock block = row_block(k, material.friction > 0.0);
-        const double gap = contacts_[k].point.gap;
-        point.approach = relative(k, contacts_[k].point.normal, velocity, false);
-        // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
-        if (point.approach < -point.rounding) point.approach = 0.0;
-        block.right[0] += !is_closed(k) ? -gap / h
-                                        : -row.violation_gain * std::max(gap, -explained_depth(k)) +
-                                              row.upsilon * point.approach;
-        block.softness[0] = row.softness;
-        const bool pressed =
-            point.before > 0.0 ||
-            (point.before < 0.0 && (is_closed(k) || gap + h * (point.approach + point.push) < 0.0));
-        block.state[0] = pressed ? RowState::free : RowState::at_lower;
-        block.multiplier[0] = std::max(0.0, point.before);
-        if (block.size == 3) {
-            block.softness[1] = block.softness[2] = material.slip_compliance / h;
-            for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangent_before[i - 1];
-            friction.push_back({static_cast<int>(system.rows.size()), material.friction,
-                                material.slip_compliance / h, point.before});
+    std::vector<Vec6> next;
+    FrictionReport report;
+    for (int round = 0;; ++round) {
+        system.rows.resize(joints);
+        friction.clear();
+        for (Point& point : points_) {
+            system.rows.push_back(resting_row(point));
+            if (system.rows.back().size == 3)
+                friction.push_back({static_cast<int>(system.rows.size()) - 1, point.material.friction,
+                                    point.material.slip_compliance / options_.time_step, point.before});
         }
-        system.rows.push_back(block);
+        if (round == 0) {  // at rest, the velocities before are those after
+            system.velocity.resize(system.mass.size());
+            for (std::size_t b = 0; b < unknown_.size(); ++b)
+                if (unknown_[b] >= 0) system.velocity[unknown_[b]] = velocity_[b];
+        }
+        report = run(system, friction, resting_solver_, options_.friction);
+        if (!report.finite || round == late_rounds) break;
+        move_on(system, next);
+        const std::size_t known = points_.size();
+        if (outrun(next)) find_open();
+        if (open_.empty() || find_strikes(next, true) == 0) break;
+        take_back_strikes(known, next);
+        counters_.contacts += points_.size() - known;
+        order_points();
     }
-    const FrictionReport report = run(system, friction, resting_solver_);
-    residual_ = report.residual;
+    judge(system, friction, report);
 
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    touches_.assign(points_.size(), {});
+    for (std::size_t k = 0; k < points_.size(); ++k) {
         const RowBlock& block = system.rows[joints + k];
-        const Vec3 normal = contacts_[k].point.normal;
+        const Point& point = points_[k];
+        const Vec3 normal = point.contact.point.normal;
         Touch& touch = touches_[k];
+        touch.contact = point.contact;
         touch.normal = block.multiplier[0];
-        touch.impulse = (touch.normal + touch.impact) * normal;
+        touch.impact = point.impact;
+        Vec3 along;
         for (int i = 1; i < block.size;
-             ++i) {  // the solver may have turned the tangents: read them from the rows
-            const Vec3 direction =
-                block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]);
-            touch.impulse += block.multiplier[i] * direction;
-        }
-        touch.tangent[0] = dot(touch.impulse, points_[k].tangent);
-        touch.tangent[1] = dot(touch.impulse, cross(normal, points_[k].tangent));
-        touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(k);
+             ++i)  // the solver may have turned the tangents: read them from the rows
+            along += block.multiplier[i] *
+                     (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
+        touch.impulse = touch.normal * normal + along + point.impact_impulse;
+        touch.tangent[0] = dot(along, point.tangent);
+        touch.tangent[1] = dot(along, cross(normal, point.tangent));
+        touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
     }
-    if (report.finite) part_overlaps(system, joints);
+    if (report.finite) {
+        part_overlaps(system, joints);
+        correct_events(system);
+    }
     return report.finite;
+}
+
+void ContactStage::mark_held(const MixedSystem& system) {
+    held_.assign(system.mass.size(), 0);
+    for (const RowBlock& block : system.rows)
+        for (const int body : {block.first, block.second})
+            if (body >= 0) held_[body] = 1;
+}
+
+/// Velocities of all bodies after a solve; those without rows fly freely.
+void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
+    mark_held(system);
+    next.resize(unknown_.size());
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        const int u = unknown_[b];
+        next[b] = u >= 0 && held_[u] ? system.velocity[u] : sum(velocity_[b], kick_[b]);
+    }
+}
+
+/// Whether some body goes further than the search for pairs allowed for; if so, the margins are widened.
+bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
+    before_ = margin_;
+    set_margins(velocity, velocity);
+    bool faster = false;
+    for (std::size_t b = 0; b < margin_.size(); ++b) {
+        faster = faster || margin_[b] > before_[b] * (1.0 + 1e-9);
+        margin_[b] = std::max(margin_[b], before_[b]);
+    }
+    return faster;
+}
+
+/// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere.
+void ContactStage::correct_events(const MixedSystem& system) {
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        const int u = unknown_[b];
+        if (u < 0 || event_time_[b] < 0.0 || !held_[u]) continue;
+        if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
+        for (int i = 0; i < 3; ++i)
+            correction_[u][i] +=
+                event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
+    }
 }
 
 void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) {
     bool overlap = false;
-    for (std::size_t k = 0; k < contacts_.size() && !overlap; ++k)
-        overlap = contacts_[k].point.gap < -explained_depth(k);
+    for (std::size_t k = 0; k < points_.size() && !overlap; ++k)
+        overlap = points_[k].contact.point.gap < -explained_depth(points_[k]);
     if (!overlap) return;
     ++counters_.corrections;
     const double h = options_.time_step;
@@ -324,19 +250,19 @@ void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) 
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
             if (!below && !above) block.lower[i] = block.upper[i] = 0.0;
         }
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        RowBlock block = row_block(k, false);
-        const double gap = contacts_[k].point.gap;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        RowBlock block = row_block(points_[k], false);
+        const double gap = points_[k].contact.point.gap;
         const double ahead =
             gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
-        const double excess = -gap - explained_depth(k);
+        const double excess = -gap - explained_depth(points_[k]);
         const double rate = regularise(0.0, points_[k].material.damping, h).violation_gain;
         block.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
         block.state[0] = excess > 0.0 ? RowState::free : RowState::at_lower;
         parting.rows.push_back(block);
     }
     std::vector<FrictionPoint> none;
-    if (run(parting, none, parting_solver_).finite) correction_ = parting.velocity;
+    if (run(parting, none, parting_solver_, options_.friction).finite) correction_ = parting.velocity;
 }
 
 Vec3 ContactStage::force(int body, int other) const noexcept {

@@ -1,24 +1,40 @@
 // Contacts in a step of rigid bodies: detection, impact, resting, and the parting of overlapping bodies.
 //
 // A step with contacts (v and q are those at its start; positions are frozen until its end):
-//   1. detect      points with a gap the bodies could close in this step;
-//   2. impact      if some point with restitution is approached: 0 <= nu ⟂ C v₊ + psi C v₋ >= 0, joints included,
-//                  forces and friction dropped;
+//   1. detect      points that are closed, and pairs that will touch within this step: where, and when;
+//   2. impact      if some point with restitution is approached: 0 <= nu ⟂ C v₊ + psi C v₋ >= 0 with Coulomb
+//                  friction |beta| <= mu nu against the slip D v₊, joints included, forces dropped;
 //   3. solve       C v₊ + Sig nu >= r ⟂ nu >= 0 with joints and friction, where r is
 //                    −(4/h) Ups g + Ups C v   for a closed gap (the SPOOK row; without Ups C v if it is hit: a
 //                                             plastic impact, with friction), and
 //                    −g/h                     for an open one: it may close, no more;
+//                  then pairs that touch only because of these impulses are looked for, and all is solved again;
 //   4. correction  an extra displacement velocity that parts overlapping bodies and leaves no trace in v.
+//
+// What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
+// finds that they meet (`collision/sweep.hpp`). Bodies in contact are swept with v, which their supports agree
+// with; flying ones with v + h M⁻¹ f.
+//
+// A strike of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
+// arms of the meeting: impulses act there, with
+// the part t/h of the step's forces before and the rest after, and both bodies are led t v₋ + (h − t) v₊ along.
+// Other strikes act at the start of the step: the gap may close, no more; with restitution a step early, psi then
+// reduced to psi', psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching
+// speed, so that the fall still ahead is not won twice.
+//
+// Why the impact cannot raise the kinetic energy E = ½ vᵀ M v. Let v_p be the plastic impact (psi = 0): with
+// impulse P, M (v_p − v₋) = P and E_p − E₋ = v_p·P − ½ |v_p − v₋|²_M, where v_p·P = Σ nu C v_p + beta·D v_p, whose
+// first part is zero by complementarity and whose second is negative, friction acting against the slip. So
+// E_p <= E₋. Newton's law, v_N, can raise E where restitutions differ, or where friction turns a slip round: then
+// v₊ = v_p + s (v_N − v_p) with the largest s in 0 … 1 for which E(v₊) <= E₋. It exists, E being convex in s and
+// E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
 //
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth a contact's own compliance
 // explains, twice eps times the force it carried last, enters r; the rest is parted by positions, at the same
-// rate 4 Ups per step, through the same solver with joints held. Positions that move without velocities keep the
-// centre of mass to rounding; the angular momentum of bodies in flight, r × p, changes a little while they part.
-//
-// Restitution acts a step early on a gap that is still open by g but closes in this step; else a fast body would
-// have to enter the other first. psi is then reduced to psi' so that the fall still ahead is not won twice:
-// psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching speed.
+// rate 4 Ups per step, through the same solver with joints held.
+// Positions that move without velocities keep the centre of mass to rounding; the angular momentum of bodies in
+// flight, r × p, changes a little while they part.
 #pragma once
 
 #include <cstdint>
@@ -35,6 +51,11 @@ namespace spook {
 
 SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
 
+/// What bodies that touch but do not approach each other do while a blow passes. simultaneous: they take part in
+/// it. successive: only points that are approached take part, again and again until none is: a blow runs through a
+/// row of touching balls, and the last one leaves.
+SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
+
 struct ContactOptions {
     double time_step = 0.0;
     FrictionModel friction = FrictionModel::cone;
@@ -43,6 +64,8 @@ struct ContactOptions {
     double residual_tolerance = 1e-10;  // m/s
     double floor = 1e-12;               // of pivots, in the factor only
     int refinements = 1;
+    ImpactOrder impacts = ImpactOrder::simultaneous;
+    double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
 };
 
 struct ContactCounters {  // exact, equal on every machine
@@ -54,9 +77,9 @@ struct ContactCounters {  // exact, equal on every machine
 class ContactStage {
 public:
     /// One material and one `unknown` per body of the scene; unknown[b] is the body's index in MixedSystem, or −1
-    /// if it does not move by itself (static, kinematic).
+    /// if it does not move by itself (static, kinematic). `joints` are the pairs of bodies that rows of joints tie.
     ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
-                 const ContactOptions& options);
+                 const ContactOptions& options, std::vector<IndexPair> joints = {});
 
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return detection_.possible(); }
@@ -66,22 +89,28 @@ public:
     bool detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                 const std::vector<Vec6>& free_velocity);
 
-    /// Whether a contact with restitution is approached faster than rounding.
+    /// Whether a contact with restitution is approached faster than rounding; asked anew after each impact.
     bool impact_needed() const noexcept { return impact_needed_; }
 
-    /// The impact. `system` holds mass, momentum M v₋ and the rows of joints as for solve(); their right sides are
-    /// not used: bilateral rows keep G v₊ + Sig lambda = 0, limits do not close, motors let go. Fills
-    /// system.velocity with v after the impact. It never raises the kinetic energy (with moving kinematic bodies:
-    /// that of the rest).
+    /// The part of the step's forces that acts on `body` before the impact.
+    double lead(int body) const noexcept { return lead_[body]; }
+
+    /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
+    /// solve(); their right sides are not used: bilateral rows keep G v₊ + Sig lambda = 0, limits do not close,
+    /// motors let go. Fills system.velocity with v after the impact. It never raises the kinetic energy (with
+    /// moving kinematic bodies: that of the rest).
     void impact(MixedSystem& system);
 
-    /// The resting stage. `system` holds mass, momentum M v + h f and rows of joints, `velocity` as in detect() but
-    /// after the impact. Appends rows of contacts behind those of joints; fills velocity and multipliers.
+    /// The resting stage. `system` holds mass, momentum M v + h f (less the lead) and rows of joints, `velocity` is
+    /// v after the impact. Appends rows of contacts behind those of joints; fills velocity and multipliers.
     /// False if a value was not finite.
     bool solve(MixedSystem& system, const std::vector<Vec6>& velocity);
 
-    /// Velocity to add to v₊ when positions advance, per moving body; empty when nothing overlapped.
+    /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none.
     const std::vector<Vec6>& correction() const noexcept { return correction_; }
+
+    /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
+    bool held(int unknown) const noexcept { return held_[unknown] != 0; }
 
     /// What this step's contacts did.
     struct Touch {
@@ -89,10 +118,18 @@ public:
         Vec3 impulse;                    // on the first body, impact and resting, N s
         double normal = 0.0;             // nu of the resting stage, N s
         double impact = 0.0;             // normal impulse of the impact, N s
-        double tangent[2] = {0.0, 0.0};  // along world tangents, for a warm start
+        double tangent[2] = {0.0, 0.0};  // of the resting stage along world tangents, for a warm start
         bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
+
+    /// All that a later step depends on.
+    struct Memory {
+        std::vector<Touch> touches;
+        ContactCounters counters;
+    };
+    Memory memory() const { return {touches_, counters_}; }
+    void remember(const Memory& memory) { touches_ = memory.touches, counters_ = memory.counters; }
 
     /// Force [N] on `body` from `other` (or from all if −1), mean over the step.
     Vec3 force(int body, int other) const noexcept;
@@ -104,44 +141,87 @@ public:
     ContactCounters counters() const noexcept { return counters_; }
     BlockLdlt::Counters factor_counters() const noexcept;
     double residual() const noexcept { return residual_; }  // of the last solve, see FrictionReport
+    /// A body whose rows the last solve left further from their law than `unsettled_residual`; −1 if there is none.
+    int unsettled_body() const noexcept { return unsettled_body_; }
+    double unsettled_by() const noexcept { return unsettled_by_; }  // m/s
 
 private:
     struct Point {
+        Contact contact;  // of a strike: where it will touch, the gap along that normal
         SurfaceMaterial material;
         Vec3 first_arm, second_arm;  // from the centres of mass, m
         Vec3 tangent;                // first tangent along world axes, unit
-        double approach = 0.0;       // C v, m/s, negative when closing; after the impact in solve()
+        double strike = -1.0;        // when it touches within the step, s; negative if the pair is closed
+        bool event = false;          // acts at that time, not at the start of the step
+        double meeting_gap = 0.0;    // then, m: other points of the pair may still be open
+        double approach = 0.0;       // C v, m/s, negative when closing
         double push = 0.0;           // C (free velocity − v), m/s, negative when pressed together
-        double bounce = 0.0;         // psi' if the point takes part in the impact, else −1
+        double bounce = -1.0;        // psi' if the point takes part in the impact, else −1
         double rounding = 0.0;       // approaches slower than this are none, m/s
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0};
+        double impact = 0.0;
+        Vec3 impact_impulse;
     };
-    /// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
-    void drop_unreachable(const std::vector<Vec6>& velocity, const std::vector<Vec6>& free_velocity);
-    RowBlock row_block(std::size_t k, bool tangents) const;
-    double relative(std::size_t k, Vec3 direction, const std::vector<Vec6>& velocity,
+    void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
+    void find_open();
+    int find_strikes(const std::vector<Vec6>& velocity, bool late);
+    bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
+                    const std::vector<Vec6>& velocity, bool late);
+    void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
+    void find_events();
+    void order_points();
+    void measure_points();
+    void set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other);
+    bool reachable(const Contact& contact) const;
+    RowBlock row_block(const Point& point, bool tangents) const;
+    double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                     bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
-    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver);
+    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
+                       FrictionModel model);
+    void after_impact(const MixedSystem& system);
+    void mark_held(const MixedSystem& system);
+    void move_on(const MixedSystem& system, std::vector<Vec6>& next);
+    bool outrun(const std::vector<Vec6>& velocity);
+    RowBlock resting_row(Point& point) const;
+    void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+               const FrictionReport& report);
+    void correct_events(const MixedSystem& system);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
-    double explained_depth(std::size_t k) const noexcept;
-    bool is_closed(std::size_t k) const noexcept;
+    double time_left(const Point& point) const noexcept;
+    double explained_depth(const Point& point) const noexcept;
+    double size(const Contact& contact) const noexcept;
+    bool is_closed(const Contact& contact) const noexcept;
 
     Detection detection_;
     std::vector<SurfaceMaterial> materials_;
     std::vector<int> unknown_;
     ContactOptions options_;
+    std::vector<IndexPair> joints_;
+    std::vector<char> jointed_;  // bodies with rows of joints
+    std::vector<char> ball_;     // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
 
-    std::vector<Contact> contacts_;
+    std::vector<Pose> poses_;
+    std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
+    std::vector<IndexPair> open_;                    // pairs that may still meet in this step
+    std::vector<char> supported_;                    // bodies with a closed contact
+    std::vector<double> depth_;                      // of a body's closed contacts, m
+    std::vector<Contact> scratch_;
+    std::vector<int> root_;
+    std::vector<std::uint64_t> known_;
+    std::vector<double> lead_, event_time_;
     std::vector<Point> points_;
-    std::vector<Touch> touches_;  // of this step; of the step before until solve()
-    std::vector<double> margin_;
+    std::vector<Touch> touches_;  // of the last step until the end of solve()
+    std::vector<double> margin_, before_;
+    std::vector<char> held_;        // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
-    double residual_ = 0.0;
+    int impact_rounds_ = 0;
+    double residual_ = 0.0, unsettled_by_ = 0.0;
+    int unsettled_body_ = -1;
     ContactCounters counters_;
 };
 

@@ -30,6 +30,15 @@ struct FrictionReport {
     bool finite = true;
 };
 
+/// The row that is furthest from its law, and by how much: each multiplier against where a step of projection would
+/// put it, as a velocity [m/s]. For the box `FrictionPoint::normal` is the bound's.
+struct RowsResidual {
+    double residual = 0.0;
+    int row = 0;  // index into MixedSystem::rows
+};
+RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+                           FrictionModel model);
+
 /// Slip velocity along tangent i (1 or 2), with what slip compliance gives way: D v + (gamma/h) beta.
 inline double slip(const RowBlock& block, const FrictionPoint& point, int i,
                    const std::vector<Vec6>& velocity) noexcept {

@@ -4,154 +4,204 @@
 #include <cmath>
 
 #include "linear/elementary.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
-/// What one block needs in every sweep: M⁻¹ Gᵀ, and S = G M⁻¹ Gᵀ + Sig.
-struct PreparedBlock {
-    std::array<Vec6, 6> first, second;  // M⁻¹ Gᵀ, one per row
-    Mat6 schur{};
-    bool bilateral = true;
-    int point = -1;                   // its friction point
-    double step = 0.0;                // 1/lambda_max of the tangents' part
-    std::array<double, 36> factor{};  // of schur, of a bilateral block
+/// One row as a sweep reads it: Jacobian of both ends, M⁻¹ Gᵀ, own inertia. An end that does not move is zero and
+/// belongs to a spare body behind the others, so that no row needs a branch.
+struct SweepRow {
+    Vec6 first, second;            // G
+    Vec6 first_push, second_push;  // M⁻¹ Gᵀ
+    double own = 0.0;              // (G M⁻¹ Gᵀ + Sig)ᵢᵢ
+    double softness = 0.0, right = 0.0, lower = 0.0, upper = 0.0, multiplier = 0.0;
 };
 
+/// One block of rows, and what is solved together in it.
+struct SweepBlock {
+    enum class Kind : unsigned char { bilateral, bounded, contact } kind = Kind::bounded;
+    int first = 0, second = 0;  // bodies
+    int row = 0, size = 0;      // rows_[row] … rows_[row + size)
+    int point = -1;             // its friction point
+    int factor = -1;            // of a bilateral block, in factors_
+    double step = 0.0;          // of a contact: 1/lambda_max of the tangents' part
+};
+
+/// Lays a system out for sweeping: rows one behind the other, velocities in one array. Memory is kept from use to
+/// use, so that nothing is allocated once the largest system has been seen.
 class Sweeper {
 public:
-    Sweeper(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model)
-        : system_(system), points_(points), model_(model), blocks_(system.rows.size()) {
+    void prepare(MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
+        model_ = model;
+        const std::size_t bodies = system.mass.size();
+        mass_factor_.resize(bodies);
+        velocity_.resize(bodies + 1);
+        for (std::size_t b = 0; b < bodies; ++b) {
+            mass_factor_[b] = factor_six(system.mass[b]);
+            velocity_[b] = system.momentum[b];
+            solve_six(mass_factor_[b], velocity_[b]);
+        }
+        velocity_[bodies] = Vec6{};
+        rows_.clear();
+        factors_.clear();
+        blocks_.assign(system.rows.size(), {});
         for (std::size_t k = 0; k < points.size(); ++k) blocks_[points[k].block].point = static_cast<int>(k);
-        std::vector<Mat6> mass_factor;
-        mass_factor.reserve(system.mass.size());
-        for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
-        for (std::size_t k = 0; k < blocks_.size(); ++k) prepare(system.rows[k], blocks_[k], mass_factor);
-        system.velocity = system.momentum;
-        for (std::size_t b = 0; b < system.mass.size(); ++b) solve_six(mass_factor[b], system.velocity[b]);
         for (std::size_t k = 0; k < blocks_.size(); ++k)
-            for (int i = 0; i < system.rows[k].size; ++i) push(k, i, system.rows[k].multiplier[i]);
+            add(system.rows[k], blocks_[k], static_cast<int>(bodies));
+        for (const SweepBlock& block : blocks_)
+            for (int i = 0; i < block.size; ++i)
+                push(block, rows_[block.row + i], rows_[block.row + i].multiplier);
     }
 
     /// One sweep; the largest change of a row, as a velocity. With `friction_only` all but tangents is held.
-    double sweep(bool friction_only) {
+    double sweep(std::vector<FrictionPoint>& points, bool friction_only) noexcept {
         double change = 0.0;
-        for (std::size_t k = 0; k < blocks_.size(); ++k) {
-            const PreparedBlock& prepared = blocks_[k];
-            if (prepared.point >= 0) {
-                if (!friction_only) change = std::max(change, update_row(k, 0));
-                change = std::max(change, update_tangents(k));
+        for (const SweepBlock& block : blocks_) {
+            if (block.kind == SweepBlock::Kind::contact) {
+                if (!friction_only) change = std::max(change, update_row(block, rows_[block.row]));
+                change = std::max(change, update_tangents(block, points[block.point]));
             } else if (!friction_only) {
-                if (prepared.bilateral) change = std::max(change, update_block(k));
+                if (block.kind == SweepBlock::Kind::bilateral) change = std::max(change, update_block(block));
                 else
-                    for (int i = 0; i < system_.rows[k].size; ++i)
-                        change = std::max(change, update_row(k, i));
+                    for (int i = 0; i < block.size; ++i)
+                        change = std::max(change, update_row(block, rows_[block.row + i]));
             }
         }
         return change;
     }
 
-    double normal_scale(int block) const noexcept { return blocks_[block].schur[0]; }
+    void write(MixedSystem& system) const {
+        system.velocity.assign(velocity_.begin(), velocity_.end() - 1);
+        for (std::size_t k = 0; k < blocks_.size(); ++k)
+            for (int i = 0; i < blocks_[k].size; ++i) {
+                const SweepRow& row = rows_[blocks_[k].row + i];
+                system.rows[k].multiplier[i] = row.multiplier;
+                system.rows[k].lower[i] = row.lower;
+                system.rows[k].upper[i] = row.upper;
+            }
+    }
 
 private:
-    void prepare(RowBlock& block, PreparedBlock& prepared, const std::vector<Mat6>& mass_factor) {
-        const int n = block.size;
-        for (int i = 0; i < n; ++i) {
-            prepared.first[i] = block.first_jacobian[i];
-            prepared.second[i] = block.second_jacobian[i];
-            if (block.first >= 0) solve_six(mass_factor[block.first], prepared.first[i]);
-            if (block.second >= 0) solve_six(mass_factor[block.second], prepared.second[i]);
-            prepared.bilateral =
-                prepared.bilateral && block.lower[i] == -unbounded && block.upper[i] == unbounded;
-        }
-        for (int i = 0; i < n; ++i)
-            for (int j = 0; j < n; ++j) {
-                double& s = prepared.schur[6 * i + j];
-                if (block.first >= 0) s += dot(block.first_jacobian[i], prepared.first[j]);
-                if (block.second >= 0) s += dot(block.second_jacobian[i], prepared.second[j]);
-                if (i == j) s += block.softness[i];
+    void add(const RowBlock& given, SweepBlock& block, int spare) {
+        block.first = given.first >= 0 ? given.first : spare;
+        block.second = given.second >= 0 ? given.second : spare;
+        block.row = static_cast<int>(rows_.size());
+        block.size = given.size;
+        bool bilateral = true;
+        for (int i = 0; i < given.size; ++i) {
+            SweepRow& row = rows_.emplace_back();
+            if (given.first >= 0) {
+                row.first = row.first_push = given.first_jacobian[i];
+                solve_six(mass_factor_[given.first], row.first_push);
             }
-        for (int i = n; i < 6; ++i) prepared.schur[6 * i + i] = 1.0;
-        if (prepared.point >= 0) {
-            const double a = prepared.schur[7], b = prepared.schur[14], c = prepared.schur[8];
-            prepared.step = 1.0 / (0.5 * (a + b) + length(0.5 * (a - b), c));
-        } else if (prepared.bilateral) {
+            if (given.second >= 0) {
+                row.second = row.second_push = given.second_jacobian[i];
+                solve_six(mass_factor_[given.second], row.second_push);
+            }
+            row.softness = given.softness[i];
+            row.right = given.right[i];
+            row.lower = given.lower[i];
+            row.upper = given.upper[i];
+            row.multiplier = given.multiplier[i];
+            row.own = schur(row, row) + row.softness;
+            bilateral = bilateral && row.lower == -unbounded && row.upper == unbounded;
+        }
+        if (block.point >= 0) {
+            block.kind = SweepBlock::Kind::contact;
+            const double a = rows_[block.row + 1].own, b = rows_[block.row + 2].own;
+            const double c = schur(rows_[block.row + 1], rows_[block.row + 2]);
+            block.step = 1.0 / (0.5 * (a + b) + length(0.5 * (a - b), c));
+        } else if (bilateral) {
+            block.kind = SweepBlock::Kind::bilateral;
+            Mat6 whole{};
+            for (int i = 0; i < 6; ++i) whole[7 * i] = 1.0;
+            for (int i = 0; i < block.size; ++i)
+                for (int j = 0; j < block.size; ++j)
+                    whole[6 * i + j] =
+                        i == j ? rows_[block.row + i].own : schur(rows_[block.row + i], rows_[block.row + j]);
             // A body tied twice to the world makes no singular block; a rigid joint without inertia would.
-            Mat6 guarded = prepared.schur;
-            for (int i = 0; i < n; ++i) guarded[7 * i] *= 1.0 + 1e-12;
-            prepared.factor = factor_six(guarded);
+            for (int i = 0; i < block.size; ++i) whole[7 * i] *= 1.0 + 1e-12;
+            block.factor = static_cast<int>(factors_.size());
+            factors_.push_back(factor_six(whole));
         }
     }
 
-    void push(std::size_t k, int i, double impulse) noexcept {
-        const RowBlock& block = system_.rows[k];
-        const PreparedBlock& prepared = blocks_[k];
-        for (int a = 0; a < 6; ++a) {
-            if (block.first >= 0) system_.velocity[block.first][a] += prepared.first[i][a] * impulse;
-            if (block.second >= 0) system_.velocity[block.second][a] += prepared.second[i][a] * impulse;
-        }
+    static double schur(const SweepRow& a, const SweepRow& b) noexcept {
+        return dot(a.first, b.first_push) + dot(a.second, b.second_push);
     }
 
-    double update_row(std::size_t k, int i) noexcept {
-        RowBlock& block = system_.rows[k];
-        const double own = blocks_[k].schur[7 * i], old = block.multiplier[i];
-        if (!(own > 0.0)) return 0.0;
-        block.multiplier[i] =
-            std::clamp(old - row_residual(block, i, system_.velocity) / own, block.lower[i], block.upper[i]);
-        push(k, i, block.multiplier[i] - old);
-        return std::abs(block.multiplier[i] - old) * own;
+    double residual(const SweepBlock& block, const SweepRow& row) const noexcept {
+        return dot(row.first, velocity_[block.first]) + dot(row.second, velocity_[block.second]) +
+               row.softness * row.multiplier - row.right;
     }
 
-    double update_block(std::size_t k) noexcept {
-        RowBlock& block = system_.rows[k];
+    void push(const SweepBlock& block, const SweepRow& row, double impulse) noexcept {
+        Vec6 &v = velocity_[block.first], &w = velocity_[block.second];
+        for (int a = 0; a < 6; ++a) v[a] += row.first_push[a] * impulse;
+        for (int a = 0; a < 6; ++a) w[a] += row.second_push[a] * impulse;
+    }
+
+    double update_row(const SweepBlock& block, SweepRow& row) noexcept {
+        if (!(row.own > 0.0)) return 0.0;
+        const double old = row.multiplier;
+        row.multiplier = std::clamp(old - residual(block, row) / row.own, row.lower, row.upper);
+        const double change = row.multiplier - old;
+        if (change == 0.0) return 0.0;
+        push(block, row, change);
+        return std::abs(change) * row.own;
+    }
+
+    double update_block(const SweepBlock& block) noexcept {
         Vec6 change{};
         double largest = 0.0;
         for (int i = 0; i < block.size; ++i) {
-            change[i] = -row_residual(block, i, system_.velocity);
+            change[i] = -residual(block, rows_[block.row + i]);
             largest = std::max(largest, std::abs(change[i]));
         }
-        solve_six(blocks_[k].factor, change);
+        solve_six(factors_[block.factor], change);
         for (int i = 0; i < block.size; ++i) {
-            block.multiplier[i] += change[i];
-            push(k, i, change[i]);
+            rows_[block.row + i].multiplier += change[i];
+            push(block, rows_[block.row + i], change[i]);
         }
         return largest;
     }
 
-    double update_tangents(std::size_t k) noexcept {
-        RowBlock& block = system_.rows[k];
-        const PreparedBlock& prepared = blocks_[k];
-        const FrictionPoint& point = points_[prepared.point];
+    double update_tangents(const SweepBlock& block, const FrictionPoint& point) noexcept {
+        SweepRow &one = rows_[block.row + 1], &two = rows_[block.row + 2];
+        const double normal = model_ == FrictionModel::box ? point.normal : rows_[block.row].multiplier;
+        const double bound = point.coefficient * std::max(0.0, normal);
         if (model_ != FrictionModel::cone) {
-            const double bound =
-                point.coefficient *
-                std::max(0.0, model_ == FrictionModel::box ? point.normal : block.multiplier[0]);
-            double change = 0.0;
-            for (int i = 1; i <= 2; ++i) {
-                block.lower[i] = -bound;
-                block.upper[i] = bound;
-                change = std::max(change, update_row(k, i));
-            }
-            return change;
+            one.lower = two.lower = -bound;
+            one.upper = two.upper = bound;
+            const double change = update_row(block, one);
+            return std::max(change, update_row(block, two));
         }
-        const double b1 = block.multiplier[1], b2 = block.multiplier[2];
-        double d1 = b1 - prepared.step * row_residual(block, 1, system_.velocity);
-        double d2 = b2 - prepared.step * row_residual(block, 2, system_.velocity);
-        const double bound = point.coefficient * std::max(0.0, block.multiplier[0]), reach = length(d1, d2);
+        const double b1 = one.multiplier, b2 = two.multiplier;
+        double d1 = b1 - block.step * residual(block, one);
+        double d2 = b2 - block.step * residual(block, two);
+        const double reach = length(d1, d2);
         if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
-        block.multiplier[1] = d1;
-        block.multiplier[2] = d2;
-        push(k, 1, d1 - b1);
-        push(k, 2, d2 - b2);
-        return length(d1 - b1, d2 - b2) / prepared.step;
+        one.multiplier = d1;
+        two.multiplier = d2;
+        push(block, one, d1 - b1);
+        push(block, two, d2 - b2);
+        return length(d1 - b1, d2 - b2) / block.step;
     }
 
-    MixedSystem& system_;
-    std::vector<FrictionPoint>& points_;
-    FrictionModel model_;
-    std::vector<PreparedBlock> blocks_;
+    FrictionModel model_ = FrictionModel::cone;
+    std::vector<Mat6> mass_factor_, factors_;
+    std::vector<Vec6> velocity_;
+    std::vector<SweepRow> rows_;
+    std::vector<SweepBlock> blocks_;
 };
+
+/// One per thread: its memory outlives a solve, its values do not.
+Sweeper& sweeper() {
+    static thread_local Sweeper own;
+    return own;
+}
 
 /// The box bounds friction by the step before; where there was none, by the load of this step's first guess.
 void guess_unknown_normals(const MixedSystem& system, std::vector<FrictionPoint>& points) {
@@ -165,12 +215,15 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
                                int iterations, double tolerance) {
     FrictionReport report;
     guess_unknown_normals(system, points);
-    Sweeper sweeper(system, points, model);
+    Sweeper& sweeps = sweeper();
+    sweeps.prepare(system, points, model);
     report.residual = unbounded;
     while (report.sweeps < iterations && report.residual > tolerance) {
-        report.residual = sweeper.sweep(false);
+        Watch::look();
+        report.residual = sweeps.sweep(points, false);
         ++report.sweeps;
     }
+    sweeps.write(system);
     if (system.rows.empty()) report.residual = 0.0;
     report.converged = report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
@@ -196,13 +249,16 @@ FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& poi
         if (points.empty() || !pivots.finite) return report;
         guess_unknown_normals(system, points);
 
-        Sweeper sweeper(system, points, model);
+        Sweeper& sweeps = sweeper();
+        sweeps.prepare(system, points, model);
         double largest = 0.0, sweep = unbounded;
         for (int inner = 0; inner < iterations && sweep > 0.1 * tolerance; ++inner) {
-            sweep = sweeper.sweep(true);
+            Watch::look();
+            sweep = sweeps.sweep(points, true);
             if (inner == 0) largest = sweep;
             ++report.sweeps;
         }
+        sweeps.write(system);
         for (FrictionPoint& point : points) {
             const double normal = system.rows[point.block].multiplier[0];
             if (model != FrictionModel::box) point.normal = normal;

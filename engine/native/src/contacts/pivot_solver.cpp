@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contacts/friction_sweeps.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
@@ -222,6 +223,7 @@ bool PivotSolver::conjugate_directions() {
     const double small = 1e-15 * speed_;
     int round = 0, stalled = 0;
     for (; round < max_directions && before > small && stalled < 8; ++round) {
+        Watch::look();
         solution_.assign(residual_.size(), 0.0);
         for (std::size_t k = 0; k < relieved_.size(); ++k) solution_[relieved_[k].at] = gradient_[k];
         matrix_.solve(solution_.data());
@@ -299,9 +301,9 @@ int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
 PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     PivotReport report;
     report.converged = false;
-    tolerance_ = tightest;
     system.velocity.resize(system.mass.size());
     if (analyse(system)) same_matrix = false;
+    tolerance_ = tightest;
     if (!same_matrix) measure(system);
 
     int bounded = 0;
@@ -322,6 +324,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
     int best = 1 << 30, left = patience;
     for (int round = 0; round < last_round; ++round) {
+        Watch::look();
         bool stale = !same_matrix || !factored_;
         for (std::size_t b = 0; b < bounded_.size() && !stale; ++b)
             stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) !=

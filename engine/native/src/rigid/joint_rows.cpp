@@ -137,8 +137,8 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
     for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
-        *bias++ = dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), parting) +
-                  dot(spun(w1, axes[k]), ends.gap);
+        *bias++ =
+            dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), parting) + dot(spun(w1, axes[k]), ends.gap);
     if (joint.kind == JointKind::ball) return;
     if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
         // q = t₁* t₂ with t' = ½ w t gives q'' = ¼ t₁* (d w₂ − w₁ d) t₂, d = w₂ − w₁.

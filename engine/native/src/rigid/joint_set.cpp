@@ -46,6 +46,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             if (spec.has_limit) {
                 axial.lower = spec.limit_lower;
                 axial.upper = spec.limit_upper;
+                axial.restitution = spec.limit_restitution;
                 axial.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
                 block.softness[block.size++] = axial.limit.softness;
             }
@@ -107,14 +108,22 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         // row at all, and a bounce off the limit would depend on the phase of the step.
         const bool low = axial.lower == axial.upper || state.angle - axial.lower <= axial.upper - state.angle;
         const double violation = state.angle - (low ? axial.lower : axial.upper);
-        const bool open = low ? violation > 0.0 : violation < 0.0;
         const Regularisation& r = axial.limit;
+        const double held = r.upsilon * row.rate - r.violation_gain * violation;
         if (axial.lower == axial.upper) {
-            next(r.upsilon * row.rate - r.violation_gain * violation);
+            next(held);
         } else {
-            const int limit =
-                next(open ? -violation / time_step_ : r.upsilon * row.rate - r.violation_gain * violation);
-            (low ? right.lower : right.upper)[limit] = 0.0;
+            const double inwards = low ? 1.0 : -1.0, gap = inwards * violation,
+                         approach = -inwards * row.rate;
+            const bool open = gap > 0.0, hit = approach > 0.0 && !state.at_limit;
+            double value = open ? -violation / time_step_ : held;
+            if (axial.restitution > 0.0 && (open ? time_step_ * approach > gap : hit))
+                value = inwards * axial.restitution * approach;
+            else if (!open &&
+                     hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
+                value = -r.violation_gain * violation;
+            state.at_limit = !open;
+            (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
     if (axial.has_spring)

@@ -34,8 +34,9 @@ public:
         std::array<double, 6> multiplier{};
         std::array<double, 3> axial_multiplier{};
         Vec3 first_reach,
-            second_reach;    // from the centres to the point where forces are read, at the last step
-        double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
+            second_reach;       // from the centres to the point where forces are read, at the last step
+        bool at_limit = false;  // the free coordinate's limit was closed in the last step
+        double angle = 0.0;     // unwrapped coordinate of a hinge that needs it
     };
 
     JointSet(const RigidScene& scene, double time_step);
@@ -83,7 +84,7 @@ private:
     struct Axial {
         bool has_motor = false, has_limit = false, has_spring = false;
         double speed = 0.0, impulse = 0.0;
-        double lower = 0.0, upper = 0.0, spring_rest = 0.0;
+        double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0;
         Regularisation limit, spring;
     };
 

@@ -19,8 +19,7 @@ void RigidSystem::find_bias(double* bias) const {
             const int body = second ? blocks[k].second : blocks[k].first;
             if (body < 0 || !constants_[body].moves() || constants_[body].particle) continue;
             const BodyState& s = live_.bodies[body];
-            const Vec3 gyro =
-                turned_by(constants_[body], s, cross(s.angular_velocity, s.angular_momentum));
+            const Vec3 gyro = turned_by(constants_[body], s, cross(s.angular_velocity, s.angular_momentum));
             const double* rows = jacobian(static_cast<int>(k), second) + 3;
             for (int i = 0; i < blocks[k].size; ++i)
                 bias[i] -= dot({rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]}, gyro);
@@ -119,8 +118,7 @@ void RigidSystem::bend_rows_back() {
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
             if (joints_.blocks()[k].axial) continue;
-            const double back =
-                live_.last_violation[row] - violation_[row] + h_ * row_speed(k, i, false);
+            const double back = live_.last_violation[row] - violation_[row] + h_ * row_speed(k, i, false);
             const JointSet::RowGain gain = joints_.gain(k, i);
             const double cap = method_.correction_cap * gain.extent;
             right_[row] -= gain.violation * 0.25 * std::clamp(back, -cap, cap);

@@ -40,6 +40,7 @@ struct JointSpec {
     bool has_motor = false, has_limit = false, has_spring = false;
     double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
     double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
+    double limit_restitution = 0.0;
     double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
 };
 
@@ -81,6 +82,8 @@ struct RigidMethod {
     FrictionModel friction = FrictionModel::cone;
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
+    ImpactOrder impacts = ImpactOrder::simultaneous;
+    double unsettled_residual = 0.1;    // m/s
     int composition = 2;                // order; above 2 a symmetric composition of constrained steps
     bool half_step_velocities = false;  // velocities live at mid-step
     int corrections = 0;                // extra solves per step for the curvature of the rows

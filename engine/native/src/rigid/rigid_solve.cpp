@@ -245,15 +245,19 @@ void RigidSystem::fill_momenta(bool forces) {
         const int i = tied_[k];
         const BodyState& s = live_.bodies[i];
         const Vec3 p = constants_[i].mass * (forces ? s.velocity + kick(i) : s.velocity);
-        const Vec3 l = forces ? s.angular_momentum + h_ * constants_[i].torque : s.angular_momentum;
+        const Vec3 l = forces ? s.angular_momentum + twist(i) : s.angular_momentum;
         mixed_.momentum[k] = {p.x, p.y, p.z, l.x, l.y, l.z};
     }
 }
 
-void RigidSystem::take_velocities(bool angular_too) {
+void RigidSystem::take_velocities(bool angular_too, const std::function<bool(int)>& untouched) {
     for (std::size_t k = 0; k < tied_.size(); ++k) {
         const Vec6& v = mixed_.velocity[k];
         BodyState& s = live_.bodies[tied_[k]];
+        if (untouched && untouched(static_cast<int>(k))) {  // not a bit of it may change
+            if (!angular_too) kick_free_body(tied_[k]);
+            continue;
+        }
         s.velocity = {v[0], v[1], v[2]};
         if (constants_[tied_[k]].particle) continue;
         s.angular_momentum = s.inertia * Vec3{v[3], v[4], v[5]};
@@ -261,12 +265,36 @@ void RigidSystem::take_velocities(bool angular_too) {
     }
 }
 
+/// Bodies led to the time of an event take the part of their forces that acts before it.
+void RigidSystem::lead_events() {
+    share_.assign(constants_.size(), 1.0);
+    for (int i : tied_) {
+        const double lead = contacts_->lead(i);
+        if (lead == 0.0) continue;
+        BodyState& s = live_.bodies[i];
+        const Vec3 twist = lead * h_ * constants_[i].torque;
+        const Vec3 dv = lead * kick(i), dw = turned_by(constants_[i], s, twist);
+        s.velocity += dv;
+        s.angular_momentum += twist;
+        s.angular_velocity += dw;
+        for (int k = 0; k < 3; ++k) velocities_[i][k] += dv[k], velocities_[i][3 + k] += dw[k];
+        share_[i] = 1.0 - lead;
+    }
+}
+
+void RigidSystem::note_unsettled(int body, double residual) {
+    Unsettled& first = live_.unsettled;
+    if (first.body < 0) first.body = body, first.step = live_.step;
+    first.residual = std::max(first.residual, residual);
+}
+
 void RigidSystem::impact() {
     fill_momenta(false);
     fill_rows();
     contacts_->impact(mixed_);
-    take_velocities(true);
-    for (std::size_t k = 0; k < tied_.size(); ++k) velocities_[tied_[k]] = mixed_.velocity[k];
+    take_velocities(true, [this](int k) { return !contacts_->held(k); });
+    for (std::size_t k = 0; k < tied_.size(); ++k)
+        if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
     if (clock_) clock_->mark(Stage::impact);
 }
 
@@ -275,7 +303,8 @@ void RigidSystem::solve_mixed(bool touching) {
     const auto blocks = joints_.blocks();
     mixed_.rows.resize(blocks.size());
     fill_masses();
-    if (touching && stages_.runs(Stage::impact) && contacts_->impact_needed()) impact();
+    if (touching) lead_events();
+    while (touching && stages_.runs(Stage::impact) && contacts_->impact_needed()) impact();
     fill_momenta(true);
     fill_rows();
     if (clock_) clock_->mark(Stage::assemble_rows);
@@ -284,6 +313,8 @@ void RigidSystem::solve_mixed(bool touching) {
     if (touching) {
         finite = contacts_->solve(mixed_, velocities_);
         residual_ = std::max(residual_, contacts_->residual());
+        if (contacts_->unsettled_body() >= 0)
+            note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by());
     } else if (solver_ == RigidSolver::iterative) {
         std::vector<FrictionPoint> none;
         const FrictionReport report =
@@ -305,7 +336,9 @@ void RigidSystem::solve_mixed(bool touching) {
         double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
         std::copy_n(mixed_.rows[k].multiplier.data(), blocks[k].size, multiplier);
     }
-    take_velocities(false);
+    if (touching) take_velocities(false, [this](int k) { return !contacts_->held(k); });
+    else take_velocities(false, {});
+    share_.clear();
     if (clock_) clock_->mark(solver_ == RigidSolver::iterative ? Stage::solve_iterative : Stage::pivot);
 }
 

@@ -35,6 +35,7 @@ void RigidSystem::apply_forces() {
 }
 
 void RigidSystem::step() {
+    ++live_.step;
     if (clock_) clock_->start();
     if (!live_.velocity_ready) velocity_stage();
     live_.velocity_ready = false;
@@ -61,7 +62,7 @@ void RigidSystem::velocity_stage() {
 void RigidSystem::kick_free_body(int i) noexcept {
     BodyState& s = live_.bodies[i];
     s.velocity += kick(i);
-    s.angular_momentum += h_ * constants_[i].torque;
+    s.angular_momentum += twist(i);
 }
 
 void RigidSystem::kick_free_bodies() {

@@ -62,6 +62,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if (touching) {
         std::vector<char> dynamic;
         std::vector<SurfaceMaterial> materials;
+        std::vector<IndexPair> joint_pairs;
+        for (const JointBlock& block : joints_.blocks()) joint_pairs.push_back({block.first, block.second});
         for (const RigidBodySpec& spec : scene.bodies) {
             dynamic.push_back(spec.motion == Motion::dynamic);
             materials.push_back(spec.material);
@@ -73,7 +75,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         fresh_contacts_.emplace(
             Detection(scene.colliders, dynamic, scene.no_contact), materials, slot_,
             ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
-                           method_.floor, method_.refinements});
+                           method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
+            joint_pairs);
     }
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
@@ -124,6 +127,7 @@ void RigidSystem::reset(StageClock* clock) {
     pivot_.floor = method_.floor;
     pivot_.refinements = method_.refinements;
     contacts_ = fresh_contacts_;
+    share_.clear();
     matrix_.clear_counters();
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
@@ -175,9 +179,10 @@ Health RigidSystem::health() const {
         return {Status::diverged, live_.too_fast,
                 "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
     if (live_.lost >= 0)
-        return {Status::diverged, live_.lost,
-                "is held by joints that no motion satisfies, even in a small part of the step; start it where its "
-                "joints can move, or take a smaller time step"};
+        return {
+            Status::diverged, live_.lost,
+            "is held by joints that no motion satisfies, even in a small part of the step; start it where its "
+            "joints can move, or take a smaller time step"};
     if (live_.contradicted >= 0)
         return {Status::diverged, live_.contradicted,
                 "is held by rows that contradict each other; give one of them a compliance"};
@@ -281,6 +286,14 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     report.counters["force_evaluations"] = substeps * (static_cast<std::int64_t>(springs_.size()) +
                                                        static_cast<std::int64_t>(fields_.size()) * moving);
     report.residual = residual_;
+    if (const Unsettled& left = live_.unsettled; left.body >= 0) {
+        report.residual = std::max(report.residual, left.residual);
+        if (report.status == Status::completed) {
+            report.status = Status::unsettled;
+            report.failed_body = left.body;
+            report.failed_step = (left.step + method_.substeps - 1) / method_.substeps;
+        }
+    }
     if (!contacts_) return;
     const ContactCounters contact = contacts_->counters();
     put("contacts", contact.contacts);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -41,10 +42,12 @@ public:
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const;
     void save() {
-        saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_, saved_contacts_ = contacts_;
+        saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_;
+        if (contacts_) saved_contacts_ = contacts_->memory();
     }
     void restore() {
-        live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_, contacts_ = saved_contacts_;
+        live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_;
+        if (contacts_) contacts_->remember(saved_contacts_);
     }
     /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
     std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
@@ -53,6 +56,14 @@ public:
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
     void count(RunReport& report, std::int64_t steps) const;
+    /// The first step with a solve that left its rows further from their law than the method allows, the body it
+    /// concerns, and the largest such residual of the run.
+    struct Unsettled {
+        int body = -1;
+        std::int64_t step = 0;  // of h, counted from 1
+        double residual = 0.0;  // m/s
+    };
+    const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
 
     // What can be observed:
@@ -87,15 +98,17 @@ private:
         int not_solved = -1;  // a body of a system that could not be factored
         double share = 0.0;  // how redundant rows share their load: a softness in the factor; −1: they do not
         int contradicted = -1;  // a body held by rows that cannot hold together
+        std::int64_t step = 0;  // steps of h done
+        Unsettled unsettled;
         // Velocities at mid-step:
-        bool velocity_ready = false;        // the velocities of the coming step are found already
-        LargeArray<BodyMomenta> before;     // those of the step before
-        std::vector<double> last_violation; // per row, where the step before began
+        bool velocity_ready = false;         // the velocities of the coming step are found already
+        LargeArray<BodyMomenta> before;      // those of the step before
+        std::vector<double> last_violation;  // per row, where the step before began
         // Compositions:
-        double pending = 0.0;               // s: half a stage still to be kicked
-        int lost = -1;                      // a body of rows that no motion satisfies
+        double pending = 0.0;  // s: half a stage still to be kicked
+        int lost = -1;         // a body of rows that no motion satisfies
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
-        std::vector<double> history;        // stages × three steps × rows: the rows' forces, N
+        std::vector<double> history;  // stages × three steps × rows: the rows' forces, N
     };
 
     void take_stages(const RigidScene& scene);
@@ -134,7 +147,8 @@ private:
     void fill_momenta(bool forces);
     void fill_rows();
     void impact();
-    void take_velocities(bool angular_too);
+    void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
+    void note_unsettled(int body, double residual);
     void solve_block();
     bool solve_once();
     bool solve_shared();
@@ -145,14 +159,17 @@ private:
     void integrate_all();
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
+    double share(int body) const noexcept { return share_.empty() ? 1.0 : share_[body]; }
     const double* jacobian(int block, bool second) const noexcept {
         return const_cast<RigidSystem*>(this)->jacobian(block, second);
     }
     Vec3 kick(int body) const noexcept {  // change of velocity by forces in a step
         Vec3 dv = h_ * acceleration_[body];
         if (!force_.empty()) dv += (h_ / constants_[body].mass) * force_[body];
-        return dv;
+        return share_.empty() ? dv : share_[body] * dv;
     }
+    Vec3 twist(int body) const noexcept { return share(body) * h_ * constants_[body].torque; }
+    void lead_events();
 
     // The scene.
     StageList stages_;
@@ -189,13 +206,15 @@ private:
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_, saved_mixed_;
     PivotSolver pivot_;
-    std::optional<ContactStage> contacts_, fresh_contacts_, saved_contacts_;
+    std::optional<ContactStage> contacts_, fresh_contacts_;
+    ContactStage::Memory saved_contacts_;
+    std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
     double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, velocities_seen_ = false;
-    LargeArray<BodyState> trial_;     // per body
+    LargeArray<BodyState> trial_;  // per body
     std::vector<double> first_right_, violation_, bias_, multiplier_;
     static constexpr int MOST_HALVINGS = 12;
     LargeArray<BodyState> step_start_[MOST_HALVINGS];

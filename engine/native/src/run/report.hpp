@@ -13,7 +13,8 @@ namespace spook {
 /// |x| [m] or |v| [m/s] beyond this is a runaway: the run ends as diverged.
 inline constexpr double RUNAWAY = 1e100;
 
-SPOOK_NAMED_ENUM(Status, completed, diverged, not_finite, timed_out)
+/// unsettled: all steps done, but some solve left more than its method allows; the values are kept.
+SPOOK_NAMED_ENUM(Status, completed, diverged, not_finite, timed_out, unsettled)
 
 /// One observable: `samples` rows of `width` values (one row for a reduction).
 struct Recording {

@@ -1,0 +1,160 @@
+"""Heaps and stacks: what a step costs, at which overlap, and how the cost grows. Exit code 1 if a limit is missed.
+
+    python bench/bench_heaps.py [--largest 10000]
+
+Costs are CPU time of this process; the claims are ratios of costs measured side by side in one run. A heap is
+10 × 10 × n bodies of 1 kg dropped in a grid at a spacing of .55 m with a jitter of .02 m onto a plane.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+
+import numpy as np
+
+from spook_tracker.engine import (
+    Box,
+    ContactCount,
+    ContactForce,
+    Final,
+    Material,
+    Method,
+    Penetration,
+    Plane,
+    Result,
+    RigidBody,
+    Scene,
+    Shape,
+    Sphere,
+    compile,
+)
+
+TIME_STEP = 1.0 / 60.0  # s
+GRAVITY = 9.81  # m/s²
+ROUGH = Material(friction=0.5)
+GROUND = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
+GROWTH = 1.6  # × the cost per contact of the smallest heap: what sorting pairs and leaving the cache may cost
+REST = 0.5  # × one step of a stack that is hit: at rest no matrix is factored
+TALL = 1.6  # × the cost per box of a stack of 100, for one of 500 at rest
+BALL = Sphere(0.25)
+OVERLAP = 1e-3  # m, what heaps of spheres are compared at
+
+
+def heap(count: int, shape: Shape = BALL) -> Scene:
+    """Bodies in layers of a square grid."""
+    rng = np.random.default_rng(1)
+    side = 10 if count <= 1000 else math.ceil(math.sqrt(count / 10))
+    bodies = [GROUND]
+    for k in range(count):
+        x, y, z = 0.55 * (k % side), 0.55 * (k // side % side), 0.5 + 0.55 * (k // side**2)
+        dx, dy = rng.uniform(-0.02, 0.02, 2)
+        bodies.append(
+            RigidBody(name=f"b{k}", mass=1.0, shape=shape, position=(x + dx, y + dy, z), material=ROUGH)
+        )
+    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def stack(count: int, knock: float = 0.0) -> Scene:
+    """`count` unit boxes on each other, the topmost pushed sideways at `knock` [m/s]."""
+    boxes = [
+        RigidBody(
+            name=f"b{k}",
+            mass=1.0,
+            shape=Box((1.0, 1.0, 1.0)),
+            position=(0.0, 0.0, 0.5 + k),
+            velocity=(knock if k == count - 1 else 0.0, 0.0, 0.0),
+            material=ROUGH,
+        )
+        for k in range(count)
+    ]
+    return Scene(bodies=(GROUND, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def run(scene: Scene, steps: int, method: Method) -> tuple[float, Result]:
+    """CPU seconds per step, and the result."""
+    observe = {
+        "overlap": Final(quantity=Penetration()),
+        "contacts": Final(quantity=ContactCount()),
+        "load": Final(quantity=ContactForce("ground")),
+    }
+    program = compile(scene, time_step=TIME_STEP, method=method, observe=observe)
+    begin = time.process_time()
+    result = program.run(steps)
+    return (time.process_time() - begin) / steps, result
+
+
+def line(title: str, cost: float, result: Result, bodies: int) -> None:
+    weight = bodies * GRAVITY
+    load = -float(result["load"][2]) / weight
+    print(
+        f"  {title:<34}{1e3 * cost:>9.2f} ms{1e3 * float(result['overlap']):>12.3g} mm"
+        f"{int(result['contacts']):>9d}{load:>9.3f}  {result.status}",
+        flush=True,
+    )
+
+
+def at_equal_overlap(steps: int) -> bool:
+    """1000 spheres over four seconds: the cheapest setting of each solver within OVERLAP."""
+    print(
+        f"1000 spheres, mean over {steps} steps: CPU a step, overlap, contacts and load / weight at the end"
+    )
+    reached = False
+    for iterations in (5, 10, 20, 50):
+        for substeps in (1, 2, 4):
+            if iterations * substeps > 60:
+                continue
+            method = Method(solver="iterative", iterations=iterations, substeps=substeps)
+            cost, result = run(heap(1000), steps, method)
+            line(f"{iterations} sweeps, {substeps} substeps", cost, result, 1000)
+            reached = reached or float(result["overlap"]) <= OVERLAP
+    return reached
+
+
+def growth(largest: int, steps: int) -> bool:
+    """The cost per contact of a heap against its size."""
+    print(f"heaps of spheres, 10 sweeps, {steps} steps: growth of the cost per body, limit {GROWTH} ×")
+    kept, first = True, 0.0
+    for count in (1000, 10_000, 100_000):
+        if count > largest:
+            break
+        cost, result = run(heap(count), steps, Method(solver="iterative", iterations=10))
+        each = cost / max(1, result.counters["contacts"]) * steps
+        first = first or each
+        line(f"{count} bodies", cost, result, count)
+        print(f"    {1e6 * each:.2f} us a contact and step, {each / first:.2f} × that of 1000")
+        kept = kept and each <= GROWTH * first
+    return kept
+
+
+def direct_at_rest() -> bool:
+    """Stacks: at rest against knocked, and tall against low."""
+    print(f"stacks, direct: at rest at most {REST} × a knocked one; 500 boxes at most {TALL} × 100 a box")
+    rest, result = run(stack(100), 120, Method())
+    line("100 at rest", rest, result, 100)
+    hit, result = run(stack(100, knock=0.5), 30, Method())
+    line("100, the topmost knocked", hit, result, 100)
+    tall, result = run(stack(500), 30, Method())
+    line("500 at rest", tall, result, 500)
+    return rest <= REST * hit and tall / 500 <= TALL * rest / 100
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--largest", type=int, default=10_000, help="largest heap (default 10000)")
+    parser.add_argument("--steps", type=int, default=240, help="steps of the heaps (default 240, 4 s)")
+    given = parser.parse_known_args()[0]
+    claims = {
+        "1000 spheres within the overlap": at_equal_overlap(given.steps),
+        "cost per contact grows little": growth(given.largest, max(20, given.steps // 4)),
+        "rest is cheap, and linear": direct_at_rest(),
+    }
+    for claim, kept in claims.items():
+        print(f"{'kept' if kept else 'NOT KEPT'}: {claim}")
+    return 0 if all(claims.values()) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

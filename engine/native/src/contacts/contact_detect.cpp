@@ -1,0 +1,331 @@
+// The contact stage's first part: which points are closed, which pairs will meet, and when.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "collision/sweep.hpp"
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double closed = 1e-9;   // gaps up to this part of the larger body's radius count as closed
+constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
+std::uint64_t pair_of(IndexPair pair) noexcept {
+    return (static_cast<std::uint64_t>(pair.first) << 24) | static_cast<std::uint64_t>(pair.second);
+}
+constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
+
+}  // namespace
+
+double ContactStage::size(const Contact& contact) const noexcept {
+    return std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
+}
+
+bool ContactStage::is_closed(const Contact& contact) const noexcept {
+    return contact.point.gap <= closed * size(contact);
+}
+
+void ContactStage::set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other) {
+    const double h = options_.time_step;
+    const std::vector<double>& radius = detection_.radius();
+    for (std::size_t b = 0; b < margin_.size(); ++b) {
+        const double speed = std::max(norm(linear(velocity[b])), norm(linear(other[b])));
+        const double spin = std::max(norm(angular(velocity[b])), norm(angular(other[b])));
+        margin_[b] = h * (speed + spin * radius[b]) + closed * radius[b];
+    }
+}
+
+/// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
+bool ContactStage::reachable(const Contact& contact) const {
+    const std::vector<double>& radius = detection_.radius();
+    const Vec3 n = contact.point.normal;
+    auto speed = [&](int b) {
+        const Vec6 free = sum(velocity_[b], kick_[b]);
+        const double spin = std::max(norm(angular(velocity_[b])), norm(angular(free)));
+        return std::max(std::abs(dot(n, linear(velocity_[b]))), std::abs(dot(n, linear(free)))) +
+               spin * radius[b];
+    };
+    return contact.point.gap <=
+           options_.time_step * (speed(contact.first) + speed(contact.second)) + closed * size(contact);
+}
+
+bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
+                          const std::vector<Vec6>& free_velocity) {
+    const std::size_t bodies = margin_.size();
+    poses_ = poses;
+    velocity_ = velocity;
+    kick_.resize(bodies);
+    for (std::size_t b = 0; b < bodies; ++b) {
+        kick_[b] = sum(free_velocity[b], velocity[b], -1.0);
+        prescribed_[b] = unknown_[b] < 0 ? velocity[b] : Vec6{};
+    }
+    std::fill(lead_.begin(), lead_.end(), 0.0);
+    std::fill(event_time_.begin(), event_time_.end(), -1.0);
+    std::fill(supported_.begin(), supported_.end(), 0);
+    std::fill(depth_.begin(), depth_.end(), 0.0);
+    correction_.clear();
+    points_.clear();
+    impact_needed_ = false;
+    impact_rounds_ = 0;
+
+    set_margins(velocity, free_velocity);
+    find_open();
+    predicted_.resize(bodies);
+    for (std::size_t b = 0; b < bodies; ++b)
+        predicted_[b] = supported_[b] || jointed_[b] || unknown_[b] < 0 ? velocity[b] : free_velocity[b];
+    const std::size_t closed_points = points_.size();
+    if (find_strikes(predicted_, false) > 0) {
+        find_events();
+        take_back_strikes(closed_points, predicted_);
+    }
+    if (points_.empty()) {
+        touches_.clear();
+        return false;
+    }
+    counters_.contacts += points_.size();
+    order_points();
+    measure_points();
+    return true;
+}
+
+/// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
+void ContactStage::find_open() {
+    known_.clear();
+    for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
+    std::sort(known_.begin(), known_.end());
+    open_.clear();
+    for (const IndexPair& pair : detection_.near(poses_, margin_)) {
+        if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
+        const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
+        scratch_.clear();
+        detection_.touch(pair, margin_[first.body] + margin_[second.body], scratch_);
+        const bool touching =
+            std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
+        // Any two shapes apart give a point, if they are near enough to meet; but not boxes corner to corner.
+        const bool boxes = first.shape.kind == ShapeKind::box && second.shape.kind == ShapeKind::box;
+        if (!touching) {
+            if (!scratch_.empty() || boxes) open_.push_back(pair);
+            continue;
+        }
+        for (const Contact& contact : scratch_) {
+            if (!reachable(contact)) continue;
+            add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
+            for (const int b : {contact.first, contact.second}) {
+                supported_[b] = 1;
+                depth_[b] = std::max(depth_[b], -contact.point.gap);
+            }
+        }
+    }
+}
+
+void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double strike) {
+    Point point;
+    point.contact = contact;
+    point.material = combined(materials_[contact.first], materials_[contact.second]);
+    point.first_arm = contact.point.position - first.position;
+    point.second_arm = contact.point.position - second.position;
+    point.tangent = world_tangent(contact.point.normal);
+    point.strike = strike;
+    points_.push_back(point);
+}
+
+/// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
+/// for an impact: if they need one, it is the next step's.
+int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
+    const double h = options_.time_step;
+    int found = 0;
+    auto moved = [&](int b) {  // an event's bodies have gone part of their way with another velocity
+        Pose pose = poses_[b];
+        if (event_time_[b] >= 0.0)
+            pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
+        return pose;
+    };
+    std::erase_if(open_, [&](const IndexPair pair) {
+        const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
+        const int a = one.body, b = two.body;
+        const Pose at_a = moved(a), at_b = moved(b);
+        const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
+        const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
+        const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
+        const double time =
+            first_touch(first, second, h, closed * radius + 2.0 * std::max(depth_[a], depth_[b]));
+        if (time < 0.0) return false;
+        const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
+        found += met;
+        return met;
+    });
+    return found;
+}
+
+/// The points of a pair that meets at `time`, with the bodies where they will be then.
+bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
+                              const std::vector<Vec6>& velocity, bool late) {
+    const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
+    const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
+    scratch_.clear();
+    detection_.touch(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius), scratch_);
+    bool met = false;
+    for (const Contact& contact : scratch_) {
+        add_point(contact, first, second, time);
+        Point& point = points_.back();
+        const double closing = -relative(point, contact.point.normal, velocity, false);
+        const double push = relative(point, contact.point.normal, kick_, false);
+        if (late && point.material.restitution > 0.0 && closing > 4.0 * std::abs(push)) {
+            points_.pop_back();
+            continue;
+        }
+        point.meeting_gap = contact.point.gap;
+        point.contact.point.gap = std::max(0.0, contact.point.gap + time * closing);
+        met = true;
+    }
+    return met;
+}
+
+/// A strike that is no event acts with the bodies at the start of the step, or the angular momentum of both would
+/// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
+/// taken back half-way between both bodies.
+void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity) {
+    const double h = options_.time_step;
+    for (std::size_t k = from; k < points_.size();) {
+        const Point point = points_[k];
+        std::size_t end = k;
+        while (end < points_.size() &&
+               (points_[end].contact.key >> feature_bits) == (point.contact.key >> feature_bits))
+            ++end;
+        if (point.strike < 0.0 || point.event) {
+            k = end;
+            continue;
+        }
+        const Contact& meeting = point.contact;
+        const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
+                             static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
+        std::vector<Contact> now;
+        detection_.touch(pair, margin_[meeting.first] + margin_[meeting.second], now);
+        const std::size_t old = points_.size();
+        bool stops = false;
+        for (const Contact& contact : now) {
+            add_point(contact, poses_[contact.first], poses_[contact.second], point.strike);
+            stops =
+                stops ||
+                contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
+        }
+        if (stops) {
+            std::rotate(points_.begin() + static_cast<std::ptrdiff_t>(end),
+                        points_.begin() + static_cast<std::ptrdiff_t>(old), points_.end());
+            points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(k),
+                          points_.begin() + static_cast<std::ptrdiff_t>(end));
+            k += now.size();
+            continue;
+        }
+        points_.resize(old);
+        for (; k < end; ++k) {
+            Point& p = points_[k];
+            const Vec3 way = linear(velocity[p.contact.first]) + linear(velocity[p.contact.second]);
+            p.contact.point.position -= 0.5 * p.strike * way;
+            p.first_arm = p.contact.point.position - poses_[p.contact.first].position;
+            p.second_arm = p.contact.point.position - poses_[p.contact.second].position;
+        }
+    }
+}
+
+/// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
+/// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
+/// that goes with it changes the energy.
+void ContactStage::find_events() {
+    root_.resize(unknown_.size());
+    std::iota(root_.begin(), root_.end(), 0);
+    auto root = [this](int b) {
+        while (root_[b] != b) b = root_[b] = root_[root_[b]];
+        return b;
+    };
+    auto join = [&](int a, int b) {
+        if (unknown_[a] < 0 || unknown_[b] < 0) return;
+        a = root(a), b = root(b);
+        root_[std::max(a, b)] = std::min(a, b);
+    };
+    for (const Point& point : points_) join(point.contact.first, point.contact.second);
+    for (const auto& [a, b] : joints_)
+        if (a >= 0 && b >= 0) join(a, b);
+
+    std::vector<std::size_t> members(unknown_.size(), 0);
+    std::vector<std::uint64_t> struck(unknown_.size(), 0);  // the pair of the island's strike, plus one
+    std::vector<char> plain(unknown_.size(), 1);
+    std::vector<double> when(unknown_.size(), -1.0);
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        if (unknown_[b] >= 0) {
+            const int island = root(static_cast<int>(b));
+            ++members[island];
+            plain[island] = plain[island] && ball_[b];
+        }
+    for (const Point& point : points_) {
+        const Contact& contact = point.contact;
+        const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
+        if (point.strike < 0.0) {
+            const double approach = -relative(point, contact.point.normal, predicted_, false);
+            if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
+                plain[island] = 0;
+            continue;
+        }
+        const std::uint64_t pair = (contact.key >> feature_bits) + 1;
+        if (struck[island] != 0 && struck[island] != pair) plain[island] = 0;
+        struck[island] = pair;
+        when[island] = point.strike;
+    }
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        if (unknown_[b] < 0) continue;
+        const int island = root(static_cast<int>(b));
+        if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
+        event_time_[b] = when[island];
+        if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
+        velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);
+        for (double& k : kick_[b]) k *= 1.0 - lead_[b];
+    }
+    for (Point& point : points_) {
+        if (point.strike < 0.0) continue;
+        const int body = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+        point.event = event_time_[body] >= 0.0;
+        if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
+    }
+}
+
+/// Sorts the points by key and finds each one's predecessor in the step before.
+void ContactStage::order_points() {
+    std::stable_sort(points_.begin(), points_.end(),
+                     [](const Point& a, const Point& b) { return a.contact.key < b.contact.key; });
+    std::size_t old = 0;
+    for (Point& point : points_) {
+        while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
+        if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
+        point.before = touches_[old].normal;
+        std::copy_n(touches_[old].tangent, 2, point.tangent_before);
+    }
+}
+
+/// Approach, push and part in the impact of every point, from the current velocities.
+void ContactStage::measure_points() {
+    const double h = options_.time_step;
+    impact_needed_ = false;
+    for (Point& point : points_) {
+        const Contact& contact = point.contact;
+        const double gap = contact.point.gap;
+        point.approach = relative(point, contact.point.normal, velocity_, false);
+        point.push = relative(point, contact.point.normal, kick_, false);
+        const double psi = point.material.restitution, speed = -point.approach;
+        point.bounce = -1.0;
+        if (is_closed(contact)) {
+            point.bounce = speed > 0.0 ? psi : 0.0;
+        } else if (speed > 0.0 && psi > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
+            const double left =
+                psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
+            if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
+        }
+        const double kick = norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second]));
+        point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
+        if (point.bounce > 0.0 && speed > point.rounding) impact_needed_ = true;
+    }
+}
+
+}  // namespace spook

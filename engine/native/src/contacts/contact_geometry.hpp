@@ -1,0 +1,33 @@
+// Small geometry shared by the parts of the contact stage.
+#pragma once
+
+#include <cmath>
+
+#include "contacts/pivot_system.hpp"
+#include "linear/vec.hpp"
+
+namespace spook {
+
+inline Vec3 linear(const Vec6& v) noexcept { return {v[0], v[1], v[2]}; }
+inline Vec3 angular(const Vec6& v) noexcept { return {v[3], v[4], v[5]}; }
+
+/// The Jacobian of a body's velocity at `arm` from its centre, along `direction`.
+inline Vec6 contact_row(Vec3 direction, Vec3 arm) noexcept {
+    const Vec3 moment = cross(arm, direction);
+    return {direction.x, direction.y, direction.z, moment.x, moment.y, moment.z};
+}
+
+/// The world axis x (or y, for surfaces that face along x) laid into the tangent plane.
+inline Vec3 world_tangent(Vec3 normal) noexcept {
+    const Vec3 axis = std::abs(normal.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+    const Vec3 t = axis - dot(axis, normal) * normal;
+    return (1.0 / norm(t)) * t;
+}
+
+inline Vec6 sum(const Vec6& a, const Vec6& b, double s = 1.0) noexcept {
+    Vec6 c;
+    for (int i = 0; i < 6; ++i) c[i] = a[i] + s * b[i];
+    return c;
+}
+
+}  // namespace spook

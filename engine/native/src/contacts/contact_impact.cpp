@@ -1,0 +1,149 @@
+// The contact stage's second part: blows.
+#include <algorithm>
+#include <cmath>
+
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int simultaneous_rounds = 20;  // of blows that follow from blows in one step
+constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
+
+}  // namespace
+
+double ContactStage::kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const {
+    double twice = 0.0;
+    for (std::size_t b = 0; b < velocity.size(); ++b)
+        for (int i = 0; i < 6; ++i) {
+            double momentum = 0.0;
+            for (int j = 0; j < 6; ++j) momentum += system.mass[b][6 * i + j] * velocity[b][j];
+            twice += momentum * velocity[b][i];
+        }
+    return 0.5 * twice;
+}
+
+void ContactStage::impact(MixedSystem& system) {
+    ++counters_.impacts;
+    ++impact_rounds_;
+    const bool successive = options_.impacts == ImpactOrder::successive &&
+                            impact_rounds_ <= 100 + 20 * static_cast<int>(points_.size());
+    MixedSystem hit;
+    hit.mass = system.mass;
+    hit.momentum = system.momentum;
+    hit.rows = system.rows;
+    for (RowBlock& block : hit.rows)
+        for (int i = 0; i < block.size; ++i) {
+            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
+            block.multiplier[i] = 0.0;
+            if (below && above) block.right[i] = 0.0;
+            else if (above && block.lower[i] == 0.0) block.right[i] = std::min(block.right[i], 0.0);
+            else if (below && block.upper[i] == 0.0) block.right[i] = std::max(block.right[i], 0.0);
+            else block.lower[i] = block.upper[i] = 0.0;
+        }
+    const std::size_t joints = system.rows.size();
+    std::vector<std::size_t> who;
+    std::vector<FrictionPoint> friction;
+    bool pushed_by_motion = false;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        if (point.bounce < 0.0 || (successive && !(point.approach < -point.rounding))) continue;
+        RowBlock block = row_block(point, point.material.friction > 0.0);
+        for (int i = 0; i < block.size; ++i) pushed_by_motion = pushed_by_motion || block.right[i] != 0.0;
+        block.right[0] += std::max(0.0, -point.bounce * point.approach);
+        block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
+        if (block.size == 3)
+            friction.push_back({static_cast<int>(hit.rows.size()), point.material.friction, 0.0, -1.0});
+        hit.rows.push_back(block);
+        who.push_back(k);
+    }
+    std::vector<Vec6> before = hit.momentum;
+    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
+    // No step before has anything to say about a blow: the box takes this one's own normal impulses.
+    const FrictionModel model =
+        options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
+    const MixedSystem start = hit;
+    const std::vector<FrictionPoint> fresh = friction;
+    run(hit, friction, impact_solver_, model);
+
+    const double limit = kinetic_energy(hit, before);
+    double share = 1.0;
+    MixedSystem plastic;
+    if (!pushed_by_motion && kinetic_energy(hit, hit.velocity) > limit * (1.0 + gain)) {
+        plastic = start;
+        std::vector<FrictionPoint> plastic_friction = fresh;
+        for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
+        run(plastic, plastic_friction, impact_solver_, model);
+        double low = 0.0, high = 1.0;
+        std::vector<Vec6> blend(before.size());
+        auto mix = [&](double s) {
+            for (std::size_t b = 0; b < blend.size(); ++b)
+                for (int i = 0; i < 6; ++i)
+                    blend[b][i] = plastic.velocity[b][i] + s * (hit.velocity[b][i] - plastic.velocity[b][i]);
+        };
+        for (int halving = 0; halving < 50; ++halving) {
+            mix(0.5 * (low + high));
+            (kinetic_energy(hit, blend) <= limit ? low : high) = 0.5 * (low + high);
+        }
+        share = low;
+        mix(share);
+        hit.velocity = blend;
+    }
+    system.velocity = hit.velocity;
+    mark_held(hit);
+    auto impulse_of = [](const RowBlock& block) {
+        Vec3 impulse;  // the solver may have turned the tangents: read them from the rows
+        for (int i = 0; i < block.size; ++i)
+            impulse += block.multiplier[i] * (block.first >= 0 ? linear(block.first_jacobian[i])
+                                                               : -linear(block.second_jacobian[i]));
+        return impulse;
+    };
+    for (std::size_t j = 0; j < who.size(); ++j) {
+        Point& point = points_[who[j]];
+        const RowBlock& block = hit.rows[joints + j];
+        double normal = block.multiplier[0];
+        Vec3 impulse = impulse_of(block);
+        if (share < 1.0) {
+            const RowBlock& soft = plastic.rows[joints + j];
+            normal = soft.multiplier[0] + share * (normal - soft.multiplier[0]);
+            impulse = (1.0 - share) * impulse_of(soft) + share * impulse;
+        }
+        point.impact += normal;
+        point.impact_impulse += impulse;
+    }
+    after_impact(system);
+}
+
+/// Blows set bodies in motion that meet others within the same step.
+void ContactStage::after_impact(const MixedSystem& system) {
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        if (unknown_[b] >= 0 && held_[unknown_[b]]) velocity_[b] = system.velocity[unknown_[b]];
+    std::vector<Vec6> next = velocity_;
+    for (std::size_t b = 0; b < next.size(); ++b)
+        if (unknown_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], kick_[b]);
+    if (outrun(next)) find_open();
+    const std::size_t known = points_.size();
+    const bool found = find_strikes(next, false) > 0;
+    if (found) {
+        take_back_strikes(known, next);
+        counters_.contacts += points_.size() - known;
+        order_points();
+    }
+    const bool successive = options_.impacts == ImpactOrder::successive;
+    measure_points();
+    if (!successive) {  // who was hit already is not hit again
+        impact_needed_ = false;
+        for (const Point& point : points_)
+            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.strike >= 0.0 &&
+                                                point.bounce > 0.0 && point.approach < -point.rounding);
+        if (impact_rounds_ >= simultaneous_rounds) impact_needed_ = false;
+    } else {
+        for (const Point& point : points_)
+            impact_needed_ = impact_needed_ || (point.bounce >= 0.0 && point.approach < -point.rounding);
+        if (impact_rounds_ > 100 + 20 * static_cast<int>(points_.size())) impact_needed_ = false;
+    }
+}
+
+}  // namespace spook

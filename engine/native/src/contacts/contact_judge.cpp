@@ -1,0 +1,90 @@
+// How far an answer is from the law it was asked for.
+#include <algorithm>
+#include <cmath>
+
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+#include "linear/elementary.hpp"
+
+namespace spook {
+
+namespace {
+
+/// About (G M⁻¹ Gᵀ + Sig) of one row: the scale between an impulse and a velocity, off-diagonal inertia left out.
+double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
+    double own = block.softness[i];
+    for (const bool first : {true, false}) {
+        const int body = first ? block.first : block.second;
+        if (body < 0) continue;
+        const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
+        for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
+    }
+    return own;
+}
+
+/// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds.
+double bounded_residual(const RowBlock& block, int i, double own, const std::vector<Vec6>& velocity) {
+    const double w = row_residual(block, i, velocity),
+                 z = block.multiplier[i];  // z − w/own would round w away
+    return w > 0.0 ? std::min(w, own * (z - block.lower[i])) : std::min(-w, own * (block.upper[i] - z));
+}
+
+}  // namespace
+
+RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+                           FrictionModel model) {
+    RowsResidual worst;
+    std::vector<const FrictionPoint*> friction(system.rows.size(), nullptr);
+    for (const FrictionPoint& point : points) friction[point.block] = &point;
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        double residual = 0.0;
+        const FrictionPoint* point = friction[k];
+        for (int i = 0; i < (point ? 1 : block.size); ++i) {
+            const double own = own_inertia(system, block, i);
+            if (own > 0.0) residual = std::max(residual, bounded_residual(block, i, own, system.velocity));
+        }
+        if (point) {
+            const double own = own_inertia(system, block, 1) + own_inertia(system, block, 2);
+            const double nu =
+                std::max(0.0, model == FrictionModel::box ? point->normal : block.multiplier[0]);
+            const double bound = point->coefficient * nu;
+            const double b1 = block.multiplier[1], b2 = block.multiplier[2];
+            const double s1 = slip(block, *point, 1, system.velocity),
+                         s2 = slip(block, *point, 2, system.velocity);
+            double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
+            bool sticks = true;
+            if (model == FrictionModel::cone) {
+                const double reach = length(d1, d2);
+                sticks = reach <= bound;
+                if (!sticks) d1 *= bound / reach, d2 *= bound / reach;
+            } else {
+                sticks = std::abs(d1) <= bound && std::abs(d2) <= bound;
+                d1 = std::clamp(d1, -bound, bound), d2 = std::clamp(d2, -bound, bound);
+            }
+            residual = std::max(residual, sticks ? length(s1, s2) : own * length(b1 - d1, b2 - d2));
+        }
+        if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
+    }
+    return worst;
+}
+
+void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
+                         const FrictionReport& report) {
+    residual_ = report.residual;
+    unsettled_body_ = -1;
+    unsettled_by_ = 0.0;
+    if (report.converged || !report.finite) return;
+    double speed = 0.0;
+    for (const Vec6& v : velocity_) speed = std::max(speed, norm(linear(v)));
+    const RowsResidual worst = rows_residual(system, points, options_.friction);
+    // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
+    if (!(worst.residual > options_.unsettled_residual + 1e-6 * speed)) return;
+    unsettled_by_ = worst.residual;
+    const RowBlock& block = system.rows[worst.row];
+    const int unknown = std::max(block.first, block.second);
+    unsettled_body_ =
+        static_cast<int>(std::find(unknown_.begin(), unknown_.end(), unknown) - unknown_.begin());
+}
+
+}  // namespace spook

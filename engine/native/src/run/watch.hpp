@@ -1,0 +1,45 @@
+// The end of a run from inside a long step: wall time and Ctrl-C.
+#pragma once
+
+#include <chrono>
+
+namespace spook {
+
+/// Asked at most ten times a second; true ends the run. Python's Ctrl-C comes in here.
+inline bool (*interrupted)() = nullptr;
+
+/// Thrown by Watch::look(); the loop that runs the system catches it and takes back the unfinished block of steps.
+struct Stopped {};
+
+/// One run's clock. While it lives, look() may be called anywhere in the thread that runs; without one it does
+/// nothing. A look costs tens of nanoseconds: solvers look once per round or sweep.
+class Watch {
+public:
+    explicit Watch(double time_limit) noexcept : limit_(time_limit) { current_ = this; }
+    ~Watch() { current_ = nullptr; }
+    Watch(const Watch&) = delete;
+    Watch& operator=(const Watch&) = delete;
+
+    double elapsed() const noexcept { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+
+    /// Whether the run is to end.
+    bool over() {
+        const double now = elapsed();
+        if (limit_ > 0.0 && now > limit_) return true;
+        if (interrupted == nullptr || now <= asked_ + 0.1) return false;
+        asked_ = now;
+        return interrupted();
+    }
+
+    static void look() {
+        if (current_ != nullptr && current_->over()) throw Stopped{};
+    }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point begin_ = Clock::now();
+    double limit_, asked_ = 0.0;
+    static inline thread_local Watch* current_ = nullptr;
+};
+
+}  // namespace spook

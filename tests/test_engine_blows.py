@@ -1,0 +1,302 @@
+"""Blows: friction while bodies rebound, no load no friction, no touch no change, and an answer not found says so."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    AngularMomentum,
+    AngularVelocity,
+    Box,
+    Capsule,
+    ContactForce,
+    Energy,
+    Final,
+    Hinge,
+    KineticEnergy,
+    Limit,
+    Material,
+    Method,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+
+H = 1 / 60  # s
+GRAVITY = (0.0, 0.0, -9.81)
+STEPS = [1 / 60, 1 / 240, 1e-3]
+SOLVERS = ["direct", "iterative", "hybrid"]
+
+
+def floor(material: Material) -> RigidBody:
+    return RigidBody(name="floor", motion="static", shape=Plane(), position=(0, 0, 0), material=material)
+
+
+def ball(
+    name: str, position: tuple[float, float, float], velocity: tuple[float, float, float], **fields: object
+) -> RigidBody:
+    given = {"mass": 1.0, "shape": Sphere(0.1)} | fields
+    return RigidBody(name=name, position=position, velocity=velocity, **given)  # type: ignore[arg-type]
+
+
+# Friction at a blow -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("model", ["cone", "box", "scaled_box"])
+@pytest.mark.parametrize(("mu", "slip"), [(0.2, 2.28), (5.0, 15 / 7)], ids=["sliding", "gripping"])
+def test_a_ball_rubs_while_it_rebounds(h: float, solver: str, model: str, mu: float, slip: float) -> None:
+    """u = 2, v = 3, psi = .8: sliding takes mu (1 + psi) u = .72 of v, gripping 2/7 of it; spin 5/2 dv/r."""
+    rough = Material(restitution=0.8, friction=mu)
+    scene = Scene(bodies=(floor(rough), ball("ball", (0, 0, 0.15), (3, 0, -2), material=rough)))
+    result = simulate(
+        scene,
+        time_step=h,
+        steps=round(0.1 / h),
+        method=Method(solver=solver, friction=model),  # type: ignore[arg-type]
+        observe={"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))},
+    )
+
+    assert result["v"] == pytest.approx((slip, 0.0, 1.6), abs=1e-9)
+    assert result["w"] == pytest.approx((0.0, 2.5 * (3.0 - slip) / 0.1, 0.0), abs=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_rough_blows_among_unequal_bodies_never_raise_the_energy(seed: int) -> None:
+    """Corners hit at a slant, restitutions from 0 to 1 mixed, friction up to 2, masses over six decades: Newton's
+    law alone raises the energy of some of these; no step may."""
+    rng = np.random.default_rng(seed)
+    shapes = (Box((0.5, 0.3, 0.4)), Sphere(0.25), Capsule(0.1, 0.5), Box((0.2, 0.2, 0.9)))
+    bodies = []
+    for k in range(8):
+        turn = rng.normal(size=4)
+        bodies.append(
+            RigidBody(
+                name=f"b{k}",
+                mass=float(10 ** rng.uniform(-3, 3)),
+                shape=shapes[k % 4],
+                position=(1.1 * (k % 2), 1.1 * (k // 2 % 2), 1.1 * (k // 4)),
+                orientation=tuple(turn / np.linalg.norm(turn)),
+                velocity=tuple(rng.normal(size=3) - np.array((k % 2, k // 2 % 2, k // 4)) * 3.0),
+                angular_velocity=tuple(rng.normal(size=3)),
+                material=Material(friction=float(rng.uniform(0, 2)), restitution=float(rng.uniform(0, 1))),
+            )
+        )
+    observe = {"e": Trace(quantity=KineticEnergy()), "l": Trace(quantity=AngularMomentum())}
+    result = simulate(Scene(bodies=tuple(bodies)), time_step=1 / 240, steps=240, observe=observe)
+
+    assert result.counters["impacts"] >= 3
+    # Free tumbling between the blows keeps the energy to the order of the rotation step.
+    assert np.diff(result["e"]).max() < 2e-3 * result["e"][0]
+    assert result["e"][-1] < result["e"][0]
+
+
+# No load, no friction -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("model", ["cone", "scaled_box"])
+def test_no_load_no_friction(solver: str, model: str) -> None:
+    """Plastic throws from whole numbers of steps away: in every step |J_t| <= mu J_n, whatever acted before."""
+    mu = 0.5
+    rough = Material(friction=mu)
+    for k in range(1, 26):
+        thrown = ball("ball", (0, 0, 0.1 + 3.0 * k * H / 5), (2.0, 0.3, -3.0), material=rough)
+        result = simulate(
+            Scene(bodies=(floor(rough), thrown)),
+            time_step=H,
+            steps=12,
+            method=Method(solver=solver, friction=model),  # type: ignore[arg-type]
+            observe={"f": Trace(quantity=ContactForce("ball"), first=1)},
+        )
+        force = result["f"]
+        tangential = (
+            np.hypot(force[:, 0], force[:, 1]) if model == "cone" else np.abs(force[:, :2]).max(axis=1)
+        )
+        assert (tangential <= mu * force[:, 2] * (1.0 + 1e-9) + 1e-9).all(), k
+
+
+# No touch, no change ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("speed", "gap"), [(3.0, 0.01), (100.0, 0.4), (1000.0, 1e-4)])
+@pytest.mark.parametrize(
+    "shape", [Sphere(0.05), Box((0.1, 0.1, 0.1)), Capsule(0.05, 0.05)], ids=["ball", "box", "capsule"]
+)
+def test_what_passes_without_touching_is_not_touched(
+    speed: float, gap: float, shape: Sphere | Box | Capsule
+) -> None:
+    half = 0.075 if isinstance(shape, Capsule) else 0.05
+    going = ball("going", (-0.5, 0.01, 0.0), (speed, 0, 0), shape=shape)
+    coming = ball("coming", (0.5, 0.0, 2 * half + gap), (-speed, 0, 0), shape=shape)
+    result = simulate(
+        Scene(bodies=(going, coming)), time_step=H, steps=30, observe={"v": Final(quantity=Velocity())}
+    )
+
+    assert result["v"].tolist() == [[speed, 0.0, 0.0], [-speed, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize("h", STEPS)
+def test_an_off_centre_hit_goes_along_the_line_of_centres(h: float) -> None:
+    """One ball at 3 m/s meets another at rest, half a radius off: normal at 30°, elastic, whatever the step."""
+    elastic = Material(restitution=1.0)
+    small = {"shape": Sphere(0.05), "material": elastic}
+    bodies = (ball("cue", (-0.5, 0, 0), (3, 0, 0), **small), ball("other", (0, 0.05, 0), (0, 0, 0), **small))
+    observe = {
+        "v": Final(quantity=Velocity()),
+        "l": Trace(quantity=AngularMomentum()),
+        "x": Final(quantity=Position()),
+    }
+    result = simulate(Scene(bodies=bodies), time_step=h, duration=0.4, observe=observe)
+    normal = np.array((math.sqrt(0.75), 0.5, 0.0))
+    given = 3.0 * normal[0] * normal
+
+    np.testing.assert_allclose(result["v"][1], given, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(result["v"][0], np.array((3.0, 0, 0)) - given, rtol=0, atol=1e-7)
+    assert np.abs(result["l"] - result["l"][0]).max() < 1e-13
+    after = 0.4 - (0.5 - 0.1 * math.sqrt(0.75)) / 3.0  # s since the hit
+    np.testing.assert_allclose(result["x"][1], np.array((0, 0.05, 0)) + after * given, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("h", [1 / 60, 1 / 240, 1 / 960])
+@pytest.mark.parametrize("shape", [Sphere(0.05), Box((0.1, 0.1, 0.1))], ids=["ball", "box"])
+def test_a_seam_of_two_faces_is_no_obstacle(h: float, shape: Sphere | Box) -> None:
+    """A frictionless slide at 5 m/s from one box to the next, their tops in one plane."""
+    tiles = [
+        RigidBody(name=f"tile{k}", motion="static", shape=Box((2, 2, 1)), position=(2.0 * k, 0, -0.5))
+        for k in range(2)
+    ]
+    slider = ball("slider", (0.013, 0, 0.05), (5, 0, 0), shape=shape)
+    result = simulate(
+        Scene(bodies=(*tiles, slider), gravity=GRAVITY),
+        time_step=h,
+        duration=0.4,
+        observe={"v": Trace(quantity=Velocity("slider")), "z": Trace(quantity=Position("slider"))},
+    )
+
+    assert np.abs(result["v"] - (5.0, 0.0, 0.0)).max() < 1e-12
+    assert np.abs(result["z"][:, 2] - 0.05).max() < 1e-12
+
+
+# Rows of balls, stops -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_a_blow_runs_through_a_row_of_balls(gap: float) -> None:
+    """Successive impacts, or gaps: the last ball leaves with the speed of the first. Touching and simultaneous,
+    Newton's law for all at once gives −.6 and .4 for the rest."""
+    elastic = Material(restitution=1.0)
+    row = [ball(f"b{k}", (k * (0.2 + gap), 0, 0), (0, 0, 0), material=elastic) for k in range(1, 5)]
+    bodies = (ball("b0", (-0.3, 0, 0), (1, 0, 0), material=elastic), *row)
+    for impacts, after in (
+        ("successive", [0, 0, 0, 0, 1]),
+        ("simultaneous", [0, 0, 0, 0, 1] if gap else [-0.6, 0.4, 0.4, 0.4, 0.4]),
+    ):
+        result = simulate(
+            Scene(bodies=bodies),
+            time_step=H,
+            steps=60,
+            method=Method(impacts=impacts),  # type: ignore[arg-type]
+            observe={"v": Final(quantity=Velocity())},
+        )
+        np.testing.assert_allclose(result["v"][:, 0], after, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("psi", [0.0, 0.5, 1.0])
+def test_a_stop_returns_its_own_restitution(h: float, psi: float) -> None:
+    """A bar turning freely at 2 rad/s meets the stop of its hinge at .5 rad."""
+    bar = RigidBody(
+        name="bar",
+        mass=1.0,
+        shape=Box((1.0, 0.1, 0.1)),
+        position=(0.5, 0, 0),
+        velocity=(0, 1.0, 0),
+        angular_velocity=(0, 0, 2.0),
+    )
+    hinge = Hinge(
+        name="hinge",
+        between=(WORLD, "bar"),
+        at=(0, 0, 0),
+        axis=(0, 0, 1),
+        compliance=0.0,
+        limit=Limit(lower=-9.0, upper=0.5, compliance=0.0, restitution=psi),
+    )
+    result = simulate(
+        Scene(bodies=(bar,), constraints=(hinge,)),
+        time_step=h,
+        duration=0.5,
+        observe={"w": Trace(quantity=AngularVelocity("bar"))},
+    )
+
+    speed = result["w"][:, 2]
+    hit = int(np.argmax(speed < 0.5 * speed[0]))
+    met = speed[hit - 1]
+
+    if psi > 0.0:
+        assert speed[hit] == pytest.approx(-psi * met, abs=1e-6)
+    # Without restitution the gap may close within the step: what is left of the speed then ends in the next.
+    assert np.abs(speed[hit + 2 :] + psi * met).max() < (0.02 if psi > 0.0 else 1e-6)
+
+
+# Answers that were not found ----------------------------------------------------------------------------------
+
+
+def tower(count: int) -> Scene:
+    rough = Material(friction=0.5)
+    boxes = [
+        RigidBody(name=f"box{k}", mass=1.0, shape=Box((1, 1, 1)), position=(0, 0, 0.5 + k), material=rough)
+        for k in range(count)
+    ]
+    return Scene(bodies=(floor(rough), *boxes), gravity=GRAVITY)
+
+
+def test_an_unsettled_solve_is_said_and_keeps_its_values() -> None:
+    """Fifty sweeps do not carry a load through a hundred boxes."""
+    observe = {"e": Trace(quantity=Energy())}
+    result = simulate(tower(100), time_step=H, steps=60, method=Method(solver="iterative"), observe=observe)
+
+    assert result.status == "unsettled" and not result.completed
+    assert result.failed_step is not None and result.failed_step >= 1
+    assert result.failed_body is not None and result.failed_body in result.failure
+    assert result.residual > 0.1
+    assert result["e"].shape == (61,)
+
+    settled = simulate(tower(100), time_step=H, steps=60, observe=observe)
+    assert settled.completed
+
+
+def test_a_time_limit_holds_within_a_step() -> None:
+    """One step of a heap that takes many seconds ends at the limit."""
+    rng = np.random.default_rng(0)
+    rough = Material(friction=0.6)
+    boxes = [
+        RigidBody(
+            name=f"box{k}",
+            mass=1.0,
+            shape=Box((1, 1, 1)),
+            material=rough,
+            velocity=(0.0, 0.0, -3.0),
+            position=(0.999 * (k % 8), 0.999 * (k // 8 % 8), 0.5 + 0.999 * (k // 64)),
+            angular_velocity=tuple(rng.normal(size=3)),
+        )
+        for k in range(512)
+    ]
+    begin = time.monotonic()
+    result = simulate(
+        Scene(bodies=(floor(rough), *boxes), gravity=GRAVITY), time_step=H, steps=100_000, time_limit=0.5
+    )
+
+    assert result.status == "timed_out"
+    assert time.monotonic() - begin < 5.0  # building the scene and a busy machine included

@@ -1,0 +1,208 @@
+"""What moves on the website, in a real browser and without a network: replay, live engine, dragging in a chart."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spook_tracker.tracker.measure.trajectory as motion
+from spook_tracker.engine import simulate
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.website.publish import publish
+from tests.browser import MISSING, browser, look, programs, wait_for
+from tests.synthetic_history import DocumentHistory, document
+
+ROOT = Path(__file__).parent.parent
+NOISE = ("GL Driver Message", "software WebGL")  # what the browser says of drawing without a graphics card
+
+
+def shifted(recorded):
+    """The same motion, wrong from the middle on."""
+    channels = []
+    for channel in recorded.channels:
+        if channel.name == "position":
+            values = motion.values_of(channel, recorded.count).copy()
+            values[recorded.count // 2 :, 2] += 0.25
+            channel = motion.channel("position", "m", values)
+        channels.append(channel)
+    return type(recorded)(
+        **{f: getattr(recorded, f) for f in recorded.__struct_fields__} | {"channels": tuple(channels)}
+    )
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    found = motion.trajectory("pendulum", CATALOGUE["pendulum"], simulate)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory, recorded):
+    nights = []
+    for n in range(3):
+        night = document(n)
+        fields = {f: getattr(night, f) for f in night.__struct_fields__}
+        nights.append(type(night)(**fields | {"trajectories": (shifted(recorded) if n == 2 else recorded,)}))
+    out = tmp_path_factory.mktemp("moving") / "public"
+    publish(DocumentHistory(nights), out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def driver():
+    found = programs()
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail(MISSING)
+        pytest.skip(MISSING)
+    with browser(*found) as opened:
+        opened.set_script_timeout(90)
+        yield opened
+
+
+def visit(driver, site, page, **how):
+    look(driver, **how)
+    driver.get("about:blank")
+    driver.get_log("browser")
+    path, mark, state = page.partition("#")
+    driver.get((site / path).as_uri() + mark + state)
+
+
+def complaints(driver):
+    return [e["message"] for e in driver.get_log("browser") if not any(n in e["message"] for n in NOISE)]
+
+
+def replay(driver, site, state=""):
+    visit(driver, site, f"tests/pendulum.html{state}")
+    driver.execute_script("document.getElementById('replay').scrollIntoView()")
+    wait_for(driver, "!!document.getElementById('replay').player")
+
+
+def test_a_replay_shows_where_the_engine_put_the_body(driver, site, recorded):
+    replay(driver, site)
+    driver.execute_script("document.getElementById('replay').player.seek(200)")
+    shown = driver.execute_script(
+        "const p = document.getElementById('replay').player; return [...p.movie.position.slice(600, 603)]"
+    )
+    channel = next(c for c in shifted(recorded).channels if c.name == "position")
+
+    assert shown == pytest.approx(motion.values_of(channel, recorded.count)[200].tolist(), abs=1e-6)
+    assert driver.execute_script("return document.querySelector('#replay canvas').width") > 200
+    assert not driver.execute_script("return document.querySelector('#replay .scenery').checkVisibility()")
+    assert complaints(driver) == []
+
+
+def test_the_time_slider_moves_by_keyboard_and_stands_in_the_address(driver, site):
+    replay(driver, site)
+    driver.execute_script(
+        "const s = document.querySelector('#replay input[type=range]'); s.value = 60; s.dispatchEvent(new Event('input'))"
+    )
+    address = driver.current_url
+    clock = driver.execute_script("return document.querySelector('#replay .clock').textContent")
+
+    replay(driver, site, "#" + address.partition("#")[2])
+
+    assert "t=2" in address
+    assert (
+        driver.execute_script("return document.querySelector('#replay .clock').textContent")
+        == clock
+        == "2.00 s"
+    )
+
+
+def test_two_nights_laid_over_each_other_show_the_first_moment_they_part(driver, site, recorded):
+    replay(driver, site)
+    driver.execute_script(
+        "const s = document.querySelector('#replay label select'); s.selectedIndex = 1; s.dispatchEvent(new Event('change'))"
+    )
+    wait_for(driver, "!!document.querySelector('#replay button[data-sample]')")
+    driver.execute_script("document.querySelector('#replay button[data-sample]').click()")
+
+    assert (
+        driver.execute_script("return document.getElementById('replay').player.sample") == recorded.count // 2
+    )
+    assert "against=" in driver.current_url
+    assert complaints(driver) == []
+
+
+def test_without_a_script_the_picture_stands_still(site):
+    page = (site / "tests" / "pendulum.html").read_text()
+
+    assert 'class="scenery"' in page
+    assert "three-scene" in page and '<script src="../assets/three-scene' not in page
+
+
+def test_dragging_zooms_into_a_chart_and_writes_the_address(driver, site):
+    visit(driver, site, "tests/pendulum.html", height=1200)
+    box = "document.getElementById('f-deviation-against-time')"
+    driver.execute_script(f"{box}.scrollIntoView({{block: 'center'}})")
+    wait_for(driver, f"'drawn' in {box}.dataset")
+    where = driver.execute_script(
+        f"const r = {box}.querySelector('.nsewdrag').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]"
+    )
+    ranges = f"return {box}.querySelector('.plot').layout.xaxis.range"
+    before = driver.execute_script(ranges)
+    left, top, wide, high = where
+    for kind, x, y in (
+        ("mousePressed", 0.3, 0.3),
+        ("mouseMoved", 0.5, 0.5),
+        ("mouseMoved", 0.6, 0.7),
+        ("mouseReleased", 0.6, 0.7),
+    ):
+        event = {
+            "type": kind,
+            "x": left + x * wide,
+            "y": top + y * high,
+            "button": "left",
+            "clickCount": 1,
+            "buttons": 1,
+        }
+        driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+    wait_for(driver, "location.hash.includes('z.f-deviation-against-time')")
+    after = driver.execute_script(ranges)
+
+    span = before[1] - before[0]
+    assert after[0] == pytest.approx(before[0] + 0.3 * span, abs=0.03 * span)
+    assert after[1] == pytest.approx(before[0] + 0.6 * span, abs=0.03 * span)
+    assert complaints(driver) == []
+
+
+@pytest.mark.skipif(not (ROOT / "site" / "static" / "live.wasm").exists(), reason="not built: make wasm")
+def test_a_slider_of_the_live_page_runs_the_engine_again(driver, site):
+    visit(driver, site, "live.html#scene=pendulum&p.method=curved", width=360)
+    wait_for(driver, "!!document.querySelector('.live').page")
+    fact = "return document.querySelector('[data-fact=\"{}\"]').textContent"
+    first = driver.execute_script(fact.format("final state"))
+    driver.execute_script(
+        "const s = document.getElementById('live-angle'); s.value = 120; s.dispatchEvent(new Event('input'))"
+    )
+    wait_for(
+        driver, f"document.querySelector('[data-fact=\"final state\"]').textContent !== {json.dumps(first)}"
+    )
+
+    assert driver.execute_script(fact.format("outcome")) == "completed"
+    assert "p.angle=120" in driver.current_url and "p.method=curved" in driver.current_url
+    assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
+    assert complaints(driver) == []
+
+
+def test_ten_thousand_bodies_are_drawn_in_one_picture(driver, site):
+    """Instanced: three.js is asked for one draw call a shape. (How long it takes is a matter of `make bench`.)"""
+    replay(driver, site)
+    calls = driver.execute_script("""
+      const n = 10000, box = document.getElementById('replay'), position = new Float32Array(2 * 3 * n);
+      for (let i = 0; i < 2 * n; i += 1) { position.set([i % 100, Math.floor(i / 100) % 100, (i % 7)], 3 * i); }
+      const solids = Array.from({ length: n }, (_, body) => ({ kind: body % 2 ? 'box' : 'sphere', size: body % 2 ? [1, 1, 1] : [0.5],
+        position: [...position.slice(3 * body, 3 * body + 3)], orientation: [1, 0, 0, 0], fixed: false, body }));
+      box.player.use({ step: 1, count: 2, bodies: n, solids, links: [], rows: 0, gravity: [0, 0, -1], attractors: [], position, orientation: null });
+      box.player.seek(0.5);
+      const told = box.player.view.renderer.info.render;
+      return [told.calls, told.triangles];
+    """)
+
+    assert calls[0] <= 4
+    assert calls[1] > 10_000 * 12 / 2
+    assert np.isfinite(calls[1])
