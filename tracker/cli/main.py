@@ -225,6 +225,35 @@ def publish(out: Path, accepted: Path | None, database: str) -> None:
         _say_published(build(history, out, accepted_levels(accepted)), out)
 
 
+@main.command(epilog=example("tracker report --pdf night.pdf"))
+@click.option("--pdf", type=click.Path(dir_okay=False, path_type=Path), help="Print the night as PDF (A4).")
+@click.option("--html", type=click.Path(dir_okay=False, path_type=Path), help="Write it as one HTML file.")
+@accepted_option
+@database_option
+def report(pdf: Path | None, html: Path | None, accepted: Path | None, database: str) -> None:
+    """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
+    import tempfile
+
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.website.printed import one_file, print_pdf
+
+    if pdf is None and html is None:
+        raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
+    with History.open(database) as history:
+        text = one_file(history, accepted_levels(accepted))
+    if html is not None:
+        _write(html, text)
+        say(f"wrote {html}")
+    if pdf is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            page = Path(folder) / "night.html"
+            page.write_text(text, encoding="utf-8")
+            print_pdf(page, pdf)
+        say(f"wrote {pdf}")
+
+
 @main.command(epilog=example("tracker serve public --port 8000"))
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option(
