@@ -28,6 +28,7 @@ nightly: install
 # Each worker has a core of its own: linear algebra with threads beside them only waits for them.
 test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
+	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
 	$(BIN)/pytest -q -n auto --dist loadfile
 
 check: develop
