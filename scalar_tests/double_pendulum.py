@@ -35,6 +35,9 @@ from spook_tracker.scalar_tests.case import (
 )
 from spook_tracker.scalar_tests.sweep import line
 
+HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_8 = Method(composition="order8")
 LENGTH, MASS, GRAVITY = 1.0, 1.0, 9.81  # m, kg, m/s²
 ACROSS, ALONG = MASS * LENGTH**2 / 12.0, 1e-3  # kg m²
 TIME_STEP, DURATION = 1e-3, 2.0  # s: before the motion is chaotic enough to hide the order
@@ -240,6 +243,19 @@ TEST = ScalarTest(
                 Configuration(
                     name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 4000, 1 / 500)
                 ),
+                Configuration(
+                    name="half-step, curved twice",
+                    method=HALF_STEP_CURVED,
+                    expected_order=2.0,
+                    order_range=(1 / 4000, 1 / 250),
+                ),
+                Configuration(
+                    name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 500, 1 / 60)
+                ),
+                Configuration(
+                    name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 250, 1 / 60)
+                ),
+                Configuration(name="order 8", method=ORDER_8, expected_order=None),
             ),
             error=angle_error,
             run=run,

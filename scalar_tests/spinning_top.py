@@ -35,6 +35,9 @@ from spook_tracker.scalar_tests.case import (
 )
 from spook_tracker.scalar_tests.sweep import line
 
+HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_8 = Method(composition="order8")
 MASS = 1.0  # kg
 ARM = 0.5  # m, from the tip to the centre of mass
 ACROSS, ALONG = 0.3, 0.5  # kg m², about the centre of mass
@@ -238,10 +241,20 @@ TEST = ScalarTest(
             name="path",
             description="largest distance of the centre of mass from its circle in 20 s",
             unit="m",
-            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
+            time_steps=tuple(1.0 / n for n in (30, 40, 48, 60, 120, 240, 480)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=1.0),
                 Configuration(name="two substeps", method=Method(substeps=2), expected_order=1.0),
+                Configuration(name="half-step, curved twice", method=HALF_STEP_CURVED, expected_order=2.0),
+                Configuration(
+                    name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 240, 1 / 40)
+                ),
+                Configuration(
+                    name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 40)
+                ),
+                Configuration(
+                    name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 60, 1 / 40)
+                ),
                 Configuration(name="half step", method=Method(half_step_velocities=True), expected_order=2.0),
                 Configuration(
                     name="curved", method=Method(half_step_velocities=True, corrections=1), expected_order=2.0

@@ -41,6 +41,9 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
 )
 
+HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_8 = Method(composition="order8")
 SIZE = (1.0, 0.06, 2.0)  # m
 MASS = 45.0  # kg
 GRAVITY = 10.0  # m/s²
@@ -229,7 +232,7 @@ TEST = ScalarTest(
             name="angle",
             description="largest angle error over 10 s against elliptic functions",
             unit="rad",
-            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
+            time_steps=tuple(1.0 / n for n in (15, 20, 24, 30, 60, 120, 240, 480, 960)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
                 Configuration(
@@ -237,6 +240,21 @@ TEST = ScalarTest(
                     method=Method(substeps=2),
                     expected_order=1.0,
                     order_range=(1 / 960, 1 / 240),
+                ),
+                Configuration(
+                    name="half-step, curved twice",
+                    method=HALF_STEP_CURVED,
+                    expected_order=2.0,
+                    order_range=(1 / 960, 1 / 60),
+                ),
+                Configuration(
+                    name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 24)
+                ),
+                Configuration(
+                    name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 20)
+                ),
+                Configuration(
+                    name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 24, 1 / 15)
                 ),
                 Configuration(
                     name="half step",

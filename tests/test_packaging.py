@@ -45,7 +45,7 @@ def tracked() -> set[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=300,
     )
     if done.returncode:
         pytest.skip("not a clone, so nobody says which files belong to it")

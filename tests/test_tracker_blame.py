@@ -13,6 +13,7 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare, known
 from spook_tracker.tracker.judge.comparison_document import Side
 from spook_tracker.tracker.judge.lane import histories, line_of
 from spook_tracker.tracker.judge.series_history import blame, judge_all, judge_history
+from spook_tracker.tracker.judge.standing import Count, count
 from spook_tracker.tracker.judge.tonight import tonight
 from tests.synthetic_history import DocumentHistory
 from tests.test_tracker_analyse import SERIES, history, run, sample, series, states
@@ -42,7 +43,7 @@ def test_results_of_another_engine_are_not_our_history() -> None:
     theirs = night(1, one(0.1))
     other = msgspec.structs.replace(theirs.engine, name="other")
     records = DocumentHistory([ours, msgspec.structs.replace(theirs, engine=other, trigger="import"), later])
-    (found,) = tonight(records, later)
+    (found,) = (f for f in tonight(records, later) if "work:" not in f.series)
 
     assert (found.verdict.word, found.red) == ("identical", False)
     assert [
@@ -122,3 +123,15 @@ def test_no_value_on_either_side_is_said() -> None:
     document = compare(_side("a", math.nan), _side("b", math.nan))
 
     assert any("no value on either side: 1 series" in note for note in document.notes)
+
+
+def test_what_an_engine_cannot_be_asked_is_never_red_and_hides_no_regression() -> None:
+    nights = history(0.01, 0.01, 0.02)
+    lost = msgspec.structs.replace(
+        nights[1].sample, value="nan", outcome="not_supported", passed=False, set_point_held=False
+    )
+    told = judge_history("t/c/m", SERIES, [nights[0], nights[1]._replace(sample=lost), nights[2]])
+
+    assert states(told) == ["green", "green", "detected"]
+    assert told[1].stands == "none"
+    assert count([(SERIES, lost)]) == Count()

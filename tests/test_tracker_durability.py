@@ -116,7 +116,7 @@ def test_writers_at_the_same_time_wait_for_each_other(url):
     """Both start on an empty database: the first makes the tables, and no run of either is lost."""
     processes = [writer(url, name, 10) for name in ("one", "two")]
     for process in processes:
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
         assert process.returncode == 0
 
     assert stored_runs(url) == {f"{name}-{number}" for name in ("one", "two") for number in range(10)}
@@ -142,7 +142,7 @@ def test_nine_writers_that_meet_on_a_new_database_lose_nothing(kind, request, tm
 def test_writers_of_the_same_run_store_it_once(url):
     processes = [writer(url, "same", 8) for _ in range(2)]
     for process in processes:
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
         assert process.returncode == 0
 
     assert stored_runs(url) == {f"same-{number}" for number in range(8)}

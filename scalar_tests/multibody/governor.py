@@ -22,7 +22,7 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
-from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.case import Configuration, Example, Measurement, Metric, ScalarTest, Simulate
 from spook_tracker.scalar_tests.multibody.library import (
     FIRST_ORDER,
     GRAVITY,
@@ -154,6 +154,7 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(time_step), time_step=time_step, duration=10.0, method=method)
 
 
+HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
 OUTPUTS = "the slider's height at 0.1, 0.5, 1, 2, 5 and 10 s"
 KEPT = (
     Metric(
@@ -228,7 +229,18 @@ TEST = ScalarTest(
         "the slider at six times",
         {
             "low": ((1 / 30, 1 / 60, 1 / 120, 1 / 240), (FIRST_ORDER,)),
-            "high": ((1 / 480, 1 / 1000, 1 / 2000, 1 / 4000, 1 / 8000), (FIRST_ORDER,)),
+            "high": (
+                (1 / 480, 1 / 1000, 1 / 2000, 1 / 4000, 1 / 8000),
+                (
+                    FIRST_ORDER,
+                    Configuration(
+                        name="half-step, curved twice",
+                        method=HALF_STEP_CURVED,
+                        expected_order=2.0,
+                        order_range=(1 / 4000, 1 / 480),
+                    ),
+                ),
+            ),
         },
         ladder_error,
         ladder_run,

@@ -18,6 +18,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     limit_option,
     recorded,
+    refuse_unwritable,
     source_options,
     terminated_is_interrupted,
     workers_option,
@@ -95,6 +96,7 @@ def run_command(
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.measure.run import Request
 
+    refuse_unwritable(json_file, junit_file)
     request = Request(
         tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
     )
@@ -151,10 +153,13 @@ def nightly(
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.website.folder import refuse_unusable
 
+    refuse_unwritable(json_file, junit_file)
+    refuse_unusable(out)
     first, *others = engine.split(",")
     for other in others:
-        asked = Request(sweep=not quick, workers=workers, trigger="nightly")
+        asked = Request(sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly")
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:
@@ -218,6 +223,35 @@ def publish(out: Path, accepted: Path | None, database: str) -> None:
 
     with History.open(database) as history:
         _say_published(build(history, out, accepted_levels(accepted)), out)
+
+
+@main.command(epilog=example("tracker report --pdf night.pdf"))
+@click.option("--pdf", type=click.Path(dir_okay=False, path_type=Path), help="Print the night as PDF (A4).")
+@click.option("--html", type=click.Path(dir_okay=False, path_type=Path), help="Write it as one HTML file.")
+@accepted_option
+@database_option
+def report(pdf: Path | None, html: Path | None, accepted: Path | None, database: str) -> None:
+    """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
+    import tempfile
+
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.website.printed import one_file, print_pdf
+
+    if pdf is None and html is None:
+        raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
+    with History.open(database) as history:
+        text = one_file(history, accepted_levels(accepted))
+    if html is not None:
+        _write(html, text)
+        say(f"wrote {html}")
+    if pdf is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            page = Path(folder) / "night.html"
+            page.write_text(text, encoding="utf-8")
+            print_pdf(page, pdf)
+        say(f"wrote {pdf}")
 
 
 @main.command(epilog=example("tracker serve public --port 8000"))

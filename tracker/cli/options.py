@@ -64,7 +64,7 @@ def limit_option(command: Command) -> Command:
         "--limit",
         metavar="SECONDS",
         type=click.FloatRange(min=0.0, min_open=True),
-        help="Wall time one simulation may take; by default 10 s for another engine.",
+        help="Wall time of one simulation; by default 10 s for another engine.",
     )(command)
 
 
@@ -176,6 +176,22 @@ def terminated_is_interrupted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def refuse_unwritable(*files: Path | None) -> None:
+    """TrackerError if a file cannot be written: asked before anything is measured, not after."""
+    from spook_tracker.tracker.document.errors import TrackerError
+
+    for file in files:
+        if file is None:
+            continue
+        folder = file.absolute().parent
+        if file.is_dir():
+            raise TrackerError(f"{file} is a folder; name a file")
+        if not folder.is_dir():
+            raise TrackerError(f"the folder of {file} does not exist; make it first")
+        if not os.access(file if file.exists() else folder, os.W_OK):
+            raise TrackerError(f"{file} cannot be written; check its permissions")
 
 
 def complain(sentence: str) -> None:

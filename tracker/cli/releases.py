@@ -40,6 +40,7 @@ def backfill(
     catalogue: str,
     limit: float | None,
     workers: int,
+    time_limit: float,
     database: str,
 ) -> None:
     """Install released versions of an engine, measure each, and record them in release order.
@@ -62,7 +63,9 @@ def backfill(
             continue
         try:
             where = releases.install(engine, version, folder.resolve())
-            document = releases.measure_release(engine, where, tests, limit, catalogue, workers)
+            document = releases.measure_release(
+                engine, where, tests, limit=limit, time_limit=time_limit, catalogue=catalogue, workers=workers
+            )
         except releases.ReleaseError as error:
             say(f"{heading}: {error}")
             continue

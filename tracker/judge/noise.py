@@ -1,8 +1,10 @@
 """Series with noise: a night is red when it and the night before both stand clear of what is usual.
 
-Usual is the median of the nights that hold, noise their median absolute deviation; what counts is a relative
-change above a floor and above four times the noise, on two nights in a row. One slow night is only suspected.
-Slow creep is found by the median of the last nights against those at the last release.
+Usual is the median of the nights that hold, noise their median absolute deviation. What counts is a relative
+change above a floor that follows the noise, and above what the nights that hold have reached themselves: two
+clusters, spikes and slow waves are learnt. One slow night is only suspected; if the next one holds, it joins
+what is usual. Two fast nights in a row are a new level, so that a slow-down after them is seen. Slow creep
+is found by the median of the last nights against those at the last release.
 """
 
 from __future__ import annotations
@@ -17,7 +19,11 @@ from spook_tracker.tracker.judge.verdict import Verdict
 
 WINDOW = 30  # nights that say what is usual
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
-FLOOR = 0.05  # relative
+LEAST = 0.01  # relative: no change below is told
+FLOOR = 0.05  # relative; less where the noise is less than an eighth of it, of nights enough
+ENOUGH = 20  # nights
+CLEAR = 8.0  # noises, below the floor: the noise of few nights may be told too small
+REACH = 1.25  # times the second largest deviation of nights that hold
 FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
 SIGMAS = 4.0
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
@@ -53,6 +59,7 @@ def judge_noisy(
     usual: list[int] = []  # places of nights that hold
     anchor: list[int] = []  # places of the nights at the last release
     suspects: list[int] = []  # unusual nights in a row, not yet or already red
+    gains: list[int] = []  # fast nights in a row
     red_since: int | None = None
     found: list[Noisy] = []
     levels: list[Usual] = []  # before each night but the first
@@ -61,11 +68,12 @@ def judge_noisy(
             usual, anchor = [place], [place]
             found.append(Noisy(verdict=Verdict(word="new", sentence="the first value"), state="green"))
             continue
-        level, threshold = _usual([values[i] for i in usual])
+        level, threshold = _usual([values[i] for i in usual], larger_is_better)
         levels.append((level, threshold))
         change = _worse_by(level, value, larger_is_better)
         if change > threshold:
             suspects.append(place)
+            gains = []
             confirmed = len(suspects) > 1 or not math.isfinite(value)
             verdict = _verdict(change, level, value, "slower" if confirmed else "")
             if accepted[place]:
@@ -85,10 +93,15 @@ def judge_noisy(
             else:
                 found.append(Noisy(verdict=verdict, state="suspected", against=usual[-1]))
             continue
-        recovered, suspects, red_since = red_since is not None, [], None
-        if -change > threshold:
-            usual = usual[-1:] if recovered else usual
-        usual = [*usual[-WINDOW + 1 :], place]
+        recovered = red_since is not None
+        dismissed = [] if recovered else suspects  # what no second night confirmed is noise
+        suspects, red_since = [], None
+        gains = [*gains, place] if -change > threshold else []
+        if gains and recovered:
+            usual = usual[-1:]
+        elif len(gains) > 1:
+            usual = gains[:-1]  # two fast nights are a new level
+        usual = [*usual, *dismissed, place][-WINDOW:]
         anchor = _anchor(anchor, place, releases[place])
         creep = _creep(values, usual, anchor, larger_is_better)
         if creep is not None and not accepted[place]:
@@ -100,7 +113,7 @@ def judge_noisy(
                 Noisy(verdict=faster or same, state="recovered" if recovered else "green", against=usual[0])
             )
     if found:
-        levels.append(_usual([values[i] for i in usual]))
+        levels.append(_usual([values[i] for i in usual], larger_is_better))
     return [replace(night, usual=after) for night, after in zip(found, levels, strict=True)]
 
 
@@ -135,7 +148,7 @@ def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Ve
     return Verdict(word="same", sentence=f"{_words(change)}, inside the noise (±{100.0 * threshold:.0f} %)")
 
 
-def _usual(values: Sequence[float]) -> Usual:
+def _usual(values: Sequence[float], larger_is_better: bool = False) -> Usual:
     """Level, and the relative change that stands clear of it."""
     finite = [value for value in values if math.isfinite(value)]
     if not finite:
@@ -143,8 +156,13 @@ def _usual(values: Sequence[float]) -> Usual:
     level = median(finite)
     if len(finite) < FEWEST or level == 0.0:
         return level, FEW_NIGHTS_FLOOR
-    noise = NORMAL * median(abs(value - level) for value in finite) / abs(level)
-    return level, max(FLOOR, SIGMAS * noise)
+    deviations = sorted(abs(value - level) / abs(level) for value in finite)
+    noise = NORMAL * median(deviations)
+    worse = sorted(_worse_by(level, value, larger_is_better) for value in finite)
+    clear = max(FLOOR, SIGMAS * noise)
+    if len(finite) >= ENOUGH:
+        clear = max(LEAST, min(clear, CLEAR * noise))
+    return level, max(clear, REACH * worse[-2])
 
 
 def _worse_by(level: float, value: float, larger_is_better: bool) -> float:
@@ -174,7 +192,7 @@ def _creep(
     old = [values[i] for i in anchor if math.isfinite(values[i])]
     if len(recent) < CREEP or len(old) < CREEP:
         return None
-    _, threshold = _usual([values[i] for i in usual])
+    _, threshold = _usual([values[i] for i in usual], larger_is_better)
     change = _worse_by(median(old), median(recent), larger_is_better)
     if change <= threshold:
         return None

@@ -137,6 +137,11 @@ def _judge_values(
                 release = night
             continue
         own = standing(definition, night.sample)
+        if own == "none":  # the engine cannot be asked this: nothing became of the level that holds
+            unasked = Verdict(word="not_comparable", sentence="not supported by this engine")
+            yield Judged(night=night, verdict=unasked, state="green", stands=own)
+            calm = None
+            continue
         broken = own in ("fail", "watch")
         if level is None or settled is None or release is None or not _comparable(level, night):
             word, why = (

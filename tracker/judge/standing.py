@@ -16,12 +16,13 @@ import msgspec
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
+NOT_SUPPORTED = "not_supported"  # outside the order: an engine cannot be asked this
 NO_VALUE = ("not_finite", "diverged", "crashed", "timed_out", "missing")
 
 
 def honest(sample: Sample) -> Sample:
     """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
-    if sample.outcome in NO_VALUE or math.isfinite(float(sample.value)):
+    if sample.outcome in (*NO_VALUE, NOT_SUPPORTED) or math.isfinite(float(sample.value)):
         return sample
     return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
 
@@ -33,6 +34,8 @@ def expected(definition: SeriesDefinition) -> bool:
 
 def standing(definition: SeriesDefinition, sample: Sample) -> Class:
     """fail, watch (set point left inside the limit), pass, or followed where nothing is expected."""
+    if sample.outcome == NOT_SUPPORTED:
+        return "none"
     if definition.role == "reported":
         return "followed"
     sample = honest(sample)
@@ -80,6 +83,8 @@ def count(pairs: Iterable[tuple[SeriesDefinition, Sample]]) -> Count:
     found: Counter[str] = Counter()
     for definition, sample in pairs:
         stands = standing(definition, sample)
+        if stands == "none":
+            continue
         if not expected(definition):
             found["lost"] += stands == "fail"
             continue

@@ -75,13 +75,21 @@ def install(engine: str, version: str, folder: Path) -> Path:
 
 
 def measure_release(
-    engine: str, place: Path, tests: Sequence[str], limit: float | None, catalogue: str, workers: int
+    engine: str,
+    place: Path,
+    tests: Sequence[str],
+    *,
+    limit: float | None,
+    time_limit: float,
+    catalogue: str,
+    workers: int,
 ) -> RunDocument:
     """One run of a release, measured in a process that sees it first. Raises ReleaseError."""
     file = place / "run.json"
     file.unlink(missing_ok=True)
     asked = ["run", *tests, "--engine", engine, "--catalogue", catalogue, "--no-record", "--json", str(file)]
-    asked += ["--workers", str(workers), *([] if limit is None else ["--limit", str(limit)])]
+    asked += ["--workers", str(workers), "--time-limit", str(time_limit)]
+    asked += [*([] if limit is None else ["--limit", str(limit)])]
     done = _python(place, "-m", "spook_tracker", *asked, limit=None)
     if not file.exists():
         raise ReleaseError(f"{place.name} could not be measured: {_last(done.stderr)}")

@@ -76,6 +76,8 @@ class Questions:
             raise RunError(
                 f"there is no catalogue {self.catalogue!r} ({error}); name one as module:NAME"
             ) from None
+        if not isinstance(found, Mapping) or not all(isinstance(test, ScalarTest) for test in found.values()):
+            raise RunError(f"{self.catalogue!r} is no catalogue: a mapping from name to ScalarTest")
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
         return others.asked_of(found, configurations, engine.gating) if configurations else found

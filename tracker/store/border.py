@@ -42,7 +42,8 @@ def _cleaned(part: Any, place: str) -> Any:
         return part if math.isfinite(part) else document.to_number(part)
     if isinstance(part, int):
         if abs(part) > MAX_INTEGER:
-            raise DocumentError(f"{place}: the number {part:.3e} is larger than 64 bits hold")
+            digits = int(part.bit_length() * 0.30103) + 1
+            raise DocumentError(f"{place}: a whole number of {digits} digits; 64 bits hold 19")
         return part
     if isinstance(part, dict):
         return {clean_text(name): _cleaned(inner, f"{place}.{name}") for name, inner in part.items()}

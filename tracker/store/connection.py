@@ -37,6 +37,8 @@ def database_url(given: str | None = None) -> URL:
         raise DatabaseError(
             "the database URL cannot be read; write sqlite:///FILE or postgresql://..."
         ) from None
+    if url.get_backend_name() == "postgres":
+        raise DatabaseError("a PostgreSQL URL begins with postgresql://, not with postgres://")
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         raise DatabaseError(f"{url.get_backend_name()} is not supported; use sqlite or postgresql")
     return url

@@ -133,6 +133,12 @@ def _check_file(url: URL, readonly: bool) -> None:
     path = Path(str(url.database))
     if path.is_dir():
         raise DatabaseError(f"{path} is a folder; name a file")
+    try:
+        path.resolve()
+    except (OSError, RuntimeError):
+        raise DatabaseError(f"{path} is a link that leads back to itself; name a file") from None
+    if path.exists() and not path.is_file():
+        raise DatabaseError(f"{path} is a pipe or a device; name a file")  # reading it might wait for ever
     if not path.exists():
         if readonly:
             raise DatabaseError(f"there is no database {path}; record a run first with: tracker run")

@@ -166,7 +166,9 @@ def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
 
 def _night_ticks(nights: Sequence[Night], shown: Sequence[int]) -> tuple[tuple[float, str], ...]:
     """Days under the axis; where several nights share a day, their commits."""
-    days = [day(nights[n].started)[5:] for n in shown]
+    dates = [day(nights[n].started) for n in shown]
+    within = len({date[:4] for date in dates}) < 2  # a year; beyond it, the year is said
+    days = [date[5:] if within else date for date in dates]
     if len(set(days)) < len(days):
         days = [short_hash(nights[n].engine)[:7] or version(nights[n].engine) for n in shown]
     return tuple(zip(map(float, shown), days, strict=True))
@@ -199,8 +201,7 @@ def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
     if limit is None:
         return "linear", [], ""
     if trend.definition.better == "smaller_magnitude":
-        signs = {math.copysign(1.0, v) for v in trend.values if math.isfinite(v) and v != 0.0}
-        return "linear", [sign * limit for sign in sorted(signs)], ""
+        return "linear", [-limit, limit], ""  # the limit is on the magnitude: both ends
     return "linear", [limit], ""
 
 

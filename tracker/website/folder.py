@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import shutil
+import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from pathlib import Path
 from spook_tracker.tracker.document.errors import TrackerError
 
 MARKER = ".tracker-site.json"
+YOUNG = 3600.0  # s; no publication takes that long
 AT_FDCWD, RENAME_EXCHANGE = -100, 2
 
 
@@ -60,6 +62,7 @@ def replacing(out: Path) -> Iterator[Folder]:
     new = out.with_name(f".{out.name}.new-{uuid.uuid4().hex[:8]}")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(out)
         new.mkdir()
         folder = Folder(out, new, known)
         yield folder
@@ -70,6 +73,16 @@ def replacing(out: Path) -> Iterator[Folder]:
         raise FolderError(f"the website cannot be written to {out}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(new, ignore_errors=True)
+
+
+def refuse_unusable(out: Path) -> None:
+    """FolderError if no website can be put there: asked before a night is measured, not after."""
+    _known(out)
+    place = out.absolute().parent
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK):
+        raise FolderError(f"the website cannot be written to {out}: {place} is no folder one may write to")
 
 
 def digest(*parts: bytes) -> str:
@@ -104,6 +117,14 @@ def _keep(before: Path, target: Path) -> None:
         os.link(before, target)  # the old name goes with the old folder, so one name remains
     except OSError:
         shutil.copy2(before, target)
+
+
+def _sweep(out: Path) -> None:
+    """Remove what publications that were killed left beside the site; a young folder may still be in work."""
+    for left in out.parent.iterdir():
+        ours = any(left.name.startswith(f".{out.name}.{kind}-") for kind in ("new", "old"))
+        if ours and left.is_dir() and not left.is_symlink() and time.time() - left.stat().st_mtime > YOUNG:
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _swap(new: Path, out: Path) -> None:

@@ -1,0 +1,85 @@
+"""What cannot be is refused in one sentence, before anything is measured."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+
+from spook_tracker.tracker.store.transfer import encoded
+from tests.run_documents import run
+from tests.test_tracker_cli import tracker
+
+
+@pytest.fixture(autouse=True)
+def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
+    monkeypatch.setenv("TRACKER_CATALOGUE", "toy_questions:CATALOGUE")
+    monkeypatch.delenv("TRACKER_DB", raising=False)
+
+
+def refused(done: Result, words: str) -> None:
+    assert done.exit_code == 2, done.stdout
+    assert re.search(words, done.stderr), done.stderr
+    assert "defect" not in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+OUTPUTS = [
+    (("--json", "no/such/run.json"), "the folder of no/such/run.json does not exist"),
+    (("--junit", "."), "is a folder; name a file"),
+    (("--out", "theirs"), "theirs"),
+    (("--out", "file/public"), "no folder one may write to|not a folder"),
+]
+
+
+@pytest.mark.parametrize(("option", "words"), OUTPUTS)
+def test_where_results_cannot_be_written_nothing_is_measured(option: tuple[str, str], words: str) -> None:
+    Path("theirs").mkdir()
+    Path("theirs", "precious.txt").write_text("do not touch")
+    Path("file").write_text("a file")
+
+    refused(tracker("nightly", "--workers", "0", *option), words)
+
+    assert not Path("tracker.db").exists()
+    assert not Path("public").exists()
+
+
+def test_a_run_asks_for_its_files_first_as_well() -> None:
+    refused(tracker("run", "--workers", "0", "--json", "no/run.json"), "does not exist")
+    assert not Path("tracker.db").exists()
+
+
+@pytest.mark.parametrize("named", ["os:environ", "os:getcwd", "math:pi", "toy_questions:FALL"])
+def test_what_is_no_catalogue_is_named(named: str) -> None:
+    refused(tracker("run", "--no-record", "--workers", "0", "--catalogue", named), "is no catalogue")
+
+
+def test_a_link_to_itself_and_a_pipe_are_no_databases() -> None:
+    Path("a").symlink_to("b")
+    Path("b").symlink_to("a")
+    os.mkfifo("pipe")
+    begun = time.monotonic()
+    for command in (("run", "--workers", "0"), ("db", "check"), ("publish", "--out", "public")):
+        refused(tracker(*command, "--db", "a"), "a link that leads back to itself")
+        refused(tracker(*command, "--db", "pipe"), "a pipe or a device")
+    assert time.monotonic() - begun < 60.0  # nobody waits for the other end of a pipe
+
+
+def test_the_old_name_of_postgresql_is_told_its_new_one() -> None:
+    refused(tracker("db", "check", "--db", "postgres://user@host/name"), "begins with postgresql://")
+
+
+@pytest.mark.parametrize("place", ["cores", "steps", "schema_version", "value"])
+def test_a_number_of_four_hundred_digits_is_refused(place: str) -> None:
+    text = re.sub(rf'("{place}": *)[0-9.]+', rf"\g<1>1{'0' * 400}", encoded(run()).decode(), count=1)
+    assert "0" * 400 in text
+    Path("big.json").write_text(text)
+
+    refused(tracker("import", "big.json"), "big.json")

@@ -1,0 +1,69 @@
+"""A night as one document: an HTML file that needs nothing else, and a PDF printed from it by a browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.website.nights import Records
+from spook_tracker.tracker.website.publish import publish
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+PATIENCE = 300.0  # s, for some sixty pages on a busy machine
+
+
+class PrintError(TrackerError):
+    """The document cannot be printed here."""
+
+
+def one_file(history: Records, accepted: Sequence[Accepted] = ()) -> str:
+    """The newest night's document as one HTML file: style inside, no script, no reference to another file."""
+    with tempfile.TemporaryDirectory() as folder:
+        site = Path(folder) / "site"
+        publish(history, site, accepted)
+        document = site / "document.html"
+        if not document.exists():
+            raise PrintError("no night is recorded yet; record one with: tracker run")
+        text = document.read_text(encoding="utf-8")
+        style = next((site / "assets").glob("site-*.css")).read_text(encoding="utf-8")
+    text = re.sub(r"<script\b.*?</script>\n?", "", text, flags=re.DOTALL)
+    text = re.sub(r'<link rel="(icon|alternate)"[^>]*>\n?', "", text)
+    text = re.sub(r"<header class=\"bar\">.*?</header>\n?", "", text, flags=re.DOTALL)
+    text = re.sub(r"<footer>.*?</footer>\n?", "", text, flags=re.DOTALL)
+    return re.sub(r'<link rel="stylesheet"[^>]*>', lambda found: f"<style>\n{style}</style>", text, count=1)
+
+
+def print_pdf(html: Path, pdf: Path) -> None:
+    """Print an HTML file as PDF with the browser that is here. PrintError if there is none, or it fails."""
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        raise PrintError(
+            f"a PDF is printed by a browser, and none of {', '.join(BROWSERS)} is here; install one, or ask "
+            "for --html and print that"
+        )
+    with tempfile.TemporaryDirectory() as profile:
+        made = Path(profile) / "made.pdf"
+        command = [
+            browser, "--headless=new", "--disable-gpu", "--no-pdf-header-footer", "--disable-dev-shm-usage",
+            f"--user-data-dir={profile}/profile", f"--print-to-pdf={made}",
+        ]  # fmt: skip
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            command.append("--no-sandbox")
+        try:
+            done = subprocess.run(
+                [*command, html.absolute().as_uri()], capture_output=True, text=True, timeout=PATIENCE
+            )
+        except subprocess.TimeoutExpired:
+            raise PrintError(f"{browser} did not finish printing within {PATIENCE:.0f} s") from None
+        if not made.exists():
+            last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+            raise PrintError(f"{browser} printed nothing: {last[:200]}")
+        pdf.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(made, pdf)
