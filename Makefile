@@ -5,12 +5,13 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests FORCE
+.PHONY: help wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
+	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
@@ -85,6 +86,12 @@ native-tests: develop
 	    -DCMAKE_BUILD_TYPE=Release -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON
 	$(BIN)/cmake --build build/native-tests
 	$(BIN)/ctest --test-dir build/native-tests --output-on-failure
+
+sanitize: develop
+	$(BIN)/cmake -S engine/native -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
+	    -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=ON
+	$(BIN)/cmake --build build/sanitize
+	$(BIN)/ctest --test-dir build/sanitize --output-on-failure
 
 clean:
 	rm -rf build $(VENV) public .mypy_cache .ruff_cache .pytest_cache .hypothesis

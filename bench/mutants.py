@@ -56,9 +56,9 @@ MUTANTS = (
         changes=(
             (f"{SRC}/particles/particle_kernels.cpp", "-r.violation_gain * g", "-0.5 * r.violation_gain * g"),
             (
-                f"{SRC}/particles/particle_system.cpp",
-                "-row.violation_gain * link.g",
-                "-0.5 * row.violation_gain * link.g",
+                f"{SRC}/particles/distance_rows.cpp",
+                "-r.violation_gain * l.g",
+                "-0.5 * r.violation_gain * l.g",
             ),
         ),
         tests=("pendulum", "n_pendulum"),

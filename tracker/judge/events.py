@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.series_history import Judged, Told
-from spook_tracker.tracker.judge.vocabulary import WORD_RANK, Class, Word
+from spook_tracker.tracker.judge.vocabulary import Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]
 
@@ -73,12 +73,11 @@ def _event(told: Told, stretch: list[Judged], standing: Standing, end: Judged | 
     last = stretch[-1]
     first = last.first_bad or stretch[0].night
     good = last.last_good if last.red else last.against
-    shown = min(stretch, key=lambda j: (WORD_RANK[j.verdict.word], j is not last)) if last.red else last
     return Event(
         definition=told.definition,
-        word=shown.verdict.word if shown.verdict.red else "regressed",
-        name=name_of(shown),
-        sentence=shown.verdict.sentence,
+        word=last.verdict.word if last.verdict.red else "regressed",
+        name=name_of(last),
+        sentence=last.verdict.sentence,
         stands=last.stands,
         first=first.run,
         last=last.night.run,

@@ -1,5 +1,5 @@
 // The particle pipeline for Python: tables in, a report out.
-#include "bindings/columns.hpp"
+#include "bindings/forces.hpp"
 #include "particles/particle_program.hpp"
 
 namespace spook {
@@ -35,20 +35,6 @@ void read_bodies(const nb::dict& bodies, ParticleScene& scene) {
     table.expect_all_read();
 }
 
-/// Two ends, each the index of a body or −1 for a point of the world.
-struct Ends {
-    explicit Ends(Columns& table)
-        : first(table.numbers("first")),
-          second(table.numbers("second")),
-          first_point(table.numbers("first_point", 3)),
-          second_point(table.numbers("second_point", 3)) {}
-    End operator()(std::size_t row, int side) const {
-        if (side == 0) return {first.index(row), first_point.vec(row)};
-        return {second.index(row), second_point.vec(row)};
-    }
-    Numbers first, second, first_point, second_point;
-};
-
 void read_rows(const nb::dict& rows, ParticleScene& scene) {
     Columns table(rows, "rows");
     const Ends end(table);
@@ -56,23 +42,6 @@ void read_rows(const nb::dict& rows, ParticleScene& scene) {
                   damping = table.numbers("damping");
     for (std::size_t i = 0; i < table.rows(); ++i)
         scene.rows.push_back({{end(i, 0), end(i, 1)}, length[i], compliance[i], damping[i]});
-    table.expect_all_read();
-}
-
-void read_springs(const nb::dict& springs, ParticleScene& scene) {
-    Columns table(springs, "springs");
-    const Ends end(table);
-    const Numbers stiffness = table.numbers("stiffness"), length = table.numbers("rest_length"),
-                  viscosity = table.numbers("viscosity");
-    for (std::size_t i = 0; i < table.rows(); ++i)
-        scene.springs.push_back({{end(i, 0), end(i, 1)}, stiffness[i], length[i], viscosity[i]});
-    table.expect_all_read();
-}
-
-void read_fields(const nb::dict& fields, ParticleScene& scene) {
-    Columns table(fields, "fields");
-    const Numbers strength = table.numbers("strength"), centre = table.numbers("centre", 3);
-    for (std::size_t i = 0; i < table.rows(); ++i) scene.fields.push_back({strength[i], centre.vec(i)});
     table.expect_all_read();
 }
 
@@ -84,8 +53,8 @@ void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, c
     scene.method = to_method(method);
     read_bodies(bodies, scene);
     read_rows(rows, scene);
-    read_springs(springs, scene);
-    read_fields(fields, scene);
+    scene.springs = read_springs(springs);
+    scene.fields = read_fields(fields);
     new (self) ParticleProgram(scene, quantities, observations);
 }
 

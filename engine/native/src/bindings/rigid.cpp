@@ -1,5 +1,5 @@
 // The rigid-body pipeline for Python: tables in, a report out.
-#include "bindings/columns.hpp"
+#include "bindings/forces.hpp"
 #include "rigid/rigid_program.hpp"
 
 namespace spook {
@@ -100,22 +100,6 @@ void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_forces(const nb::dict& springs, const nb::dict& fields, RigidScene& scene) {
-    Columns spring(springs, "springs");
-    const Numbers first = spring.numbers("first"), second = spring.numbers("second"),
-                  first_point = spring.numbers("first_point", 3),
-                  second_point = spring.numbers("second_point", 3), stiffness = spring.numbers("stiffness"),
-                  length = spring.numbers("rest_length"), viscosity = spring.numbers("viscosity");
-    for (std::size_t i = 0; i < spring.rows(); ++i)
-        scene.springs.push_back({first.index(i), second.index(i), first_point.vec(i), second_point.vec(i),
-                                 stiffness[i], length[i], viscosity[i]});
-    spring.expect_all_read();
-    Columns field(fields, "fields");
-    const Numbers strength = field.numbers("strength"), centre = field.numbers("centre", 3);
-    for (std::size_t i = 0; i < field.rows(); ++i) scene.fields.push_back({strength[i], centre.vec(i)});
-    field.expect_all_read();
-}
-
 void read_colliders(const nb::dict& colliders, RigidScene& scene) {
     Columns table(colliders, "colliders");
     const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
@@ -182,7 +166,8 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_motors(motors, scene);
     read_limits(limits, scene);
     read_joint_springs(joint_springs, scene);
-    read_forces(springs, fields, scene);
+    scene.springs = read_springs(springs);
+    scene.fields = read_fields(fields);
     read_colliders(colliders, scene);
     read_no_contact(no_contact, scene);
     new (self) RigidProgram(scene, quantities, observations);

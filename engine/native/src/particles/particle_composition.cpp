@@ -6,16 +6,17 @@
 // RATTLE also projects the velocity at the end of the step. Between two stages that projection acts along the same
 // directions as the next impulses, so it drops out and only the sum of both is solved for: one nonlinear solve per
 // stage. Velocities are projected where they are read. The kicks at the end of a stage and the beginning of
-// the next are one kick, too: v_ lives at mid-stage and `pending_` is the half stage it still has to be kicked.
+// the next are one kick, too: v_ lives at mid-stage and `state_.pending` is the half stage it still has to be kicked.
 //
 // Newton's method: the matrix at the predicted end, then the same factor again until the square of the residual is
 // below rounding; refactored when that converges slowly. The prediction extrapolates each stage's forces from the
 // same stage of the steps before.
+#include "particles/particle_composition.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "particles/particle_system.hpp"
 #include "run/composition.hpp"
 
 namespace spook {
@@ -31,22 +32,42 @@ constexpr double FARTHEST = 0.3;     // of |d|²/L² − 1 at the prediction
 
 }  // namespace
 
-void ParticleSystem::start_composition() {
-    pending_ = 0.0;
-    stage_steps_ = 0;
-    halved_steps_ = 0;
-    lost_ = false;
-    std::fill(history_.begin(), history_.end(), 0.0);
+ParticleComposition::ParticleComposition(ParticleParts& parts, int order)
+    : nodes_(parts.nodes),
+      rows_(parts.rows),
+      forces_(parts.forces),
+      paths_(parts.paths),
+      saddle_(parts.saddle),
+      solver_(parts.solver),
+      h_(parts.h),
+      gammas_(composition_stages(order)) {
+    upper_.resize(rows_.size());
+    impulse_.resize(rows_.size());
+    state_.history.resize(3 * rows_.size() * gammas_.size());
+    for (int depth = 0; depth < MOST_HALVINGS; ++depth) {
+        step_x_[depth].reserve(nodes_.size());
+        step_v_[depth].reserve(nodes_.size());
+    }
 }
 
-void ParticleSystem::compose(std::int64_t steps) {
-    const std::span<const double> stages = composition_stages(scene_.method.composition);
+void ParticleComposition::start(StageClock* clock) {
+    clock_ = clock;
+    state_.newton_iterations = 0;
+    state_.pending = 0.0;
+    state_.stage_steps = 0;
+    state_.halved_steps = 0;
+    state_.lost = false;
+    std::fill(state_.history.begin(), state_.history.end(), 0.0);
+}
+
+void ParticleComposition::advance(std::int64_t steps) {
     if (clock_) clock_->start();
     if (solver_ == ParticleSolver::none) {
         for (; steps > 0; --steps) {
-            for (const double gamma : stages) drift_kick(gamma * h_);
-            for (std::size_t node = 0; node < x_.size(); ++node) x_[node] += pending_ * v_[node];
-            pending_ = 0.0;  // so that reading a sample changes no bit of what follows
+            for (const double gamma : gammas_) drift_kick(gamma * h_);
+            for (std::size_t node = 0; node < nodes_.x.size(); ++node)
+                nodes_.x[node] += state_.pending * nodes_.v[node];
+            state_.pending = 0.0;  // so that reading a sample changes no bit of what follows
         }
         return;
     }
@@ -54,78 +75,75 @@ void ParticleSystem::compose(std::int64_t steps) {
 }
 
 /// One step of length h. Where the equations have no solution near (a whip cracks within the step), the step is
-/// taken back and done in two halves, and so on; the order stays, `halved_steps_` counts it. When the smallest part
+/// taken back and done in two halves, and so on; the order stays, `halved_steps` counts it. When the smallest part
 /// has none either, the state is lost: not a number from here on.
-void ParticleSystem::constrained_step(double h, int depth) {
-    const std::span<const double> stages = composition_stages(scene_.method.composition);
-    const std::size_t rows = row_.size();
-    if (lost_) return;
+void ParticleComposition::constrained_step(double length, int depth) {
+    const std::size_t count = rows_.size();
+    if (state_.lost) return;
     std::vector<Vec3>&x = step_x_[static_cast<std::size_t>(depth)],
     &v = step_v_[static_cast<std::size_t>(depth)];
-    x = x_;
-    v = v_;
-    const double pending = pending_;
+    x = nodes_.x;
+    v = nodes_.v;
+    const double pending = state_.pending;
     bool solved = true;
-    for (std::size_t stage = 0; stage < stages.size() && solved; ++stage)
-        solved = constrained_stage(stages[stage] * h, history_.data() + 3 * rows * stage);
-    ++stage_steps_;
+    for (std::size_t stage = 0; stage < gammas_.size() && solved; ++stage)
+        solved = constrained_stage(gammas_[stage] * length, state_.history.data() + 3 * count * stage);
+    ++state_.stage_steps;
     if (solved) return;
     if (depth + 1 == MOST_HALVINGS) {
-        lost_ = true;
-        for (Vec3& speed : v_) speed.x = std::numeric_limits<double>::quiet_NaN();
+        state_.lost = true;
+        for (Vec3& speed : nodes_.v) speed.x = std::numeric_limits<double>::quiet_NaN();
         return;
     }
-    x_ = x;
-    v_ = v;
-    pending_ = pending;
-    ++halved_steps_;
+    nodes_.x = x;
+    nodes_.v = v;
+    state_.pending = pending;
+    ++state_.halved_steps;
     for (int half = 0; half < 2; ++half) {
-        stage_steps_ = half == 0 ? 0 : stage_steps_;
-        if (half == 0) std::fill(history_.begin(), history_.end(), 0.0);
-        constrained_step(0.5 * h, depth + 1);
+        state_.stage_steps = half == 0 ? 0 : state_.stage_steps;
+        if (half == 0) std::fill(state_.history.begin(), state_.history.end(), 0.0);
+        constrained_step(0.5 * length, depth + 1);
     }
-    stage_steps_ = 0;
-    std::fill(history_.begin(), history_.end(), 0.0);
+    state_.stage_steps = 0;
+    std::fill(state_.history.begin(), state_.history.end(), 0.0);
 }
 
 /// Without rows: drift, kick, drift; the drifts of neighbouring stages are one.
-void ParticleSystem::drift_kick(double tau) noexcept {
-    const double drift = pending_ + 0.5 * tau, part = tau / h_;
-    for (std::size_t node = 0; node < x_.size(); ++node) x_[node] += drift * v_[node];
+void ParticleComposition::drift_kick(double tau) noexcept {
+    const double drift = state_.pending + 0.5 * tau, part = tau / h_;
+    for (std::size_t node = 0; node < nodes_.x.size(); ++node) nodes_.x[node] += drift * nodes_.v[node];
     if (clock_) clock_->mark(Stage::integrate_positions);
     find_kicks();
-    for (std::size_t node = 0; node < x_.size(); ++node) v_[node] += part * kick_[node];
-    pending_ = 0.5 * tau;
-    if (clock_) clock_->mark(fields_.empty() ? Stage::apply_gravity : Stage::apply_central_gravity);
+    for (std::size_t node = 0; node < nodes_.x.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
+    state_.pending = 0.5 * tau;
+    if (clock_) clock_->mark(forces_.fields().empty() ? Stage::apply_gravity : Stage::apply_central_gravity);
 }
 
-void ParticleSystem::find_kicks() noexcept {
-    if (!moving_forces_) return;
-    kick_ = steady_kick_;
-    if (!fields_.empty()) apply_central_gravity();
-    if (!springs_.empty()) apply_springs();
+void ParticleComposition::find_kicks() noexcept {
+    if (forces_.any()) forces_.find_kicks(nodes_, h_);
 }
 
 /// `history` holds this stage's forces one, two and three steps ago. False if no solution was found.
-bool ParticleSystem::constrained_stage(double tau, double* history) {
-    const std::size_t rows = row_.size();
-    const double span = pending_ + 0.5 * tau, part = span / h_;
-    double *one = history, *two = history + rows, *three = history + 2 * rows;
+bool ParticleComposition::constrained_stage(double tau, double* history) {
+    const std::size_t count = rows_.size();
+    const double span = state_.pending + 0.5 * tau, part = span / h_;
+    double *one = history, *two = history + count, *three = history + 2 * count;
     find_kicks();
-    const double a1 = stage_steps_ >= 3 ? 3.0 : stage_steps_ == 2 ? 2.0 : 1.0;
-    const double a2 = stage_steps_ >= 3   ? -3.0
-                      : stage_steps_ == 2 ? -1.0
-                                          : 0.0,
-                 a3 = stage_steps_ >= 3 ? 1.0 : 0.0;
-    for (std::size_t k = 0; k < rows; ++k)
-        link_[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
+    const double a1 = state_.stage_steps >= 3 ? 3.0 : state_.stage_steps == 2 ? 2.0 : 1.0;
+    const double a2 = state_.stage_steps >= 3   ? -3.0
+                      : state_.stage_steps == 2 ? -1.0
+                                                : 0.0,
+                 a3 = state_.stage_steps >= 3 ? 1.0 : 0.0;
+    for (std::size_t k = 0; k < count; ++k)
+        rows_.link[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
     if (solver_ == ParticleSolver::path) {
         predict_paths(part);
     } else {
-        for (std::size_t k = 0; k < rows; ++k)
-            link_[k].u = row_[k].rest_inverse * (x_[row_[k].b] - x_[row_[k].a]);
-        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += part * kick_[node];
-        push(v_);
+        for (std::size_t k = 0; k < count; ++k)
+            rows_.link[k].u =
+                rows_.row[k].rest_inverse * (nodes_.x[rows_.row[k].b] - nodes_.x[rows_.row[k].a]);
+        for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
+        rows_.push(nodes_, nodes_.v);
     }
     if (clock_) clock_->mark(Stage::assemble_rows);
     double before = std::numeric_limits<double>::infinity();
@@ -134,7 +152,7 @@ bool ParticleSystem::constrained_stage(double tau, double* history) {
         const double off =
             solver_ == ParticleSolver::path ? lengthen_paths(tau, fresh) : lengthen_blocks(tau, fresh);
         const double ratio = off / before;
-        ++newton_iterations_;
+        ++state_.newton_iterations;
         if (off <= SETTLED || (off < 1e-12 && ratio > 0.5)) break;  // settled, or down in the rounding
         if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
         fresh = iteration > 0 && ratio > SLOW;
@@ -146,37 +164,28 @@ bool ParticleSystem::constrained_stage(double tau, double* history) {
     }
     if (clock_) clock_->mark(solver_ == ParticleSolver::path ? Stage::solve_path : Stage::solve_block);
     const double per_span = 1.0 / span;
-    for (std::size_t k = 0; k < rows; ++k) {
+    for (std::size_t k = 0; k < count; ++k) {
         three[k] = two[k];
         two[k] = one[k];
-        one[k] = link_[k].lambda * per_span;
+        one[k] = rows_.link[k].lambda * per_span;
     }
-    for (std::size_t node = 0; node < x_.size(); ++node) x_[node] += tau * v_[node];
-    pending_ = 0.5 * tau;
+    for (std::size_t node = 0; node < nodes_.x.size(); ++node) nodes_.x[node] += tau * nodes_.v[node];
+    state_.pending = 0.5 * tau;
     if (clock_) clock_->mark(Stage::integrate_positions);
     return true;
 }
 
-/// v += M⁻¹ Gᵀ λ with the directions d/L.
-void ParticleSystem::push(std::vector<Vec3>& v) const noexcept {
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Vec3 impulse = link_[k].lambda * link_[k].u;
-        v[row_[k].a] -= w_[row_[k].a] * impulse;
-        v[row_[k].b] += w_[row_[k].b] * impulse;
-    }
-}
-
 /// Residual of every row and the way down: L U of the Jacobian if `fresh`, else forward substitution only.
 /// Returns the largest |d₊²/L² − 1|. rhs: y; lambda keeps the impulse so far.
-double ParticleSystem::lengthen_paths(double tau, bool fresh) noexcept {
+double ParticleComposition::lengthen_paths(double tau, bool fresh) noexcept {
     double worst = 0.0;
-    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
-        const int first = path_first_[path], end = path_first_[path + 1];
+    for (std::size_t path = 0; path + 1 < paths_.first().size(); ++path) {
+        const int first = paths_.first()[path], end = paths_.first()[path + 1];
         double y = 0.0, inverse = 0.0, upper = 0.0;
         for (int k = first; k < end; ++k) {
-            const Row& row = row_[k];
-            Link& link = link_[k];
-            const Vec3 ahead = row.rest * link.u + tau * (v_[row.b] - v_[row.a]);
+            const Row& row = rows_.row[k];
+            Link& link = rows_.link[k];
+            const Vec3 ahead = row.rest * link.u + tau * (nodes_.v[row.b] - nodes_.v[row.a]);
             const double residual = dot(ahead, ahead) - row.rest * row.rest;
             worst = std::max(worst, std::fabs(residual) * row.rest_inverse_square);
             if (residual != residual) return residual;
@@ -185,12 +194,12 @@ double ParticleSystem::lengthen_paths(double tau, bool fresh) noexcept {
                 const double along = dot(ahead, link.u);
                 if (along < LEAST_ALONG * row.rest) return std::numeric_limits<double>::infinity();
                 const double diagonal = row.stiff * tau * along;
-                const double left = k > first ? -w_[row.a] * dot(scaled, link_[k - 1].u) : 0.0;
+                const double left = k > first ? -nodes_.w[row.a] * dot(scaled, rows_.link[k - 1].u) : 0.0;
                 link.lower = left * inverse;
                 inverse = 1.0 / (diagonal - link.lower * upper);
-                upper = k + 1 < end ? -w_[row.b] * dot(scaled, link_[k + 1].u) : 0.0;
+                upper = k + 1 < end ? -nodes_.w[row.b] * dot(scaled, rows_.link[k + 1].u) : 0.0;
                 link.pivot_inverse = inverse;
-                link.length = upper;
+                upper_[k] = upper;
             }
             link.rhs = y = -0.5 * residual - link.lower * y;
         }
@@ -199,113 +208,105 @@ double ParticleSystem::lengthen_paths(double tau, bool fresh) noexcept {
 }
 
 /// The way up: the changes of the impulses, into λ and the velocities.
-void ParticleSystem::shorten_paths() noexcept {
-    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
+void ParticleComposition::shorten_paths() noexcept {
+    for (std::size_t path = 0; path + 1 < paths_.first().size(); ++path) {
         double change = 0.0;
         Vec3 out;
-        const int first = path_first_[path], end = path_first_[path + 1];
+        const int first = paths_.first()[path], end = paths_.first()[path + 1];
         for (int k = end - 1; k >= first; --k) {
-            Link& link = link_[k];
-            change = (link.rhs - link.length * change) * link.pivot_inverse;
+            Link& link = rows_.link[k];
+            change = (link.rhs - upper_[k] * change) * link.pivot_inverse;
             link.lambda += change;
             const Vec3 in = change * link.u;
-            v_[row_[k].b] += w_[row_[k].b] * (in - out);
+            nodes_.v[rows_.row[k].b] += nodes_.w[rows_.row[k].b] * (in - out);
             out = in;
         }
-        v_[row_[first].a] -= w_[row_[first].a] * out;
+        nodes_.v[rows_.row[first].a] -= nodes_.w[rows_.row[first].a] * out;
     }
 }
 
 /// Kicks and predicted impulses, node by node.
-void ParticleSystem::predict_paths(double part) noexcept {
+void ParticleComposition::predict_paths(double part) noexcept {
     int node = 0;
-    for (std::size_t path = 0; path + 1 < path_first_.size(); ++path) {
-        Vec3 in, here = x_[node];
-        for (int k = path_first_[path]; k < path_first_[path + 1]; ++k, ++node) {
-            Link& link = link_[k];
-            const Vec3 next = x_[node + 1];
-            link.u = row_[k].rest_inverse * (next - here);
+    for (std::size_t path = 0; path + 1 < paths_.first().size(); ++path) {
+        Vec3 in, here = nodes_.x[node];
+        for (int k = paths_.first()[path]; k < paths_.first()[path + 1]; ++k, ++node) {
+            Link& link = rows_.link[k];
+            const Vec3 next = nodes_.x[node + 1];
+            link.u = rows_.row[k].rest_inverse * (next - here);
             const Vec3 out = link.lambda * link.u;
-            v_[node] += part * kick_[node] + w_[node] * (in - out);
+            nodes_.v[node] += part * nodes_.kick[node] + nodes_.w[node] * (in - out);
             in = out;
             here = next;
         }
-        v_[node] += part * kick_[node] + w_[node] * in;
+        nodes_.v[node] += part * nodes_.kick[node] + nodes_.w[node] * in;
         ++node;
     }
-    for (; node < static_cast<int>(v_.size()); ++node) v_[node] += part * kick_[node];
+    for (; node < static_cast<int>(nodes_.v.size()); ++node) nodes_.v[node] += part * nodes_.kick[node];
 }
 
 /// The same for rows that branch or close loops: the symmetric matrix at the start of the stage, so the iteration
 /// converges by a factor of about the angle turned in a stage.
-double ParticleSystem::lengthen_blocks(double tau, bool fresh) {
+double ParticleComposition::lengthen_blocks(double tau, bool fresh) {
     double worst = 0.0;
     if (fresh) {
-        factor_rigid_blocks();
-        std::fill(saddle_rhs_.begin(), saddle_rhs_.end(), 0.0);
+        saddle_.factor_rigidly(nodes_, rows_);
     }
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        const Vec3 ahead = row.rest * link_[k].u + tau * (v_[row.b] - v_[row.a]);
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) {
+        const Row& row = rows_.row[k];
+        const Vec3 ahead = row.rest * rows_.link[k].u + tau * (nodes_.v[row.b] - nodes_.v[row.a]);
         const double residual = dot(ahead, ahead) - row.rest * row.rest;
         if (residual != residual) return residual;
         worst = std::max(worst, std::fabs(residual) * row.rest_inverse_square);
-        link_[k].rhs = -0.5 * residual / (tau * row.rest);
+        rows_.link[k].rhs = -0.5 * residual / (tau * row.rest);
     }
     return worst;
 }
 
-void ParticleSystem::shorten_blocks() {
-    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].length = link_[k].lambda;
-    substitute_blocks();
-    push(v_);
-    for (std::size_t k = 0; k < row_.size(); ++k) link_[k].lambda += link_[k].length;
-}
-
-/// The matrix with Sig = 0 at the directions link_.u.
-void ParticleSystem::factor_rigid_blocks() {
-    factor_blocks();
-    for (std::size_t k = 0; k < row_.size(); ++k) *ldlt_.diagonal(row_blocks_[k].row) = -0.0;
-    factor_saddle();
+void ParticleComposition::shorten_blocks() {
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) impulse_[k] = rows_.link[k].lambda;
+    saddle_.substitute(nodes_, rows_);
+    rows_.push(nodes_, nodes_.v);
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) rows_.link[k].lambda += impulse_[k];
 }
 
 /// λ such that G M⁻¹ Gᵀ λ = rhs, rigidly.
-void ParticleSystem::solve_rigidly() {
+void ParticleComposition::solve_rigidly() {
     if (solver_ == ParticleSolver::block) {
-        factor_rigid_blocks();
-        std::fill(saddle_rhs_.begin(), saddle_rhs_.end(), 0.0);
-        return substitute_blocks();
+        saddle_.factor_rigidly(nodes_, rows_);
+        return saddle_.substitute(nodes_, rows_);
     }
-    factor_paths(true);
-    substitute_paths();
+    paths_.factor(nodes_, rows_, true);
+    paths_.substitute(rows_);
 }
 
 /// What is seen at the end of a step, without changing what goes on: velocities kicked and projected to the sample,
 /// forces from the accelerations there.
-void ParticleSystem::read_composition() {
+void ParticleComposition::read(Seen& seen) {
     if (solver_ == ParticleSolver::none) {
-        seen_v_ = v_;
+        seen.v = nodes_.v;
         return;
     }
     find_kicks();
-    const double part = pending_ / h_;
-    seen_v_ = v_;
-    for (std::size_t node = 0; node < x_.size(); ++node) seen_v_[node] += part * kick_[node];
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        link_[k].u = (1.0 / row.rest) * (x_[row.b] - x_[row.a]);
-        link_[k].rhs = -dot(link_[k].u, seen_v_[row.b] - seen_v_[row.a]);
+    const double part = state_.pending / h_;
+    seen.v = nodes_.v;
+    for (std::size_t node = 0; node < nodes_.x.size(); ++node) seen.v[node] += part * nodes_.kick[node];
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) {
+        const Row& row = rows_.row[k];
+        rows_.link[k].u = (1.0 / row.rest) * (nodes_.x[row.b] - nodes_.x[row.a]);
+        rows_.link[k].rhs = -dot(rows_.link[k].u, seen.v[row.b] - seen.v[row.a]);
     }
     solve_rigidly();
-    push(seen_v_);
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        const Vec3 dv = seen_v_[row.b] - seen_v_[row.a];
-        link_[k].rhs = -dot(link_[k].u, kick_[row.b] - kick_[row.a]) - h_ * dot(dv, dv) / row.rest;
+    rows_.push(nodes_, seen.v);
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) {
+        const Row& row = rows_.row[k];
+        const Vec3 dv = seen.v[row.b] - seen.v[row.a];
+        rows_.link[k].rhs =
+            -dot(rows_.link[k].u, nodes_.kick[row.b] - nodes_.kick[row.a]) - h_ * dot(dv, dv) / row.rest;
     }
-    if (solver_ == ParticleSolver::block) substitute_blocks();
-    else substitute_paths();
-    for (std::size_t k = 0; k < row_.size(); ++k) seen_lambda_[k] = link_[k].lambda;
+    if (solver_ == ParticleSolver::block) saddle_.substitute(nodes_, rows_);
+    else paths_.substitute(rows_);
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) seen.lambda[k] = rows_.link[k].lambda;
 }
 
 }  // namespace spook

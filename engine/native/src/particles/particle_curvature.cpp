@@ -9,11 +9,12 @@ namespace spook {
 /// came, is known before the first solve; c₊ is where that solve, then the corrected one, would take it. Each is
 /// capped at a fraction of the rest length.
 void ParticleSystem::bend_rows_back() noexcept {
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        Link& link = link_[k];
+    for (std::size_t k = 0; k < rows_.row.size(); ++k) {
+        const Row& row = rows_.row[k];
+        Link& link = rows_.link[k];
         const double cap = scene_.method.correction_cap * row.rest;
-        const double back = std::min(cap, curvature(link.u, link.length, -h_ * (v_[row.b] - v_[row.a])));
+        const double back =
+            std::min(cap, curvature(link.u, link.length, -parts_.h * (nodes_.v[row.b] - nodes_.v[row.a])));
         link.rhs -= row.violation_gain * 0.25 * back;
         first_rhs_[k] = link.rhs;
     }
@@ -21,14 +22,14 @@ void ParticleSystem::bend_rows_back() noexcept {
 
 void ParticleSystem::correct_curvature() {
     for (int round = 0; round < corrections_; ++round) {
-        trial_ = v_;
+        trial_ = nodes_.v;
         kick_nodes(trial_);
-        for (std::size_t k = 0; k < row_.size(); ++k) {
-            const Row& row = row_[k];
-            Link& link = link_[k];
+        for (std::size_t k = 0; k < rows_.row.size(); ++k) {
+            const Row& row = rows_.row[k];
+            Link& link = rows_.link[k];
             const double cap = scene_.method.correction_cap * row.rest;
             const double ahead =
-                std::min(cap, curvature(link.u, link.length, h_ * (trial_[row.b] - trial_[row.a])));
+                std::min(cap, curvature(link.u, link.length, parts_.h * (trial_[row.b] - trial_[row.a])));
             link.rhs = first_rhs_[k] - row.violation_gain * (0.25 + row.relaxation) * ahead;
         }
         solve_rows_again();
@@ -38,47 +39,44 @@ void ParticleSystem::correct_curvature() {
 /// The tensions at the start, which the stiffness of strings in the first step is made of. The first round knows
 /// none and moves light bodies under a heavy load far too fast; its tensions are right all the same.
 void ParticleSystem::find_tensions() {
-    kick_ = steady_kick_;
-    if (!fields_.empty()) apply_central_gravity();
-    if (!springs_.empty()) apply_springs();
+    parts_.forces.find_kicks(nodes_, parts_.h);
     for (int round = 0; round < 3; ++round) {
-        assemble_rows();
+        rows_.assemble(nodes_);
         if (corrections_ > 0) bend_rows_back();
         solve_rows();
     }
-    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
+    parts_.saddle.count_from_here();
 }
 
 /// v −= (h/2) a with the constrained acceleration. The row's right side gets −(2/h) c₋, c₋ the curvature on the
 /// way back; with v constant that is −h Ġ v, found first, and with curved constraints it is iterated.
 void ParticleSystem::half_kick_back() {
-    kick_ = steady_kick_;
-    if (!fields_.empty()) apply_central_gravity();
-    if (!springs_.empty()) apply_springs();
-    const std::vector<Vec3> start = v_;
-    if (solver_ != ParticleSolver::none) {
-        assemble_rows();
-        for (std::size_t k = 0; k < row_.size(); ++k) first_rhs_[k] = link_[k].rhs;
+    parts_.forces.find_kicks(nodes_, parts_.h);
+    const std::vector<Vec3> start = nodes_.v;
+    if (parts_.solver != ParticleSolver::none) {
+        rows_.assemble(nodes_);
+        for (std::size_t k = 0; k < rows_.row.size(); ++k) first_rhs_[k] = rows_.link[k].rhs;
         for (int round = 0; round <= 3 * corrections_; ++round) {
-            for (std::size_t k = 0; k < row_.size(); ++k) {
-                const Row& row = row_[k];
-                const double back = curvature(link_[k].u, link_[k].length, -h_ * (v_[row.b] - v_[row.a]));
-                link_[k].rhs = first_rhs_[k] - (2.0 / h_) * back;
+            for (std::size_t k = 0; k < rows_.row.size(); ++k) {
+                const Row& row = rows_.row[k];
+                const double back = curvature(rows_.link[k].u, rows_.link[k].length,
+                                              -parts_.h * (nodes_.v[row.b] - nodes_.v[row.a]));
+                rows_.link[k].rhs = first_rhs_[k] - (2.0 / parts_.h) * back;
             }
             if (round == 0) solve_rows();
             else solve_rows_again();
-            v_ = start;
-            kick_nodes(v_);
-            for (std::size_t node = 0; node < v_.size(); ++node)
-                v_[node] = start[node] - 0.5 * (v_[node] - start[node]);
+            nodes_.v = start;
+            kick_nodes(nodes_.v);
+            for (std::size_t node = 0; node < nodes_.v.size(); ++node)
+                nodes_.v[node] = start[node] - 0.5 * (nodes_.v[node] - start[node]);
         }
     } else {
-        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] -= 0.5 * kick_[node];
+        for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] -= 0.5 * nodes_.kick[node];
     }
     if (!stiff_strings_)
-        for (Link& link : link_) link.lambda = 0.0;
-    sweeps_ = 0;
-    operations_at_start_ = static_cast<std::int64_t>(ldlt_.counters().block_operations);
+        for (Link& link : rows_.link) link.lambda = 0.0;
+    parts_.sweeps.work = {};
+    parts_.saddle.count_from_here();
 }
 
 }  // namespace spook

@@ -1,5 +1,5 @@
 // The hot loops: what advance() does when a scene needs no more. Operation for operation the arithmetic of the
-// stages in particle_system.cpp and particle_paths.cpp, so a timed or observed run gives the same bits.
+// stages in particle_system.cpp and open_paths.cpp, so a timed or observed run gives the same bits.
 #include "particles/particle_system.hpp"
 
 #include <algorithm>
@@ -10,55 +10,56 @@ namespace spook {
 /// Bodies that nothing couples, under steady forces and at most one centre: each body flies its whole block of
 /// steps with its state in registers.
 void ParticleSystem::fly(std::int64_t steps) noexcept {
-    const double h = h_;
-    if (fields_.empty()) {
-        for (std::size_t node = 0; node < x_.size(); ++node) {
-            Vec3 x = x_[node], v = v_[node];
-            const Vec3 kick = steady_kick_[node];
+    const double h = parts_.h;
+    if (parts_.forces.fields().empty()) {
+        for (std::size_t node = 0; node < nodes_.x.size(); ++node) {
+            Vec3 x = nodes_.x[node], v = nodes_.v[node];
+            const Vec3 kick = nodes_.steady_kick[node];
             for (std::int64_t step = 0; step < steps; ++step) {
                 v += kick;
                 x += h * v;
             }
-            x_[node] = x;
-            v_[node] = v;
+            nodes_.x[node] = x;
+            nodes_.v[node] = v;
         }
         return;
     }
-    const Vec3 centre = fields_[0].centre;
-    const double pull = h * fields_[0].strength;
-    for (std::size_t node = 0; node < x_.size(); ++node) {
-        Vec3 x = x_[node], v = v_[node];
-        const Vec3 kick = steady_kick_[node];
+    const Vec3 centre = parts_.forces.fields()[0].centre;
+    const double pull = h * parts_.forces.fields()[0].strength;
+    for (std::size_t node = 0; node < nodes_.x.size(); ++node) {
+        Vec3 x = nodes_.x[node], v = nodes_.v[node];
+        const Vec3 kick = nodes_.steady_kick[node];
         for (std::int64_t step = 0; step < steps; ++step) {
             const Vec3 d = x - centre;
             const double r2 = dot(d, d), r = std::sqrt(r2);
             v += kick - (pull / (r2 * r)) * d;
             x += h * v;
         }
-        x_[node] = x;
-        v_[node] = v;
+        nodes_.x[node] = x;
+        nodes_.v[node] = v;
     }
 }
 
 /// Open paths under steady forces: geometry and elimination in one pass down, impulses and motion in one up.
 /// Each correction of the curvature adds a pass down, with the same factor, and one up.
 template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcept {
-    const double h = h_, fraction = scene_.method.correction_cap;
+    const double h = parts_.h, fraction = scene_.method.correction_cap;
     const int corrections = Curved ? corrections_ : 0;
-    Vec3* const x = x_.data();
-    Vec3* const v = v_.data();
+    Vec3* const x = nodes_.x.data();
+    Vec3* const v = nodes_.v.data();
     Vec3* const trial = trial_.data();
-    const Vec3* const kick = steady_kick_.data();
-    const double* const w = w_.data();
-    Link* const link = link_.data();
-    const Row* const row = row_.data();
+    const Vec3* const kick = nodes_.steady_kick.data();
+    const double* const w = nodes_.w.data();
+    Link* const link = rows_.link.data();
+    const Row* const row = rows_.row.data();
     double* const first_rhs = first_rhs_.data();
-    const std::size_t paths = path_first_.size() - 1;
-    const int nodes = static_cast<int>(x_.size()), on_paths = static_cast<int>(row_.size() + paths);
+    const std::size_t paths = parts_.paths.first().size() - 1;
+    const int nodes = static_cast<int>(nodes_.x.size()),
+              on_paths = static_cast<int>(rows_.row.size() + paths);
     for (std::int64_t step = 0; step < steps; ++step) {
         int node = 0;
         for (std::size_t path = 0; path < paths; ++path) {
-            const int first = path_first_[path], end = path_first_[path + 1], top = node;
+            const int first = parts_.paths.first()[path], end = parts_.paths.first()[path + 1], top = node;
             Vec3 xa = x[node], va = v[node], ka = kick[node], u_above;
             double inverse = 0.0, y = 0.0;
             for (int k = first; k < end; ++k, ++node) {

@@ -4,35 +4,35 @@
 #include <algorithm>
 #include <cmath>
 
-#include "run/composition.hpp"
-
 namespace spook {
 
 void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->start();
-    for (std::size_t k = 0; k < link_.size(); ++k) seen_lambda_[k] = sample > 0 ? link_[k].lambda : 0.0;
-    seen_v_ = v_;
-    if (composed_) {
-        if (sample > 0) read_composition();
+    for (std::size_t k = 0; k < rows_.link.size(); ++k)
+        seen_.lambda[k] = sample > 0 ? rows_.link[k].lambda : 0.0;
+    seen_.v = nodes_.v;
+    if (composition_) {
+        if (sample > 0) composition_->read(seen_);
     } else if (half_step_) {
         velocity_stage<false>();
         velocity_ready_ = true;
-        for (std::size_t node = 0; node < v_.size(); ++node) seen_v_[node] = 0.5 * (seen_v_[node] + v_[node]);
+        for (std::size_t node = 0; node < nodes_.v.size(); ++node)
+            seen_.v[node] = 0.5 * (seen_.v[node] + nodes_.v[node]);
         if (sample == 0)
             for (int body = 0; body < bodies(); ++body)
-                seen_v_[node_of_body_[body]] = scene_.bodies[body].velocity;
+                seen_.v[nodes_.of_body[body]] = scene_.bodies[body].velocity;
     }
     recorder.sample(sample);
     if (clock_) clock_->mark(Stage::observe);
 }
 
 Health ParticleSystem::health() const noexcept {
-    if (contradicted_ >= 0)
-        return {Status::diverged, contradicted_,
+    if (parts_.saddle.contradicted() >= 0)
+        return {Status::diverged, parts_.saddle.contradicted(),
                 "is held by rows that contradict each other; give one of them a compliance"};
     Health health;
     for (int body = 0; body < bodies(); ++body) {
-        const Vec3 x = x_[node_of_body_[body]], v = v_[node_of_body_[body]];
+        const Vec3 x = nodes_.x[nodes_.of_body[body]], v = nodes_.v[nodes_.of_body[body]];
         if (!finite(x) || !finite(v)) return {Status::not_finite, body};
         const double largest = std::max(
             {std::fabs(x.x), std::fabs(x.y), std::fabs(x.z), std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
@@ -42,96 +42,83 @@ Health ParticleSystem::health() const noexcept {
 }
 
 void ParticleSystem::save() {
-    saved_.x = x_;
-    saved_.v = v_;
-    saved_.lambda.resize(link_.size());
-    for (std::size_t k = 0; k < link_.size(); ++k) saved_.lambda[k] = link_[k].lambda;
+    saved_.x = nodes_.x;
+    saved_.v = nodes_.v;
+    saved_.lambda.resize(rows_.size());
+    for (std::size_t k = 0; k < rows_.size(); ++k) saved_.lambda[k] = rows_.link[k].lambda;
     saved_.velocity_ready = velocity_ready_;
-    saved_.sweeps = sweeps_;
-    saved_.pending = pending_;
-    saved_.stage_steps = stage_steps_;
-    saved_.newton_iterations = newton_iterations_;
-    saved_.halved_steps = halved_steps_;
-    saved_.history = history_;
-    saved_.residual = residual_;
-    saved_.share = share_;
+    saved_.sweeps = parts_.sweeps.work;
+    saved_.share = parts_.saddle.share();
+    if (composition_) composition_->save();
 }
 
 void ParticleSystem::restore() {
-    x_ = saved_.x;
-    v_ = saved_.v;
-    for (std::size_t k = 0; k < link_.size(); ++k) link_[k].lambda = saved_.lambda[k];
+    nodes_.x = saved_.x;
+    nodes_.v = saved_.v;
+    for (std::size_t k = 0; k < rows_.size(); ++k) rows_.link[k].lambda = saved_.lambda[k];
     velocity_ready_ = saved_.velocity_ready;
-    sweeps_ = saved_.sweeps;
-    pending_ = saved_.pending;
-    stage_steps_ = saved_.stage_steps;
-    newton_iterations_ = saved_.newton_iterations;
-    halved_steps_ = saved_.halved_steps;
-    lost_ = false;
-    history_ = saved_.history;
-    residual_ = saved_.residual;
-    contradicted_ = -1;
-    share_ = saved_.share;
-    ldlt_.shift_constraints(std::max(0.0, share_));
+    parts_.sweeps.work = saved_.sweeps;
+    parts_.saddle.restore(saved_.share);
+    if (composition_) composition_->restore();
 }
 
 void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
     const std::int64_t inner = steps * scene_.method.substeps;
-    const auto rows = static_cast<std::int64_t>(row_.size());
+    const auto rows = static_cast<std::int64_t>(rows_.row.size());
     const std::int64_t passes = 1 + corrections_;
     report.counters["steps"] = steps;
     report.counters["substeps"] = inner;
     report.counters["force_evaluations"] =
-        inner * static_cast<std::int64_t>(springs_.size() + fields_.size() * scene_.bodies.size());
+        inner * static_cast<std::int64_t>(parts_.forces.springs() +
+                                          parts_.forces.fields().size() * scene_.bodies.size());
     report.counters["rows_assembled"] = inner * rows;
     report.counters["contacts"] = 0;
-    report.counters["sweeps"] = sweeps_;
+    report.counters["sweeps"] = parts_.sweeps.work.sweeps;
     report.counters["back_substitutions"] =
-        solver_ == ParticleSolver::path || solver_ == ParticleSolver::block ? inner * passes : 0;
+        parts_.solver == ParticleSolver::path || parts_.solver == ParticleSolver::block ? inner * passes : 0;
     std::int64_t blocks = 0;
-    if (solver_ == ParticleSolver::path)
-        blocks = 2 * rows - static_cast<std::int64_t>(path_first_.size()) + 1;
+    if (parts_.solver == ParticleSolver::path)
+        blocks = 2 * rows - static_cast<std::int64_t>(parts_.paths.first().size()) + 1;
     report.counters["block_operations"] = inner * blocks;
-    if (solver_ == ParticleSolver::block)
-        report.counters["block_operations"] =
-            static_cast<std::int64_t>(ldlt_.counters().block_operations) - operations_at_start_;
-    if (composed_) {
-        const auto stages = static_cast<std::int64_t>(composition_stages(scene_.method.composition).size());
+    if (parts_.solver == ParticleSolver::block)
+        report.counters["block_operations"] = parts_.saddle.operations();
+    if (composition_) {
+        const std::int64_t stages = composition_->stages();
         report.counters["composition_stages"] = inner * stages;
-        report.counters["halved_steps"] = halved_steps_;
-        report.counters["newton_iterations"] = newton_iterations_;
+        report.counters["halved_steps"] = composition_->halved_steps();
+        report.counters["newton_iterations"] = composition_->newton_iterations();
         report.counters["force_evaluations"] *= stages;
         report.counters["rows_assembled"] *= stages;
-        report.counters["back_substitutions"] = rows > 0 ? newton_iterations_ : 0;
-        report.counters["block_operations"] = newton_iterations_ * blocks;
+        report.counters["back_substitutions"] = rows > 0 ? composition_->newton_iterations() : 0;
+        report.counters["block_operations"] = composition_->newton_iterations() * blocks;
     }
-    report.residual = residual_;
+    report.residual = parts_.sweeps.work.residual;
 }
 
 std::vector<double> ParticleSystem::final_state() {
     std::vector<double> state;
-    std::vector<Vec3> reported = v_;
-    if (composed_) {
-        read_composition();
-        reported = seen_v_;
+    std::vector<Vec3> reported = nodes_.v;
+    if (composition_) {
+        composition_->read(seen_);
+        reported = seen_.v;
     } else if (half_step_) {
-        if (velocity_ready_) reported = seen_v_;
+        if (velocity_ready_) reported = seen_.v;
         else {
             velocity_stage<false>();
-            for (std::size_t node = 0; node < v_.size(); ++node)
-                reported[node] = 0.5 * (reported[node] + v_[node]);
+            for (std::size_t node = 0; node < nodes_.v.size(); ++node)
+                reported[node] = 0.5 * (reported[node] + nodes_.v[node]);
         }
     }
     for (int body = 0; body < bodies(); ++body) {
-        const Vec3 x = position(body), v = reported[node_of_body_[body]];
+        const Vec3 x = position(body), v = reported[nodes_.of_body[body]];
         state.insert(state.end(), {x.x, x.y, x.z, 1.0, 0.0, 0.0, 0.0, v.x, v.y, v.z, 0.0, 0.0, 0.0});
     }
     return state;
 }
 
 double ParticleSystem::violation(int row) const noexcept {
-    const Row& r = row_[slot_of_row_[row]];
-    return norm(x_[r.b] - x_[r.a]) - r.rest;
+    const Row& r = rows_.row[rows_.slot[row]];
+    return norm(nodes_.x[r.b] - nodes_.x[r.a]) - r.rest;
 }
 
 double ParticleSystem::kinetic_energy() const noexcept {
@@ -145,15 +132,10 @@ double ParticleSystem::potential_energy() const noexcept {
     double energy = 0.0;
     for (int body = 0; body < bodies(); ++body) {
         energy -= mass(body) * dot(scene_.gravity, position(body));
-        for (const CentralField& field : fields_)
+        for (const CentralField& field : parts_.forces.fields())
             energy -= mass(body) * field.strength / norm(position(body) - field.centre);
     }
-    for (const SpringNodes& s : springs_) {
-        const Vec3 d = x_[s.b] - x_[s.a];
-        const double stretch = s.spring.rest_length > 0.0 ? norm(d) - s.spring.rest_length : norm(d);
-        energy += 0.5 * s.spring.stiffness * stretch * stretch;
-    }
-    return energy;
+    return parts_.forces.spring_energy(nodes_, energy);
 }
 
 }  // namespace spook

@@ -3,15 +3,9 @@
 
 #include <vector>
 
-#include "linear/vec.hpp"
+#include "run/forces.hpp"
 
 namespace spook {
-
-/// One end of a spring or distance: a body by index, or (body < 0) a point of the world.
-struct End {
-    int body = -1;
-    Vec3 point;  // m
-};
 
 struct ParticleBody {
     double mass = 1.0;  // kg
@@ -25,16 +19,6 @@ struct DistanceRow {
     double rest_length = 1.0;  // m
     double compliance = 0.0;   // m/N
     double damping = 0.0;      // s
-};
-
-struct SpringForce {
-    End ends[2];
-    double stiffness = 0.0, rest_length = 0.0, viscosity = 0.0;  // N/m, m, N s/m
-};
-
-struct CentralField {
-    double strength = 0.0;  // m³/s²
-    Vec3 centre;            // m
 };
 
 enum class ParticleSolver { none, path, block, iterative };

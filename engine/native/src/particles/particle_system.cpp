@@ -8,15 +8,17 @@ namespace spook {
 
 void ParticleSystem::advance(std::int64_t steps) {
     steps *= scene_.method.substeps;
-    if (composed_) return compose(steps);
+    if (composition_) return composition_->advance(steps);
     if (clock_) return advance_by<true>(steps);
     if (velocity_ready_ && steps > 0) {
         position_stage();
         velocity_ready_ = false;
         --steps;
     }
-    if (solver_ == ParticleSolver::none && springs_.empty() && fields_.size() <= 1) fly(steps);
-    else if (solver_ == ParticleSolver::path && !moving_forces_) swing(steps);
+    if (parts_.solver == ParticleSolver::none && parts_.forces.springs() == 0 &&
+        parts_.forces.fields().size() <= 1)
+        fly(steps);
+    else if (parts_.solver == ParticleSolver::path && !parts_.forces.any()) swing(steps);
     else advance_by<false>(steps);
 }
 
@@ -31,142 +33,67 @@ template <bool Timed> void ParticleSystem::advance_by(std::int64_t steps) {
 }
 
 template <bool Timed> void ParticleSystem::velocity_stage() {
-    if (moving_forces_) {
-        kick_ = steady_kick_;
+    if (parts_.forces.any()) {
+        nodes_.kick = nodes_.steady_kick;
         mark<Timed>(Stage::apply_gravity);
-        if (!fields_.empty()) {
-            apply_central_gravity();
+        if (!parts_.forces.fields().empty()) {
+            parts_.forces.add_attraction(nodes_, parts_.h);
             mark<Timed>(Stage::apply_central_gravity);
         }
-        if (!springs_.empty()) {
-            apply_springs();
+        if (!parts_.forces.springs() == 0) {
+            parts_.forces.add_springs(nodes_, parts_.h);
             mark<Timed>(Stage::apply_springs);
         }
     }
-    if (solver_ == ParticleSolver::none) {
-        for (std::size_t node = 0; node < v_.size(); ++node) v_[node] += kick_[node];
+    if (parts_.solver == ParticleSolver::none) {
+        for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += nodes_.kick[node];
         mark<Timed>(Stage::apply_gravity);
         return;
     }
-    assemble_rows();
+    rows_.assemble(nodes_);
     if (corrections_ > 0) bend_rows_back();
     mark<Timed>(Stage::assemble_rows);
     solve_rows();
-    mark<Timed>(solver_ == ParticleSolver::path    ? Stage::solve_path
-                : solver_ == ParticleSolver::block ? Stage::solve_block
-                                                   : Stage::solve_iterative);
+    mark<Timed>(parts_.solver == ParticleSolver::path    ? Stage::solve_path
+                : parts_.solver == ParticleSolver::block ? Stage::solve_block
+                                                         : Stage::solve_iterative);
     if (corrections_ > 0) {
         correct_curvature();
         mark<Timed>(Stage::correct_curvature);
     }
-    kick_nodes(v_);
+    kick_nodes(nodes_.v);
     mark<Timed>(Stage::apply_gravity);
 }
 
 void ParticleSystem::position_stage() noexcept {
-    for (std::size_t node = 0; node < x_.size(); ++node) x_[node] += h_ * v_[node];
-}
-
-void ParticleSystem::apply_central_gravity() noexcept {
-    for (const CentralField& field : fields_)
-        for (std::size_t node = 0; node < x_.size(); ++node) {
-            if (w_[node] == 0.0) continue;
-            const Vec3 d = x_[node] - field.centre;
-            const double r2 = dot(d, d), r = std::sqrt(r2);
-            kick_[node] = kick_[node] - (h_ * field.strength / (r2 * r)) * d;
-        }
-}
-
-void ParticleSystem::apply_springs() noexcept {
-    for (const SpringNodes& s : springs_) {
-        const Vec3 d = x_[s.b] - x_[s.a];
-        Vec3 pull = s.spring.stiffness * d;  // on a, towards b
-        if (s.spring.rest_length > 0.0 || s.spring.viscosity > 0.0) {
-            const double length = norm(d);
-            const Vec3 u = length > 0.0 ? (1.0 / length) * d : Vec3{};
-            const double rate = s.spring.viscosity * dot(u, v_[s.b] - v_[s.a]);
-            pull += (rate - s.spring.stiffness * s.spring.rest_length) * u;
-        }
-        kick_[s.a] += (h_ * w_[s.a]) * pull;
-        kick_[s.b] -= (h_ * w_[s.b]) * pull;
-    }
-}
-
-void ParticleSystem::assemble_rows() noexcept {
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        Link& link = link_[k];
-        const Vec3 d = x_[row.b] - x_[row.a];
-        const double length = norm(d);
-        const Vec3 u = (1.0 / length) * d;
-        link.u = u;
-        link.length = length;
-        link.g = length - row.rest;
-        link.rhs = -row.violation_gain * link.g - row.velocity_gain * dot(u, v_[row.b] - v_[row.a]) -
-                   dot(u, kick_[row.b] - kick_[row.a]);
-    }
+    for (std::size_t node = 0; node < nodes_.x.size(); ++node) nodes_.x[node] += parts_.h * nodes_.v[node];
 }
 
 void ParticleSystem::solve_rows() {
-    if (solver_ == ParticleSolver::iterative) return solve_iterative();
-    if (solver_ == ParticleSolver::path) {
-        factor_paths();
-        substitute_paths();
-    } else {
-        factor_blocks();
-        substitute_blocks();
+    switch (parts_.solver) {
+        case ParticleSolver::path: parts_.paths.factor(nodes_, rows_); break;
+        case ParticleSolver::block: parts_.saddle.factor(nodes_, rows_); break;
+        case ParticleSolver::iterative:
+        case ParticleSolver::none: break;
     }
+    solve_rows_again();
 }
 
 void ParticleSystem::solve_rows_again() {
-    if (solver_ == ParticleSolver::iterative) solve_iterative();
-    else if (solver_ == ParticleSolver::path) substitute_paths();
-    else substitute_blocks();
-}
-
-/// Projected Gauss–Seidel on the Schur form, warm started with the last step's impulses.
-void ParticleSystem::solve_iterative() noexcept {
-    std::fill(trial_.begin(), trial_.end(), Vec3{});  // M⁻¹ Gᵀ λ
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Vec3 impulse = link_[k].lambda * link_[k].u;
-        trial_[row_[k].a] -= w_[row_[k].a] * impulse;
-        trial_[row_[k].b] += w_[row_[k].b] * impulse;
-    }
-    for (int sweep = 0; sweep < scene_.method.iterations; ++sweep) {
-        double worst = 0.0;
-        ++sweeps_;
-        for (std::size_t k = 0; k < row_.size(); ++k) {
-            const Row& row = row_[k];
-            Link& link = link_[k];
-            const double residual =
-                link.rhs - dot(link.u, trial_[row.b] - trial_[row.a]) - row.softness * link.lambda;
-            worst = std::max(worst, std::fabs(residual));
-            const double change = residual / row.diagonal;
-            link.lambda += change;
-            trial_[row.a] -= (w_[row.a] * change) * link.u;
-            trial_[row.b] += (w_[row.b] * change) * link.u;
-        }
-        residual_ = worst;
-        if (worst <= scene_.method.residual_tolerance) break;
+    switch (parts_.solver) {
+        case ParticleSolver::path: parts_.paths.substitute(rows_); break;
+        case ParticleSolver::block: parts_.saddle.substitute(nodes_, rows_); break;
+        case ParticleSolver::iterative: parts_.sweeps.solve(nodes_, rows_); break;
+        case ParticleSolver::none: break;
     }
 }
 
 /// v += kick + M⁻¹ Gᵀ λ
 void ParticleSystem::kick_nodes(std::vector<Vec3>& v) const noexcept {
-    if (solver_ == ParticleSolver::path) return kick_paths(v);
-    for (std::size_t node = 0; node < v.size(); ++node) v[node] += kick_[node];
-    if (stiff_strings_ && solver_ == ParticleSolver::block) {
-        for (std::size_t node = 0; node < v.size(); ++node)
-            if (block_of_node_[node] >= 0)
-                v[node] += vec_at(saddle_.data() + ldlt_.offset(block_of_node_[node]));
-        return;
-    }
-    for (std::size_t k = 0; k < row_.size(); ++k) {
-        const Row& row = row_[k];
-        const Vec3 impulse = link_[k].lambda * link_[k].u;
-        v[row.a] -= w_[row.a] * impulse;
-        v[row.b] += w_[row.b] * impulse;
-    }
+    if (parts_.solver == ParticleSolver::path) return parts_.paths.kick(nodes_, rows_, v);
+    for (std::size_t node = 0; node < v.size(); ++node) v[node] += nodes_.kick[node];
+    if (stiff_strings_) parts_.saddle.add_moves(v);
+    else rows_.push(nodes_, v);
 }
 
 template void ParticleSystem::velocity_stage<false>();

@@ -188,7 +188,7 @@ void RigidSystem::read_composition() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     const auto blocks = joints_.blocks();
     const auto solve = [&] {  // multiplier_ from the rows' right sides
-        if (!(live_.share > 0.0 ? solve_shared() : solve_once())) live_.not_solved = tied_.front();
+        if (!factor_and_solve()) live_.not_solved = tied_.front();
         for (std::size_t row = 0; row < rows; ++row) multiplier_[row] = -solution_[row];
     };
     assemble_blocks();

@@ -53,7 +53,7 @@ void RigidSystem::start_half_step() {
             fill_block_momenta();
             find_bias(bias_.data());
             for (std::size_t row = 0; row < rows; ++row) right_[row] -= h_ * bias_[row];
-            if (!solve_once()) live_.not_solved = tied_.front();
+            if (!factor_and_solve()) live_.not_solved = tied_.front();
             const double* x = solution_.data() + rows;
             for (int i : tied_) {
                 const Vec3 v{x[0], x[1], x[2]};
@@ -159,8 +159,7 @@ void RigidSystem::correct_curvature() {
                 right_[row] = first_right_[row] -
                               gain.violation * (0.25 + gain.relaxation) * std::clamp(curved, -cap, cap);
             }
-        if (live_.share > 0.0) solve_shared();
-        else matrix_.solve_refined(right_.data(), solution_.data(), method_.refinements);
+        solve_again();
     }
 }
 

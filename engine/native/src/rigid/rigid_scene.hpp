@@ -8,6 +8,7 @@
 #include "collision/detection.hpp"
 #include "contacts/contact_stage.hpp"
 #include "linear/vec.hpp"
+#include "run/forces.hpp"
 #include "run/named_enum.hpp"
 
 namespace spook {
@@ -62,17 +63,6 @@ inline bool can_let_go(const JointSpec& joint) noexcept {
            (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }
 
-struct RigidSpring {
-    int first = -1, second = -1;     // body, −1 the point
-    Vec3 first_point, second_point;  // world, of ends that are no body
-    double stiffness = 0.0, rest_length = 0.0, viscosity = 0.0;
-};
-
-struct RigidField {
-    double strength = 0.0;
-    Vec3 centre;
-};
-
 struct RigidMethod {
     double time_step = 0.0;  // of a reported step
     int substeps = 1;
@@ -95,8 +85,8 @@ struct RigidMethod {
 struct RigidScene {
     std::vector<RigidBodySpec> bodies;
     std::vector<JointSpec> joints;
-    std::vector<RigidSpring> springs;
-    std::vector<RigidField> fields;
+    std::vector<SpringForce> springs;
+    std::vector<CentralField> fields;
     std::vector<Collider> colliders;    // of all bodies that can touch
     std::vector<IndexPair> no_contact;  // pairs of bodies that never touch
     bool contacts = true;               // false: the scene switches them off

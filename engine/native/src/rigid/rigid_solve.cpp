@@ -30,6 +30,7 @@ void RigidSystem::analyse_block() {
     matrix_.analyse(sizes, edges, is_constraint, true);
     right_.assign(matrix_.unknowns(), 0.0);
     solution_.assign(matrix_.unknowns(), 0.0);
+    redundant_.prepare(matrix_);
     for (int k = 0; k < row_blocks; ++k)
         for (int i = 0; i < sizes[k]; ++i) matrix_.diagonal(k)[i] = -blocks[k].softness[i];
     for (std::size_t k = 0; k < tied_.size(); ++k) {
@@ -112,7 +113,7 @@ void RigidSystem::solve_block() {
     if (method_.corrections > 0) bend_rows_back();
     if (clock_) clock_->mark(Stage::assemble_rows);
 
-    if (!(live_.share > 0.0 ? solve_shared() : solve_once())) {
+    if (!factor_and_solve()) {
         live_.not_solved = tied_.front();
         return;
     }
@@ -143,53 +144,36 @@ void RigidSystem::take_block_solution() {
     tied_are_moved_ = at_once;
 }
 
-bool RigidSystem::solve_once() {
-    const std::uint64_t floored = matrix_.counters().floored_pivots;
-    if (!matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(), method_.refinements))
-        return false;
-    if (matrix_.counters().floored_pivots == floored) return true;
-    if (live_.share == 0.0) {
-        // Redundant rows, seen for the first time: let all of them share the load, if that can be had.
-        live_.share = 1e-7 * matrix_.largest_constraint_scale();
-        return solve_shared();
-    }
-    find_contradiction();
-    return true;
+bool RigidSystem::factor_and_solve() {
+    const bool doubtful = redundant_.factor_and_solve(
+        matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
+        [this](std::span<const double> left) { return settled(left); });
+    if (redundant_.finite() && doubtful) find_contradiction();
+    return redundant_.finite();
 }
 
-bool RigidSystem::solve_shared() {
-    // With a slight softness of all rows in the factor, refinement from zero tends to the multipliers of least norm;
-    // quickly, unless the rows are nearly dependent as well (long rings). Then the factor with floors is better.
-    matrix_.shift_constraints(live_.share);
-    bool solved = matrix_.factor_and_solve(method_.floor, right_.data(), solution_.data(),
-                                           std::max(2, method_.refinements));
-    left_.resize(right_.size());
-    for (int round = 0; solved; ++round) {
-        double speed = 0.0;
-        if (row_residual(speed).first <= 1e-13 * speed) return true;
-        if (round == 6) solved = false;
-        else matrix_.solve(left_.data());
-        for (std::size_t i = 0; i < left_.size() && solved; ++i) solution_[i] += left_[i];
-    }
-    live_.share = -1.0;
-    matrix_.shift_constraints(0.0);
-    return solve_once();
+void RigidSystem::solve_again() {
+    redundant_.solve(matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
+                     [this](std::span<const double> left) { return settled(left); });
 }
 
-/// The largest residual of a row, its block, and the largest speed the rows and forces ask for [m/s, rad/s].
-std::pair<double, int> RigidSystem::row_residual(double& speed) {
-    left_.resize(right_.size());
-    matrix_.residual(right_.data(), solution_.data(), left_.data());
+bool RigidSystem::settled(std::span<const double> left) const {
+    const Worst worst = worst_row(left);
+    return worst.residual <= 1e-13 * worst.speed;
+}
+
+RigidSystem::Worst RigidSystem::worst_row(std::span<const double> left) const {
+    Worst worst;
     for (int i : tied_) {
         const Vec3 v = live_.bodies[i].velocity + kick(i);
-        speed = std::max({speed, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+        worst.speed = std::max({worst.speed, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
     }
-    std::pair<double, int> worst{0.0, 0};
     std::size_t row = 0;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
-            speed = std::max(speed, std::abs(right_[row]));
-            if (!(std::abs(left_[row]) <= worst.first)) worst = {std::abs(left_[row]), k};
+            worst.speed = std::max(worst.speed, std::abs(right_[row]));
+            if (!(std::abs(left[row]) <= worst.residual))
+                worst.residual = std::abs(left[row]), worst.block = k;
         }
     return worst;
 }
@@ -197,10 +181,9 @@ std::pair<double, int> RigidSystem::row_residual(double& speed) {
 void RigidSystem::find_contradiction() {
     // Redundant rows agree with the others, and refinement leaves them a residual of rounding. Rows that cannot
     // hold together keep one of the size of the speeds they ask for.
-    double speed = 0.0;
-    const auto [largest, worst] = row_residual(speed);
-    if (largest <= 1e-3 * speed) return;
-    const JointBlock& block = joints_.blocks()[worst];
+    const Worst worst = worst_row(redundant_.residual(matrix_, right_.data(), solution_.data()));
+    if (worst.residual <= 1e-3 * worst.speed) return;
+    const JointBlock& block = joints_.blocks()[worst.block];
     const bool second = block.second >= 0 && constants_[block.second].moves();
     live_.contradicted = second ? block.second : block.first;
 }

@@ -8,7 +8,7 @@ namespace spook {
 
 void RigidSystem::apply_forces() {
     std::fill(force_.begin(), force_.end(), Vec3{});
-    for (const RigidField& field : fields_)
+    for (const CentralField& field : fields_)
         for (int i = 0; i < bodies(); ++i) {
             if (!constants_[i].moves()) continue;
             const Vec3 d = position_of(i) - field.centre;
@@ -16,20 +16,15 @@ void RigidSystem::apply_forces() {
             force_[i] -= (constants_[i].mass * field.strength / (r2 * std::sqrt(r2))) * d;
         }
     if (clock_ && !fields_.empty()) clock_->mark(Stage::apply_central_gravity);
-    for (const RigidSpring& spring : springs_) {
-        const Vec3 a = spring.first < 0 ? spring.first_point : position_of(spring.first);
-        const Vec3 b = spring.second < 0 ? spring.second_point : position_of(spring.second);
-        const Vec3 va = spring.first < 0 ? Vec3{} : live_.bodies[spring.first].velocity;
-        const Vec3 vb = spring.second < 0 ? Vec3{} : live_.bodies[spring.second].velocity;
-        const Vec3 d = b - a;
-        Vec3 pull = spring.stiffness * d;  // on the first end
-        if (spring.rest_length > 0.0) pull = (spring.stiffness * (1.0 - spring.rest_length / norm(d))) * d;
-        if (spring.viscosity > 0.0) {
-            const double squared = dot(d, d);
-            if (squared > 0.0) pull += (spring.viscosity * dot(vb - va, d) / squared) * d;
-        }
-        if (spring.first >= 0 && constants_[spring.first].moves()) force_[spring.first] += pull;
-        if (spring.second >= 0 && constants_[spring.second].moves()) force_[spring.second] -= pull;
+    for (const SpringForce& spring : springs_) {
+        const auto velocity = [&](const End& end) {
+            return end.body < 0 ? Vec3{} : live_.bodies[end.body].velocity;
+        };
+        const auto& [first, second] = spring.ends;
+        const Vec3 pull =
+            spook::pull(spring, place(second) - place(first), velocity(second) - velocity(first));
+        if (first.body >= 0 && constants_[first.body].moves()) force_[first.body] += pull;
+        if (second.body >= 0 && constants_[second.body].moves()) force_[second.body] -= pull;
     }
     if (clock_ && !springs_.empty()) clock_->mark(Stage::apply_springs);
 }

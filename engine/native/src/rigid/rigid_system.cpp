@@ -118,7 +118,7 @@ void RigidSystem::reset(StageClock* clock) {
     live_ = {};
     tied_are_moved_ = false;
     live_.bodies = start_;
-    matrix_.shift_constraints(0.0);
+    redundant_.reset(matrix_);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
     clock_ = clock;
     rounds_ = sweeps_ = 0;
@@ -219,15 +219,11 @@ double RigidSystem::potential_energy() const noexcept {
         if (!constants_[i].moves()) continue;
         const Vec3 x = position_of(i);
         sum -= constants_[i].mass * dot(gravity_, x);
-        for (const RigidField& field : fields_)
+        for (const CentralField& field : fields_)
             sum -= constants_[i].mass * field.strength / norm(x - field.centre);
     }
-    for (const RigidSpring& spring : springs_) {
-        const Vec3 a = spring.first < 0 ? spring.first_point : position_of(spring.first);
-        const Vec3 b = spring.second < 0 ? spring.second_point : position_of(spring.second);
-        const double stretch = norm(b - a) - spring.rest_length;
-        sum += 0.5 * spring.stiffness * stretch * stretch;
-    }
+    for (const SpringForce& spring : springs_)
+        sum += energy(spring, place(spring.ends[1]) - place(spring.ends[0]));
     return sum;
 }
 

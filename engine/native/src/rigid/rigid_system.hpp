@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "contacts/contact_stage.hpp"
 #include "contacts/pivot_solver.hpp"
 #include "linear/block_ldlt.hpp"
+#include "linear/redundant_rows.hpp"
 #include "rigid/joint_set.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
@@ -42,10 +44,12 @@ public:
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const;
     void save() {
+        saved_share_ = redundant_.share();
         saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_;
         if (contacts_) saved_contacts_ = contacts_->memory();
     }
     void restore() {
+        redundant_.restore(matrix_, saved_share_);
         live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_;
         if (contacts_) contacts_->remember(saved_contacts_);
     }
@@ -94,9 +98,8 @@ public:
 private:
     struct Live {
         LargeArray<BodyState> bodies;
-        int too_fast = -1;    // the first body that turned too fast
-        int not_solved = -1;  // a body of a system that could not be factored
-        double share = 0.0;  // how redundant rows share their load: a softness in the factor; −1: they do not
+        int too_fast = -1;      // the first body that turned too fast
+        int not_solved = -1;    // a body of a system that could not be factored
         int contradicted = -1;  // a body held by rows that cannot hold together
         std::int64_t step = 0;  // steps of h done
         Unsettled unsettled;
@@ -150,15 +153,22 @@ private:
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual);
     void solve_block();
-    bool solve_once();
-    bool solve_shared();
-    std::pair<double, int> row_residual(double& speed);
+    struct
+        Worst {  // row residual, its block, and the largest speed that rows and forces ask for, m/s or rad/s
+        double residual = 0.0, speed = 0.0;
+        int block = 0;
+    };
+    Worst worst_row(std::span<const double> left) const;
+    bool settled(std::span<const double> left) const;
+    bool factor_and_solve();  // false when nothing it gives may be used
+    void solve_again();       // new right sides, same matrix
     void find_contradiction();
     void solve_mixed(bool touching);
     void integrate_body(int body);
     void integrate_all();
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
+    Vec3 place(const End& end) const noexcept { return end.body < 0 ? end.point : position_of(end.body); }
     double share(int body) const noexcept { return share_.empty() ? 1.0 : share_[body]; }
     const double* jacobian(int block, bool second) const noexcept {
         return const_cast<RigidSystem*>(this)->jacobian(block, second);
@@ -176,8 +186,8 @@ private:
     LargeArray<BodyConstants> constants_;
     LargeArray<BodyState> start_;
     std::vector<Vec3> acceleration_;  // gravity and constant loads
-    std::vector<RigidSpring> springs_;
-    std::vector<RigidField> fields_;
+    std::vector<SpringForce> springs_;
+    std::vector<CentralField> fields_;
     Vec3 gravity_;
     RigidMethod method_;
     double h_ = 0.0;  // of one substep
@@ -195,7 +205,9 @@ private:
     bool tied_are_moved_ = false;
     std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
-    LargeArray<double> right_, solution_, left_;
+    RedundantRows redundant_;
+    double saved_share_ = 0.0;
+    LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
         bool first_particle = false, second_particle = false;

@@ -1,0 +1,44 @@
+// Tables that both pipelines have: ends, springs, centres of gravity.
+#pragma once
+
+#include "bindings/columns.hpp"
+#include "run/forces.hpp"
+
+namespace spook {
+
+/// Two ends, each the index of a body or −1 for a point of the world.
+struct Ends {
+    explicit Ends(Columns& table)
+        : first(table.numbers("first")),
+          second(table.numbers("second")),
+          first_point(table.numbers("first_point", 3)),
+          second_point(table.numbers("second_point", 3)) {}
+    End operator()(std::size_t row, int side) const {
+        if (side == 0) return {first.index(row), first_point.vec(row)};
+        return {second.index(row), second_point.vec(row)};
+    }
+    Numbers first, second, first_point, second_point;
+};
+
+inline std::vector<SpringForce> read_springs(const nb::dict& springs) {
+    std::vector<SpringForce> read;
+    Columns table(springs, "springs");
+    const Ends end(table);
+    const Numbers stiffness = table.numbers("stiffness"), length = table.numbers("rest_length"),
+                  viscosity = table.numbers("viscosity");
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        read.push_back({{end(i, 0), end(i, 1)}, stiffness[i], length[i], viscosity[i]});
+    table.expect_all_read();
+    return read;
+}
+
+inline std::vector<CentralField> read_fields(const nb::dict& fields) {
+    std::vector<CentralField> read;
+    Columns table(fields, "fields");
+    const Numbers strength = table.numbers("strength"), centre = table.numbers("centre", 3);
+    for (std::size_t i = 0; i < table.rows(); ++i) read.push_back({strength[i], centre.vec(i)});
+    table.expect_all_read();
+    return read;
+}
+
+}  // namespace spook
