@@ -70,7 +70,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     points_.clear();
     impact_needed_ = false;
     impact_rounds_ = 0;
-    neighbours_known_ = false;
 
     set_margins(velocity, free_velocity);
     find_open();
@@ -79,7 +78,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         predicted_[b] = supported_[b] || jointed_[b] || unknown_[b] < 0 ? velocity[b] : free_velocity[b];
     const std::size_t closed_points = points_.size();
     if (find_strikes(predicted_, false) > 0) {
-        find_neighbours();
         find_events();
         take_back_strikes(closed_points, predicted_);
     }
@@ -87,8 +85,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         touches_.clear();
         return false;
     }
-    if (!neighbours_known_) find_neighbours();
-    join_neighbours();
     counters_.contacts += points_.size();
     order_points();
     measure_points();
@@ -134,57 +130,6 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     point.tangent = world_tangent(contact.point.normal);
     point.strike = strike;
     points_.push_back(point);
-}
-
-/// Open pairs that go little compared with their size and do not enter each other's half-space by their own motion,
-/// but may be pushed into it.
-void ContactStage::find_neighbours() {
-    neighbours_known_ = true;
-    neighbours_.clear();
-    crowded_.assign(unknown_.size(), 0);
-    const std::vector<double>& radius = detection_.radius();
-    for (const IndexPair& pair : open_) {
-        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-        const double small = radius[a] == 0.0   ? radius[b]
-                             : radius[b] == 0.0 ? radius[a]
-                                                : std::min(radius[a], radius[b]);
-        if (margin_[a] + margin_[b] > 0.5 * small) continue;
-        scratch_.clear();
-        detection_.touch(pair, margin_[a] + margin_[b], scratch_);
-        bool near = false, harmless = true;
-        for (const Contact& contact : scratch_) {
-            near = near || reachable(contact);
-            add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
-            const double approach = -relative(points_.back(), contact.point.normal, predicted_, false);
-            points_.pop_back();
-            harmless = harmless && contact.point.gap >= options_.time_step * approach;
-        }
-        if (!near || !harmless) continue;
-        neighbours_.push_back(pair);
-        crowded_[a] = crowded_[b] = 1;
-    }
-}
-
-/// Neighbours of bodies that have rows get rows, too, and so on: a blow then runs through a heap in one solve.
-void ContactStage::join_neighbours() {
-    std::vector<char> rows(unknown_.size(), 0);
-    for (const Point& point : points_)
-        for (const int b : {point.contact.first, point.contact.second}) rows[b] = unknown_[b] >= 0;
-    for (bool changed = true; changed;) {
-        changed = false;
-        std::erase_if(neighbours_, [&](const IndexPair& pair) {
-            const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-            if (!rows[a] && !rows[b]) return false;
-            scratch_.clear();
-            detection_.touch(pair, margin_[a] + margin_[b], scratch_);
-            for (const Contact& contact : scratch_)
-                if (reachable(contact)) add_point(contact, poses_[a], poses_[b], -1.0);
-            rows[a] = unknown_[a] >= 0, rows[b] = unknown_[b] >= 0;
-            std::erase(open_, pair);
-            changed = true;
-            return true;
-        });
-    }
 }
 
 /// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
@@ -313,7 +258,7 @@ void ContactStage::find_events() {
         if (unknown_[b] >= 0) {
             const int island = root(static_cast<int>(b));
             ++members[island];
-            plain[island] = plain[island] && ball_[b] && !crowded_[b];
+            plain[island] = plain[island] && ball_[b];
         }
     for (const Point& point : points_) {
         const Contact& contact = point.contact;

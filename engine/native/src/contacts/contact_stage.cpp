@@ -194,12 +194,9 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
 
 void ContactStage::mark_held(const MixedSystem& system) {
     held_.assign(system.mass.size(), 0);
-    for (const RowBlock& block : system.rows) {
-        const bool contact = block.lower[0] == 0.0 && block.upper[0] == unbounded;
-        if (contact && block.multiplier[0] == 0.0) continue;  // it did not push: not a bit may change
+    for (const RowBlock& block : system.rows)
         for (const int body : {block.first, block.second})
             if (body >= 0) held_[body] = 1;
-    }
 }
 
 /// Velocities of all bodies after a solve; those without rows fly freely.
@@ -228,11 +225,11 @@ bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
 void ContactStage::correct_events(const MixedSystem& system) {
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         const int u = unknown_[b];
-        if (u < 0 || event_time_[b] < 0.0) continue;
-        const Vec6 after = held_[u] ? system.velocity[u] : sum(velocity_[b], kick_[b]);
+        if (u < 0 || event_time_[b] < 0.0 || !held_[u]) continue;
         if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
         for (int i = 0; i < 3; ++i)
-            correction_[u][i] += event_time_[b] / options_.time_step * (predicted_[b][i] - after[i]);
+            correction_[u][i] +=
+                event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
     }
 }
 

@@ -170,8 +170,6 @@ private:
                     const std::vector<Vec6>& velocity, bool late);
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
-    void find_neighbours();
-    void join_neighbours();
     void order_points();
     void measure_points();
     void set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other);
@@ -208,11 +206,8 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     std::vector<IndexPair> open_;                    // pairs that may still meet in this step
-    std::vector<IndexPair> neighbours_;
-    std::vector<char> crowded_;
-    bool neighbours_known_ = false;
-    std::vector<char> supported_;  // bodies with a closed contact
-    std::vector<double> depth_;    // of a body's closed contacts, m
+    std::vector<char> supported_;                    // bodies with a closed contact
+    std::vector<double> depth_;                      // of a body's closed contacts, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
