@@ -44,7 +44,7 @@ MUTANTS = (
     mutant("three-sigmas", "noise", "SIGMAS = 4.0", "SIGMAS = 3.0"),
     mutant("short-window", "noise", "WINDOW = 30 ", "WINDOW = 8 "),
     mutant("long-window", "noise", "WINDOW = 30 ", "WINDOW = 60 "),
-    mutant("noise-times-level", "noise", "for value in finite) / abs(level)", "for value in finite) * abs(level)"),
+    mutant("noise-times-level", "noise", "(value - level) / abs(level) for", "(value - level) * abs(level) for"),
     mutant("no-floor", "noise", "max(FLOOR, SIGMAS * noise)", "SIGMAS * noise"),
     mutant("low-floor", "noise", "FLOOR = 0.05", "FLOOR = 0.03"),
     mutant("noise-from-four", "noise", "FEWEST = 5", "FEWEST = 4"),

@@ -125,5 +125,5 @@ def test_storage_knows_every_field_of_the_document():
     assert document.RunDocument.__struct_fields__ == (
         "schema_version", "id", "idempotency_key", "started", "finished", "trigger", "tracker_version",
         "ci_address", "engine", "machine", "tests", "series", "samples", "figures", "maps",
-        "trajectories",
+        "trajectories", "partial",
     )  # fmt: skip
