@@ -73,7 +73,6 @@ void only_the_listed_stages_run() {
            is_zero(after({fall, move, turn}).angular_velocity));
     EXPECT(is_zero(after({load, move, turn}).velocity) && after({load, move, turn}).angular_velocity.x > 0.1);
     EXPECT(is_refused([&] { after({fall, move}); }));
-    EXPECT(is_refused([&] { after({move, turn, Stage::half_step}); }));
     EXPECT(is_refused([&] { after({move, turn, Stage::friction}); }));
     const RigidScene held = cantilever(2, 1e-9);
     EXPECT(is_refused([&] { RigidSystem(held, {move, turn, Stage::assemble_rows}); }));

@@ -40,7 +40,7 @@ template <bool Timed> void ParticleSystem::velocity_stage() {
             parts_.forces.add_attraction(nodes_, parts_.h);
             mark<Timed>(Stage::apply_central_gravity);
         }
-        if (!parts_.forces.springs() == 0) {
+        if (parts_.forces.springs() > 0) {
             parts_.forces.add_springs(nodes_, parts_.h);
             mark<Timed>(Stage::apply_springs);
         }
