@@ -12,7 +12,7 @@ from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.particle_program import compile_particles
 from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.rigid_program import compile_rigid, lacking
+from spook_tracker.engine.rigid_program import compile_rigid
 from spook_tracker.engine.scene import Scene
 
 NOTHING: Mapping[str, Observable] = MappingProxyType({})
@@ -56,5 +56,4 @@ def explain(
 
 def _forces_rigid_stages(method: Method) -> bool:
     """Whether a stage only rigid bodies have is to be measured, and nothing is asked that they lack."""
-    wanted = not {"rotation", "collision"}.isdisjoint(method.force_stages)
-    return wanted and lacking(method) is None
+    return not {"rotation", "collision"}.isdisjoint(method.force_stages) and not method.string_stiffness

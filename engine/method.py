@@ -14,10 +14,11 @@ STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "rotation")
 class Method:
     """Options of the stepper. Anything but the defaults is a separate configuration in every table.
 
-    corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step
-    correction_cap     largest curvature correction, as a fraction of the rest length
+    corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step; each takes an
+                       order of the violation, and closed loops with redundant joints move without compliance
+    correction_cap     largest curvature correction, as a fraction of the rest length or of a joint's arms, or rad
     half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out
-    string_stiffness   treat the transverse stiffness of taut links implicitly
+    string_stiffness   treat the transverse stiffness of taut links, the geometric one of loaded joints, implicitly
     substeps           steps of h/substeps per reported step
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so

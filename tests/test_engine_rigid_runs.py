@@ -26,7 +26,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Mean,
     Method,
-    MethodError,
     Minimum,
     Momentum,
     Motor,
@@ -147,9 +146,23 @@ def test_what_a_scene_does_not_need_is_left_out() -> None:
     assert all(choice.reason for choice in compile(hanging, time_step=0.01).explain())
 
 
-def test_the_option_that_only_particles_have_is_refused_by_name() -> None:
-    with pytest.raises(MethodError, match="string_stiffness"):
-        compile(Scene(bodies=(body(),)), time_step=0.01, method=Method(string_stiffness=True))
+@pytest.mark.parametrize(
+    ("options", "stage"),
+    [
+        ({"corrections": 1}, "correct_curvature"),
+        ({"half_step_velocities": True}, "half_step"),
+        ({"string_stiffness": True}, "string_stiffness"),
+        ({"composition": "order4"}, "half_step"),
+    ],
+)
+def test_an_option_is_a_stage_of_rigid_bodies_too(options: dict[str, object], stage: str) -> None:
+    hanging = Scene(
+        bodies=(body(),),
+        constraints=(Hinge(name="hinge", between=(WORLD, "body"), at=(1.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
+    )
+
+    assert stage in compile(hanging, time_step=0.01, method=Method(**options)).stages  # type: ignore[arg-type]
+    assert stage not in compile(hanging, time_step=0.01).stages
 
 
 def test_a_particle_among_rigid_bodies_is_still_a_particle() -> None:
