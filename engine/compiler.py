@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -36,6 +37,8 @@ def compile(
         raise MethodError(f"method must be a Method, not {method!r}")
     if isinstance(time_step, bool) or not isinstance(time_step, int | float):
         raise MethodError(f"time_step must be a number of seconds, not {time_step!r}")
+    if isinstance(time_step, int) and abs(time_step) > sys.float_info.max:
+        raise MethodError("time_step is a number too large for arithmetic")
     if not (math.isfinite(time_step) and time_step > 0.0):
         raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
     if all(isinstance(body, Particle) for body in scene.bodies) and not _forces_rigid_stages(method):

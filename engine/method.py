@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import Literal
 
@@ -54,6 +55,12 @@ class Method:
         def refuse(field: str, rule: str) -> None:
             raise MethodError(f"method: {field} must be {rule}, not {getattr(self, field)!r}")
 
+        for field in ("correction_cap", "residual_tolerance", "unsettled_residual", "floor"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                refuse(field, "a number")
+            if isinstance(value, int) and abs(value) > sys.float_info.max:
+                raise MethodError(f"method: {field} is a number too large for arithmetic")
         if self.corrections not in (0, 1, 2):
             refuse("corrections", "0, 1 or 2")
         if not 0.0 < self.correction_cap <= 1.0:
@@ -68,8 +75,8 @@ class Method:
             refuse("impacts", "simultaneous or successive")
         if not self.unsettled_residual > 0.0:
             refuse("unsettled_residual", "above 0")
-        if not isinstance(self.iterations, int) or self.iterations < 1:
-            refuse("iterations", "a whole number from 1")
+        if not isinstance(self.iterations, int) or not 1 <= self.iterations <= 1_000_000_000:
+            refuse("iterations", "a whole number from 1 to a thousand million")
         if not self.residual_tolerance >= 0.0:
             refuse("residual_tolerance", "zero or above")
         if self.friction not in ("cone", "box", "scaled_box"):

@@ -1,7 +1,8 @@
 """What to keep of a run: a quantity, reduced inside the native loop. Only what is asked for is computed.
 
 Quantities (per sample)                         shape            unit
-  Position, Velocity (body or all)              (3,) or (n, 3)   m, m/s
+  Position, Velocity (body or all)              (3,) or (n, 3)   m, m/s; of the centre of mass, or of `point` [m] of
+                                                                 one rigid body, in its axes from that centre
   Orientation (body or all)                     (4,) or (n, 4)   1, quaternion (w, x, y, z)
   AngularVelocity (body or all)                 (3,) or (n, 3)   rad/s, world axes
   KineticEnergy, PotentialEnergy, Energy        ()               J; gravity −m g·x, central −m k/r,
@@ -41,14 +42,28 @@ class Quantity:
     """Base of what can be observed."""
 
 
+def _point_of_one(quantity: Position | Velocity) -> None:
+    object.__setattr__(quantity, "point", _point("point", quantity.point))
+    if quantity.body is None and any(quantity.point):
+        raise MethodError(f"observe: {quantity!r} asks for a point of all bodies; name the one it belongs to")
+
+
 @dataclass(frozen=True, slots=True)
 class Position(Quantity):
     body: str | None = None
+    point: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _point_of_one(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Velocity(Quantity):
     body: str | None = None
+    point: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _point_of_one(self)
 
 
 @dataclass(frozen=True, slots=True)
