@@ -160,9 +160,9 @@ def hits_of(told: Told) -> list[Hit]:
             found.append(_hit(told.key, told.definition, judged, "accepted"))
             open_from = len(found)
         else:
-            standing = _ended(judged)
+            end = judged.night.run
             found[open_from:] = [
-                replace(h, standing=standing, end=judged.night.run) for h in found[open_from:]
+                replace(hit, standing=_ended(hit, judged), end=end) for hit in found[open_from:]
             ]
             open_from = len(found)
     return found
