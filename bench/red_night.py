@@ -63,7 +63,11 @@ COMMITS = (  # subject, author, whose answers: the rest of the tests is the soun
     ("Spell the names of stages as the thesis does", "Bo Example", ("DULL", "STICKY")),
     ("Ask the impact stage for the restitution of the pair", "Ada Example", ("STICKY",)),
     ("Build with the newer compiler of the image", "Cy Example", ("STICKY",)),
-    ("Fold the damping of rods into one coefficient", "Dee Example", ("STICKY", "SLACK")),
+    (
+        "Fold the damping of rods into one coefficient",
+        "Dee Example",
+        ("SLACK", "STICKY"),
+    ),  # a later one overrules
 )
 
 
@@ -79,7 +83,18 @@ def merged(sound: RunDocument, faulty: RunDocument) -> RunDocument:
         part: both(part, lambda item: str(item.test))
         for part in ("series", "figures", "maps", "trajectories")
     }
-    parts["samples"] = both("samples", lambda item: str(item.series.partition("/")[0]))
+    quick = {sample.series: sample for sample in sound.samples}
+    times = {definition.key for definition in sound.series if definition.kind == "time"}
+
+    def timed(sample: Any) -> Any:
+        """Run times stay those of the sound engine: the nights differ in their answers alone."""
+        own = quick.get(sample.series)
+        if own is None:
+            return sample
+        return own if sample.series in times else msgspec.structs.replace(sample, timing=own.timing)
+
+    answers = both("samples", lambda item: str(item.series.partition("/")[0]))
+    parts["samples"] = tuple(timed(sample) for sample in answers)
     order = {card.name: place for place, card in enumerate(sound.tests)}
     parts["series"] = tuple(sorted(parts["series"], key=lambda d: order[d.test]))
     return msgspec.structs.replace(sound, **parts)
