@@ -216,7 +216,7 @@ def test_the_list_is_searched_and_filtered_and_the_address_keeps_it(driver, site
 
 
 def test_a_link_opens_its_cause(driver, site):
-    fixed = next(c for c in map(lambda c: told(c, book(nights())), causes_of(book(nights()))) if not c.new)
+    fixed = next(c for c in (told(c, book(nights())) for c in causes_of(book(nights()))) if not c.new)
     opened(driver, site, f"regressions.html#{fixed.anchor}")
     wait_for(driver, f"document.getElementById('{fixed.anchor}').open")
 
