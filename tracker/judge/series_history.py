@@ -44,6 +44,7 @@ class Judged:
     before_worse: Point | None = None  # the night before that
     accepted: str = ""
     usual: Usual | None = None  # of run times: level and noise after this night
+    confirms: bool = False  # of run times: the second slow night, which makes both red
 
     @property
     def red(self) -> bool:
@@ -51,8 +52,8 @@ class Judged:
 
     @property
     def news(self) -> bool:
-        """Red for a reason of tonight, and not only still red."""
-        return self.red and self.worse_at is self.night
+        """Red for a reason of tonight, or red since tonight, and not only still red."""
+        return self.red and (self.worse_at is self.night or self.confirms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,5 +336,6 @@ def _judge_times(
                 before_worse=good,
                 accepted=str(taken[i]) if noisy.state == "accepted" else "",
                 usual=noisy.usual,
+                confirms=noisy.state == "detected" and (i == 0 or verdicts[i - 1].state != "detected"),
             )
     return [found[place] for place in sorted(found)]
