@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.document.wording import number
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.series_history import Judged, Told, blame
 from spook_tracker.tracker.judge.tonight import Finding
@@ -69,7 +70,9 @@ class Hit:
         if math.isnan(self.margin):
             return ""
         of = "its limit" if self.stands == "fail" and self.definition and self.definition.limit else "before"
-        return f"{self.margin:.3g} × {of}"
+        if 1.0 < self.margin < 1.1:
+            return f"{number(100.0 * (self.margin - 1.0), 2)} % above {of}"
+        return f"{number(self.margin, 3)} × {of}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +112,13 @@ class Cause:
         return f"{count}; {self.blame}; {worst}{measure}"
 
 
-def causes(told: Mapping[str, Told]) -> list[Cause]:
-    """Every cause in judged histories (`judge_all`): what lasts first, then the newest, then the widest."""
+def causes(told: Mapping[str, Told], also: Iterable[Hit] = ()) -> list[Cause]:
+    """Every cause in judged histories (`judge_all`): what lasts first, then the newest, then the widest.
+
+    `also` are hits that no history tells: stability maps.
+    """
     order = _order(told)
-    hits = [hit for series in told.values() for hit in hits_of(series)]
+    hits = [*(hit for series in told.values() for hit in hits_of(series)), *also]
     found = _grouped(hits, order)
     return sorted(
         found, key=lambda c: (STANDINGS.index(c.standing), -order.get(_id(c.bad), -1), -len(c.hits))
