@@ -1,15 +1,16 @@
 """A real browser for the tests of the website: headless Chromium, without a network.
 
-The picture in the README comes from here, after `make nightly`:
+The pictures in the README and in docs/ come from here, after `make nightly` and `bench/red_night.py`:
 
     python -m tests.browser public/index.html docs/dashboard.png
+    python -m tests.browser public-red/index.html docs/red-night.png --width 1400 --most 900
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,8 @@ MISSING = "no Chromium with its driver here; .ci/install-system installs both"
 PATIENCE = 60.0  # s, on a machine whose cores are busy; a page that never gets there fails then
 SEEN = """[...document.querySelectorAll('figure.chart')].every((box) => 'drawn' in box.dataset ||
   !box.checkVisibility() || box.getBoundingClientRect().top > innerHeight)"""
+STILL = """[...document.querySelectorAll('figure.replay, .live')].every((box) => box.player || box.page ||
+  box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
 CHROMES = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -75,20 +78,40 @@ def wait_for(driver: Any, condition: str, *arguments: Any) -> None:
     waiting.until(lambda d: d.execute_script(f"return {condition};", *arguments), condition)
 
 
-def photograph(page: Path, picture: Path, *, width: int = 1280, most: int = 1500) -> None:
-    """A picture of a page of the website, from its top down to `most` pixels."""
+def photograph(
+    page: str, picture: Path, *, width: int = 1280, most: int = 1500, dark: bool = False, at: str = ""
+) -> None:
+    """A picture of a page of the website (its view may follow after a #), from its top down to `most` pixels.
+
+    `at` is a selector of what the picture begins with, if not the top.
+    """
     found = programs()
     if found is None:
         raise SystemExit(MISSING)
+    path, mark, view = page.partition("#")
     with browser(*found) as driver:
-        look(driver, width=width)
-        arrive(driver, page.resolve().as_uri())
+        look(driver, width=width, dark=dark)
+        arrive(driver, Path(path).resolve().as_uri() + mark + view)
         tall = driver.execute_script("return document.documentElement.scrollHeight")
-        look(driver, width=width, height=min(most, tall))
+        look(driver, width=width, height=min(most, tall), dark=dark)
+        if at:
+            driver.execute_script("document.querySelector(arguments[0]).scrollIntoView()", at)
         wait_for(driver, SEEN)  # charts are drawn as they come into view
+        wait_for(driver, STILL)
         picture.parent.mkdir(parents=True, exist_ok=True)
         driver.save_screenshot(str(picture))
 
 
+def main() -> None:
+    reader = argparse.ArgumentParser(description="A picture of a page of the website.")
+    reader.add_argument("page", help="such as public/index.html or public/live.html#scene=pile")
+    reader.add_argument("picture", type=Path)
+    reader.add_argument("--width", type=int, default=1280)
+    reader.add_argument("--most", type=int, default=1500, help="pixels from the top")
+    reader.add_argument("--at", default="", help="selector of what the picture begins with")
+    reader.add_argument("--dark", action="store_true")
+    photograph(**vars(reader.parse_args()))
+
+
 if __name__ == "__main__":
-    photograph(Path(sys.argv[1]), Path(sys.argv[2]))
+    main()

@@ -41,12 +41,14 @@ async function movieFrom(source) {
 
 function sameScene(one, other) { return one.bodies === other.bodies && one.count === other.count && one.step === other.step; }
 
-// The first sample at which two nights are further apart than their stored digits can say.
-function firstDifference(one, other) {
+const TOLD = 1e-4, SEEN = 0.02;  // of the scene's reach: what the stored digits can tell, what an eye sees
+
+// The first sample at which two nights are further apart than a share of the scene's reach; -1 if there is none.
+function firstDifference(one, other, share) {
   const away = apart(one.position, other.position, one.bodies, one.count);
   let reach = 0;
   one.position.forEach((v) => { reach = Math.max(reach, Math.abs(v) || 0); });
-  return away.findIndex((d) => !(d <= 1e-4 * reach));
+  return away.findIndex((d) => !(d <= share * reach));
 }
 
 async function startReplay(box) {
@@ -72,15 +74,20 @@ async function startReplay(box) {
       const night = await movieFrom(source);
       if (!sameScene(tonight, night)) { say(`${source.label} was recorded with other steps or bodies, so it cannot be laid over tonight.`); return; }
       say("");
-      const at = firstDifference(tonight, night);
+      const at = firstDifference(tonight, night, TOLD);
       first.hidden = false;
       first.disabled = at < 0;
       first.textContent = at < 0 ? "No difference" : "First difference";
       first.dataset.sample = String(at);
+      first.dataset.seen = String(firstDifference(tonight, night, SEEN));
       player.use({ ...tonight, ghost: { name: source.label, position: night.position, orientation: night.orientation, energy: night.energy } }, true);
     }
     player.tools.prepend(make("label", {}, "against ", other), first);
     if (state.get("against")) { other.value = state.get("against"); await against(other.value); }
+    if (state.get("at") === "first") {  // whoever comes from the list of causes wants to see it go wrong
+      state.set("at", "");
+      if (!first.hidden && first.dataset.seen >= 0) { player.seek(Number(first.dataset.seen)); player.remember(); } else if (!first.hidden) { player.toWorst(); }
+    }
   } catch (error) {
     say(`The replay needs WebGL, which this browser does not offer (${error.message}). The picture shows the start.`);
   }
@@ -92,5 +99,8 @@ async function startReplay(box) {
       if (entry.isIntersecting) { watch.unobserve(entry.target); startReplay(entry.target); }
     }
   }, { rootMargin: "200px 0px" });
-  document.querySelectorAll("figure.replay").forEach((box) => watch.observe(box));
+  document.querySelectorAll("figure.replay").forEach((box) => {
+    if (state.get("at")) { box.scrollIntoView({ block: "center" }); }
+    watch.observe(box);
+  });
 })();

@@ -158,17 +158,26 @@ function sortBy(table, head, down) {
   head.setAttribute("aria-sort", down ? "descending" : "ascending");
 }
 
-// --- the filter of a list: lines carry data-search and data-state ---
+// --- the filter of a list: what it hides is a line of a table, or a group of lines, with data-state ---
 function filter() {
   const tools = document.getElementById("filter");
   if (!tools) { return; }
-  const search = document.getElementById("search"), show = document.getElementById("show");
-  const lines = [...tools.parentElement.querySelectorAll("tbody tr")];
+  const search = document.getElementById("search"), show = document.getElementById("show"), none = document.getElementById("none-found");
+  const groups = [...document.querySelectorAll("details.cause")];
+  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll("tbody tr")];
+  const textOf = (element) => element.dataset.search ?? (element.dataset.search = element.textContent.toLowerCase());
   const apply = () => {
     const words = search.value.toLowerCase().trim();
     lines.forEach((line) => {
-      line.hidden = !(line.dataset.search.includes(words) && (!show.value || line.dataset.state === show.value));
+      line.hidden = !(textOf(line).includes(words) && (!show.value || line.dataset.state === show.value));
+      const head = line.querySelector("summary");
+      if (head) {  // of a group only the series that fit, unless the group itself does
+        const whole = textOf(head).includes(words);
+        line.querySelectorAll("tbody tr").forEach((row) => { row.hidden = !whole && !textOf(row).includes(words); });
+        if (words && !whole && !line.hidden) { line.open = true; }
+      }
     });
+    if (none) { none.hidden = lines.some((line) => !line.hidden) || !lines.length; }
   };
   const restore = () => { search.value = state.get("q"); show.value = state.get("show"); apply(); };
   search.addEventListener("input", () => { state.set("q", search.value.trim()); apply(); });
@@ -196,6 +205,10 @@ function switches() {
 }
 
 function openDetails() {
+  const meant = () => location.hash.length > 1 && !location.hash.includes("=") && document.querySelector(`details[id="${CSS.escape(location.hash.slice(1))}"]`);
+  const open = () => { const box = meant(); if (box) { box.open = true; box.scrollIntoView(); } };
+  addEventListener("hashchange", open);
+  open();
   document.querySelectorAll("details[id]").forEach((box) => {
     box.open = state.get("open").split(" ").includes(box.id) || box.open;
     box.addEventListener("toggle", () => {

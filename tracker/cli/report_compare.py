@@ -10,6 +10,7 @@ import click
 from spook_tracker.tracker.cli.console import Column, clean, table, width
 from spook_tracker.tracker.document.run_document import Number
 from spook_tracker.tracker.document.wording import page_of
+from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.vocabulary import QUIET, WORDS, spaced
@@ -215,9 +216,15 @@ def _escape(text: str) -> str:
 
 
 def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
-    """What tonight came to against the history: one sentence over all, then a line for each red series."""
+    """What tonight came to: one sentence over all, a line for each cause of several, and one for each red series."""
     red = [finding for finding in findings if finding.red]
-    return [summary(findings), *(click.style(_finding_line(finding, site), fg="red") for finding in red)]
+    causes = causes_tonight(findings)
+    shared = [f"  {clean(cause.sentence)}" for cause in causes] if len(causes) < len(red) else []
+    return [
+        summary(findings),
+        *shared,
+        *(click.style(_finding_line(finding, site), fg="red") for finding in red),
+    ]
 
 
 def summary(findings: Sequence[Finding]) -> str:

@@ -38,6 +38,8 @@ class EngineVersion(Struct, frozen=True, kw_only=True):
     parents: tuple[str, ...] = ()  # hashes; commit order comes from ancestry
     compiler: Text = ""
     flags: Text = ""
+    subject: Text = ""  # first line of the commit's message; empty where no repository was at hand
+    author: Text = ""  # of the commit
 
 
 class Machine(Struct, frozen=True, kw_only=True):

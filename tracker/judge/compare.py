@@ -18,8 +18,8 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.lane import Records, histories, line_of
-from spook_tracker.tracker.judge.noise import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off, judge_all, red_class
+from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map

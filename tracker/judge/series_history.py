@@ -18,7 +18,8 @@ from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.noise import Usual, judge_noisy, only_followed
+from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.slower import Usual, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class, State
@@ -44,6 +45,7 @@ class Judged:
     before_worse: Point | None = None  # the night before that
     accepted: str = ""
     usual: Usual | None = None  # of run times: level and noise after this night
+    confirms: bool = False  # of run times: the second slow night, which makes both red
 
     @property
     def red(self) -> bool:
@@ -51,8 +53,8 @@ class Judged:
 
     @property
     def news(self) -> bool:
-        """Red for a reason of tonight, and not only still red."""
-        return self.red and self.worse_at is self.night
+        """Red for a reason of tonight, or red since tonight, and not only still red."""
+        return self.red and (self.worse_at is self.night or self.confirms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,5 +337,6 @@ def _judge_times(
                 before_worse=good,
                 accepted=str(taken[i]) if noisy.state == "accepted" else "",
                 usual=noisy.usual,
+                confirms=noisy.state == "detected" and (i == 0 or verdicts[i - 1].state != "detected"),
             )
     return [found[place] for place in sorted(found)]

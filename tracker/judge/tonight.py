@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from spook_tracker.tracker.document.run_document import MapData, SeriesDefinition
@@ -26,6 +26,8 @@ class Finding:
     verdict: Verdict
     red: bool
     news: bool = True  # red for a reason of tonight, not only still red
+    good: Any = None  # of a map: the run it is compared with
+    bad: Any = None  # of a map: the run it is of
 
     @property
     def name(self) -> str:
@@ -60,7 +62,8 @@ def tonight(records: Records, run: Any, accepted: Sequence[Accepted] = ()) -> li
     findings = of_run(judge_all(histories(records, line), accepted), run.id)
     for other in reversed(line[:-1]):
         if other.machine.float_environment == run.machine.float_environment and records.maps(other.id):
-            findings += judge_maps(records.maps(other.id), records.maps(run.id))
+            found = judge_maps(records.maps(other.id), records.maps(run.id))
+            findings += [replace(finding, good=other, bad=run) for finding in found]
             break
     return worst_first(findings)
 

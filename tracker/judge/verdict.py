@@ -199,7 +199,7 @@ def badness(definition: SeriesDefinition, value: float) -> float | None:
     return None if definition.reference is None else abs(value - definition.reference)
 
 
-def _half_width(definition: SeriesDefinition) -> float | None:
+def half_width(definition: SeriesDefinition) -> float | None:
     """The limit as a magnitude of error, for those judged by magnitude."""
     if definition.better in ("larger", "smaller") or definition.limit is None:
         return None
@@ -210,7 +210,7 @@ def _half_width(definition: SeriesDefinition) -> float | None:
 
 def _deep_inside(definition: SeriesDefinition, smaller: float) -> float:
     """Below this magnitude growth is no regression; -inf where there is no limit to be inside of."""
-    half = _half_width(definition)
+    half = half_width(definition)
     if half is None:
         return -math.inf
     return half * (EXACT_ZERO if smaller == 0.0 else DEEP_INSIDE) * (1.0 + 1e-9)

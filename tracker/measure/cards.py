@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.run_document import EngineVersion, StageChoice, TestCard
+from spook_tracker.tracker.measure.commit import subject_and_author
 from spook_tracker.tracker.measure.question import ask, sentence
 from spook_tracker.tracker.measure.scene_drawing import drawing
 
@@ -56,6 +58,11 @@ def explained(test: ScalarTest, engine: Any) -> Any:
 def engine_version(engine: Any) -> EngineVersion:
     """The engine's own account of what it was built from."""
     info = engine.build_info
+    here = [
+        Path.cwd(),
+        *map(Path, getattr(engine, "__path__", ())),
+    ]  # an editable build lies in its repository
+    subject, author = subject_and_author(info.git_hash, here)
     return EngineVersion(
         name=info.name,
         version=info.version,
@@ -65,4 +72,6 @@ def engine_version(engine: Any) -> EngineVersion:
         parents=tuple(info.parents),
         compiler=info.compiler,
         flags=info.flags,
+        subject=subject,
+        author=author,
     )

@@ -116,6 +116,8 @@ class EngineVersion(Base):
     parents: Mapped[str] = _text("JSON list of the hashes of the parent commits; gives the commit order")
     compiler: Mapped[str] = _text("compiler and its version")
     flags: Mapped[str] = _text("compiler flags")
+    subject: Mapped[str] = _text("first line of the commit's message; empty if unknown")
+    author: Mapped[str] = _text("author of the commit; empty if unknown")
 
 
 class Machine(Base):

@@ -73,8 +73,9 @@ def joined(value: float | None, special: str | None) -> Number:
 
 
 def engine_row(engine: document.EngineVersion) -> Row:
-    columns = msgspec.structs.asdict(engine) | {"parents": json_of(engine.parents)}
-    return {"id": identity("engine", json_of(engine)), **columns}
+    columns = msgspec.structs.asdict(engine)
+    told = {name: value for name, value in columns.items() if value or name not in ("subject", "author")}
+    return {"id": identity("engine", json_of(told)), **columns, "parents": json_of(engine.parents)}
 
 
 def engine_of(row: Mapping[str, Any]) -> document.EngineVersion:

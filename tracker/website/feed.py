@@ -1,25 +1,18 @@
-"""What other programs read of the website: the Atom feed of regressions and recoveries, and the badges."""
+"""What other programs read of the website: the Atom feed of causes and what became of them, and the badges."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
-from spook_tracker.tracker.document.wording import (
-    clean,
-    conditions,
-    instant,
-    limit,
-    named,
-    quantity,
-    short_hash,
-    version,
-)
+from spook_tracker.tracker.document.wording import clean, instant, limit, opening, quantity
+from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.standing import Count
-from spook_tracker.tracker.judge.vocabulary import Class, spaced
-from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.causes import anchor, line
 from spook_tracker.tracker.website.nights import Book, Night
 
 ATOM = "http://www.w3.org/2005/Atom"
@@ -27,37 +20,44 @@ MOST_ENTRIES = 100
 COLOURS = {"pass": ("#00694d", "brightgreen"), "watch": ("#8a6100", "yellow"), "fail": ("#a93f00", "red")}
 
 
-def atom(book: Book, events: Sequence[Event], addresses: dict[str, str]) -> bytes:
-    """One entry for every regression and one for every recovery, newest first."""
+def atom(book: Book, causes: Sequence[Cause]) -> bytes:
+    """One entry for every cause, and one more when the last of its series came back or was accepted."""
     ElementTree.register_namespace("", ATOM)
     feed = ElementTree.Element(f"{{{ATOM}}}feed")
     _put(feed, "title", f"Regressions of {clean(book.tonight.engine.name)}")
     _put(feed, "id", f"tag:spook-tracker,2026:{_code(book.tonight.engine.name)}")
     _put(feed, "updated", _moment(book.tonight))
-    ElementTree.SubElement(feed, f"{{{ATOM}}}link", {"href": "index.html"})
+    ElementTree.SubElement(feed, f"{{{ATOM}}}link", {"href": "regressions.html"})
     author = ElementTree.SubElement(feed, f"{{{ATOM}}}author")
     _put(author, "name", "SPOOK tracker")
-    news: list[tuple[Night, Event, str]] = [(e.first, e, spaced(e.word)) for e in events]
-    news += [(e.worse_at, e, "regressed again") for e in events if e.worse_at is not e.first]
-    news += [(e.end, e, e.standing) for e in events if e.end is not None]
-    news.sort(key=lambda item: (-item[0].index, item[1].definition.key, item[2]))
-    for night, event, word in news[:MOST_ENTRIES]:
-        _entry(feed, night, event, word, addresses.get(event.definition.test, "index.html"))
+    news: list[tuple[Night, str, Cause]] = [(cause.bad, "red", cause) for cause in causes]
+    for cause in causes:
+        ends = [hit.end for hit in cause.hits if hit.end is not None]
+        if cause.standing != "detected" and ends:
+            news.append((max(ends, key=lambda night: int(night.index)), cause.standing, cause))
+    news.sort(key=lambda item: (-item[0].index, item[1], item[2].bad.id))
+    for night, word, cause in news[:MOST_ENTRIES]:
+        _entry(feed, night, word, cause)
     told: bytes = ElementTree.tostring(feed, encoding="utf-8", xml_declaration=True)
     return told
 
 
-def _entry(feed: ElementTree.Element, night: Night, event: Event, word: str, address: str) -> None:
-    d = event.definition
+def _entry(feed: ElementTree.Element, night: Night, word: str, cause: Cause) -> None:
     entry = ElementTree.SubElement(feed, f"{{{ATOM}}}entry")
-    _put(entry, "title", f"{clean(d.test)}: {clean(d.metric)} {word} at {version(night.engine)}")
-    _put(entry, "id", f"tag:spook-tracker,2026:{_code(d.key, night.id, word)}")
+    _put(entry, "title", f"{word}: {line(cause)}")
+    _put(entry, "id", f"tag:spook-tracker,2026:{_code(cause.bad.id, night.id, word)}")
     _put(entry, "updated", _moment(night))
-    ElementTree.SubElement(entry, f"{{{ATOM}}}link", {"href": address})
-    told = f"{clean(named(d)[0])} ({clean(conditions(d))}): "
-    told += f"{quantity(event.before, d.unit, 6)} before, {quantity(event.value, d.unit, 6)} after; limit {limit(d)}. "
-    told = f"{event.name}: {told}"
-    _put(entry, "summary", told + f"Commit {short_hash(night.engine) or 'unknown'}.")
+    ElementTree.SubElement(entry, f"{{{ATOM}}}link", {"href": f"regressions.html#{anchor(cause)}"})
+    worst = cause.worst
+    told = f"{clean(worst.name)}: {clean(worst.series)}"
+    if worst.definition is not None:
+        unit = worst.definition.unit
+        told += f", {quantity(worst.before, unit, 6)} before" if math.isfinite(worst.before) else ""
+        told += f", {quantity(worst.value, unit, 6)} after" if math.isfinite(worst.value) else ", no value"
+        told += f", limit {limit(worst.definition)}" if worst.definition.limit is not None else ""
+    written = f" by {clean(cause.bad.engine.author)}" if cause.bad.engine.author else ""
+    tests = ", ".join(clean(test)[:60] for test in cause.tests[:20])
+    _put(entry, "summary", f"Tests: {tests}. The worst: {told}. {opening(clean(cause.blame))}{written}.")
 
 
 def _put(parent: ElementTree.Element, name: str, text: str) -> None:

@@ -26,6 +26,7 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import histories, lines
 from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.standing import worst
+from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
@@ -93,6 +94,7 @@ class TestHistory:
     motions: tuple[tuple[Night, Trajectory], ...] = ()  # newest first
     maps: tuple[MapData, ...] = ()
     earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
+    map_nights: dict[str, tuple[Night | None, Night]] = field(default_factory=dict)  # both, by key of a map
 
     def gates(self) -> list[Trend]:
         """The series that decide green or red."""
@@ -195,6 +197,7 @@ def _chapter(
     motions: dict[str, list[tuple[Night, Trajectory]]] = {}
     maps: dict[MapKey, MapData] = {}
     earlier_maps: dict[MapKey, MapData] = {}
+    map_nights: dict[MapKey, tuple[Night | None, Night]] = {}
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
         figures_found = set(figures)
         for card in history.cards(night.id):
@@ -206,7 +209,11 @@ def _chapter(
             motions.setdefault(motion.test, []).append((night, motion))
         for stability_map in history.maps(night.id):
             place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
-            (earlier_maps if place_of_map in maps else maps).setdefault(place_of_map, stability_map)
+            if place_of_map not in maps:
+                maps[place_of_map], map_nights[place_of_map] = stability_map, (None, night)
+            elif place_of_map not in earlier_maps:
+                earlier_maps[place_of_map] = stability_map
+                map_nights[place_of_map] = night, map_nights[place_of_map][1]
     by_test: dict[str, list[Trend]] = {}
     for trend in trends.values():
         by_test.setdefault(trend.definition.test, []).append(trend)
@@ -223,6 +230,7 @@ def _chapter(
             motions=tuple(motions.get(test, ())),
             maps=tuple(m for m in maps.values() if m.test == test),
             earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
+            map_nights={map_key(m): map_nights[place] for place, m in maps.items() if m.test == test},
         )
         for test, card in cards.items()
     ]

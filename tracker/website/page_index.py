@@ -8,13 +8,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
+from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.standing import Count, count, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
-from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.causes import Told, lasting, told
 from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
-from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.website.page_rows import Page, address, row
 
 HEAT_NIGHTS = 60
+MOST_OLD = 6  # causes of earlier nights on the first page; the page of regressions has all
+MOST_TESTS = 14  # of one cause
 
 
 def tonight(book: Book) -> list[Trend]:
@@ -36,10 +39,11 @@ def health(book: Book) -> tuple[Class, Count]:
     return "none" if state == "followed" and not found.expected else state, found
 
 
-def index(book: Book, events: Sequence[Event]) -> Page:
+def index(book: Book, causes: Sequence[Cause]) -> Page:
     """Is the engine healthy tonight?"""
     gates = [(test, trend) for test in book.tests for trend in test.gates()]
-    open_events = [e for e in events if e.lasting]
+    red = [told(cause, book) for cause in lasting(causes)]
+    new, old = [c for c in red if c.new], [c for c in red if not c.new]
     state, found = health(book)
     seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
     others = [row(t, test.card.title, address(test), book.nights) for test, t in gates if not test.card.seven]
@@ -55,6 +59,11 @@ def index(book: Book, events: Sequence[Event]) -> Page:
         "state": state,
         "headline": _headline(state, found, tonight(book)),
         "summary": summary(book),
+        "new": new,
+        "old": old[:MOST_OLD],
+        "old_left_out": max(0, len(old) - MOST_OLD),
+        "most_tests": MOST_TESTS,
+        "blamed": _blamed(new, old),
         "kept": found.kept,
         "limits": found.limits,
         "held": found.set_points - found.left,
@@ -65,7 +74,6 @@ def index(book: Book, events: Sequence[Event]) -> Page:
         "common_step": _step_words(step),
         "heat": heat(book),
         "signs": [(name, said, meaning) for name, (_, said, meaning) in CLASSES.items()],
-        "open": [event_row(e, book) for e in open_events[:12]],
     }
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
 
@@ -110,7 +118,6 @@ def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:
 def summary(book: Book) -> str:
     """Tonight in two sentences."""
     fresh = [(test, t) for test in book.tests for t in test.gates() if t.nights[-1] == book.tonight.index]
-    red = [trend for _, trend in fresh if trend.state == "fail"]
     seven = [trend for test, trend in fresh if test.card.seven]
     kept = sum(trend.state != "fail" for trend in seven)
     parts = []
@@ -125,9 +132,22 @@ def summary(book: Book) -> str:
     missed = [test for test in book.tests if test.gates() and test.name not in put]
     if missed:
         parts.append(f"{len(missed)} {'was' if len(missed) == 1 else 'were'} not run tonight.")
-    if red:
-        names = list(dict.fromkeys(trend.definition.test for trend in red))
-        parts.append("Red: " + ", ".join(clean(n)[:60] for n in names[:5]) + ("…" if len(names) > 5 else "."))
+    return " ".join(parts)
+
+
+def _blamed(new: Sequence[Told], old: Sequence[Told]) -> str:
+    """How many causes there are, new apart from old."""
+    parts = []
+    if new:
+        parts.append("Something became worse tonight.")
+    elif old:
+        parts.append("Nothing became worse tonight.")
+    if old:
+        parts.append(
+            "One earlier cause is still red."
+            if len(old) == 1
+            else f"{len(old)} earlier causes are still red."
+        )
     return " ".join(parts)
 
 

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from spook_tracker.tracker.document.wording import slug, web_address
+from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import spaced
+from spook_tracker.tracker.website.causes import hit_row, told
 from spook_tracker.tracker.website.comparisons import Comparisons, choice, page_data
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
@@ -22,11 +24,12 @@ from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
-from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.website.page_rows import Page, address, row
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
 
-MOST_CLOSED = 100  # events on the page; the file has all
+MOST_CAUSES = 200  # on the page of regressions; the file has all
+MOST_ROWS, FEW_ROWS = 500, 25  # series of all causes; of one that is over
 MOST_CHANGES = 100  # of a comparison read without scripts
 MOST_NIGHTS = 120
 
@@ -76,23 +79,21 @@ def stability(book: Book, events: Sequence[Event]) -> Page:
     )
 
 
-def regressions(book: Book, events: Sequence[Event]) -> Page:
-    """What is red, and what was."""
-    closed = [e for e in events if not e.lasting]
+def regressions(book: Book, causes: Sequence[Cause]) -> Page:
+    """Every cause with all that it hit, those that last first; the oldest without their rows."""
+    left = MOST_ROWS
+    groups: list[dict[str, Any]] = []
+    for cause in causes[:MOST_CAUSES]:
+        hits = cause.hits[: min(left, MOST_ROWS if cause.standing == "detected" else FEW_ROWS)]
+        left -= len(hits)
+        groups.append({"told": told(cause, book), "rows": [hit_row(hit, book) for hit in hits]})
     context = {
-        "open": [event_row(e, book) for e in events if e.lasting],
-        "closed": [event_row(e, book) for e in closed[:MOST_CLOSED]],
-        "left_out": max(0, len(closed) - MOST_CLOSED),
-        "maps": [
-            (test.card.title, address(test), m, verdict)
-            for test in book.tests
-            for m in test.maps
-            if (verdict := map_verdicts(test).get(map_key(m))) is not None and verdict.red
-        ],
+        "red": [group for group in groups if group["told"].standing == "detected"],
+        "closed": [group for group in groups if group["told"].standing != "detected"],
+        "left_out": max(0, len(causes) - MOST_CAUSES),
     }
-    return Page(
-        "regressions.html", "regressions.html", "Regressions", "What became worse, and when.", context
-    )
+    title = "What became worse, since which commit, and what became of it."
+    return Page("regressions.html", "regressions.html", "Regressions", title, context)
 
 
 def compare(told: Comparisons) -> Page:

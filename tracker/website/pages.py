@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.website import page_overviews
 from spook_tracker.tracker.website.comparisons import Comparisons
 from spook_tracker.tracker.website.events import Event
@@ -25,17 +26,19 @@ NAVIGATION = (
 )
 
 
-def pages(book: Book, events: Sequence[Event], compared: Comparisons, module: str = "") -> Iterator[Page]:
+def pages(
+    book: Book, events: Sequence[Event], causes: Sequence[Cause], compared: Comparisons, module: str = ""
+) -> Iterator[Page]:
     """Every page of the website, from the first to the pages of the tests; `module` is the live engine's script."""
     if not book.nights:
         yield Page("index.html", "empty.html", "Nothing yet", "No night is recorded yet.")
         return
-    yield index(book, events)
+    yield index(book, causes)
     yield page_overviews.error_time(book)
     yield page_overviews.stability(book, events)
     yield live_page(module)
     yield page_overviews.compare(compared)
-    yield page_overviews.regressions(book, events)
+    yield page_overviews.regressions(book, causes)
     yield page_overviews.versions(book)
     yield page_overviews.data(book, events)
     yield page_overviews.document(book, events)

@@ -18,15 +18,17 @@ import msgspec
 
 from spook_tracker.tracker.document.wording import slug
 from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website import data_files, feed
+from spook_tracker.tracker.website.causes import causes_of
 from spook_tracker.tracker.website.comparisons import FILE, comparisons, read_known, stored
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import module_script
 from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
-from spook_tracker.tracker.website.page_rows import Page, address
+from spook_tracker.tracker.website.page_rows import Page
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
 from spook_tracker.tracker.website.replays import replay_files
 from spook_tracker.tracker.website.templates import environment
@@ -86,9 +88,10 @@ def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> R
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
         events = all_events(told) if told.nights else []
+        causes = causes_of(told)
         levels = digest(making.encode(), repr(accepted).encode())
         compared = comparisons(history, told, accepted, read_known(out, levels))
-        for page in pages(told, events, compared, module):
+        for page in pages(told, events, causes, compared, module):
             context = _context(page, names, told.nights[-1] if told.nights else None)
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
 
@@ -98,12 +101,14 @@ def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> R
             folder.add(page.path, source, render)
         pairs = stored(compared, levels)
         folder.add(FILE, digest(pairs), partial(bytes, pairs))
-        for path, made_from, make in _data(told, events):
+        for path, made_from, make in _data(told, events, causes):
             folder.add(path, digest(making.encode(), made_from), make)
     return Report(folder.written, folder.skipped, folder.old)
 
 
-def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
+def _data(
+    told: Book, events: Sequence[Event], causes: Sequence[Cause]
+) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
     """Files of numbers: path, what they are made from, and how."""
     if not told.nights:
         return
@@ -130,7 +135,7 @@ def _data(told: Book, events: Sequence[Event]) -> Iterator[tuple[str, bytes, Cal
         )
         yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
         yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
-    news = feed.atom(told, events, {test.name: address(test) for test in told.tests})
+    news = feed.atom(told, causes)
     yield "feed.xml", news, partial(bytes, news)
     state, found = health(told)
     words = feed.badge_words(found)

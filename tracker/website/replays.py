@@ -37,7 +37,7 @@ def replay(test: TestHistory) -> Replay | None:
         return None
     sources: list[dict[str, str]] = []
     for night, motion in test.motions[:MOST_NIGHTS]:
-        key = _key(motion)
+        key = key_of(motion)
         name = short_hash(night.engine) or version(night.engine)
         same = sources and key == sources[0]["key"]
         if same:
@@ -65,7 +65,7 @@ def replay_files(tests: Iterable[TestHistory]) -> Iterator[tuple[str, bytes]]:
             if age >= len(test.motions):
                 continue
             motion = test.motions[age][1]
-            key = _key(motion)
+            key = key_of(motion)
             if key in written:
                 continue
             content = _script(key, motion)
@@ -76,7 +76,8 @@ def replay_files(tests: Iterable[TestHistory]) -> Iterator[tuple[str, bytes]]:
             yield f"replay/{key}.js", content
 
 
-def _key(motion: Trajectory) -> str:
+def key_of(motion: Trajectory) -> str:
+    """What a motion is called: the same for the same motion, whatever night it is of."""
     return f"{slug(motion.test)}-{digest(msgspec.json.encode(motion))[:10]}"
 
 

@@ -7,6 +7,17 @@
 
 namespace spook {
 
+namespace {
+
+/// Component by component: copied whole, a Vec3 goes through the stack, where one load waits for two stores.
+inline void put(Vec3& place, Vec3 value) noexcept {
+    place.x = value.x;
+    place.y = value.y;
+    place.z = value.z;
+}
+
+}  // namespace
+
 /// Bodies that nothing couples, under steady forces and at most one centre: each body flies its whole block of
 /// steps with its state in registers.
 void ParticleSystem::fly(std::int64_t steps) noexcept {
@@ -108,19 +119,19 @@ template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcep
                     const Vec3 moved = v[at] + (kick[at] + w[at] * (k == end - 1 ? in : in - out));
                     out = in;
                     if (last) {
-                        v[at] = moved;
+                        put(v[at], moved);
                         x[at] += h * moved;
                     } else {
-                        trial[at] = moved;
+                        put(trial[at], moved);
                     }
                 }
                 const Vec3 moved = v[top] + (kick[top] + w[top] * (Vec3{} - out));
                 if (last) {
-                    v[top] = moved;
+                    put(v[top], moved);
                     x[top] += h * moved;
                     break;
                 }
-                trial[top] = moved;
+                put(trial[top], moved);
                 y = 0.0;
                 for (int k = first, at = top; k < end; ++k, ++at) {
                     const Row& r = row[k];

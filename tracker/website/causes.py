@@ -1,0 +1,211 @@
+"""What went wrong, grouped by cause, as pages and the feed tell it: a commit, what it hit, how badly.
+
+The grouping is the judge's (tracker/judge/causes.py); here it becomes words, links and rows.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from spook_tracker.tracker.document.wording import (
+    clean,
+    conditions,
+    limit,
+    named,
+    quantity,
+    short_hash,
+    version,
+)
+from spook_tracker.tracker.judge.causes import Cause, Hit, causes
+from spook_tracker.tracker.judge.series_history import blame
+from spook_tracker.tracker.judge.tonight import judge_maps, map_key
+from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.nights import Book, Night, TestHistory
+from spook_tracker.tracker.website.page_rows import address
+from spook_tracker.tracker.website.replays import MOST_NIGHTS, key_of
+
+SAID = {"detected": "RED", "accepted": "ACCEPTED", "fixed": "FIXED", "recovered": "RECOVERED"}
+SIGN: dict[str, Class] = {"accepted": "accepted", "fixed": "pass", "recovered": "pass"}
+
+
+@dataclass
+class HitTest:
+    """A test that a cause hits."""
+
+    title: str
+    address: str
+    state: Class
+    series: int
+
+
+@dataclass
+class Told:
+    """A cause in words."""
+
+    anchor: str
+    state: Class  # FAIL or WATCH while red, else what became of it
+    said: str
+    standing: str
+    new: bool  # began tonight
+    night: Night
+    good: Night | None
+    subject: str
+    author: str
+    blame: str
+    damage: list[tuple[str, int]]  # what, how often; nothing that is zero
+    tests: list[HitTest]
+    worst: dict[str, Any]
+    replay: str  # where its first wrong moment can be seen; empty where no motion was recorded
+    compare: str
+    ended: list[Night]  # runs where it came back or was accepted, first and last
+    hits: Sequence[Hit]
+
+
+def causes_of(book: Book) -> list[Cause]:
+    """Every cause of the history: what lasts first, then the newest, then the widest."""
+    told = {trend.definition.key: trend.told for test in book.tests for trend in test.trends}
+    return causes(told, [hit for test in book.tests for hit in _map_hits(test)])
+
+
+def _map_hits(test: TestHistory) -> list[Hit]:
+    """The stability maps of a test with worse cells than the night before that has them."""
+    found = []
+    for finding in judge_maps(test.earlier_maps, test.maps):
+        good, bad = test.map_nights.get(finding.series, (None, None))
+        if finding.red and bad is not None:
+            found.append(
+                Hit(
+                    series=finding.series,
+                    test=test.name,
+                    definition=None,
+                    name=finding.name,
+                    sentence=finding.verdict.sentence,
+                    stands="watch",
+                    before=math.nan,
+                    value=math.nan,
+                    good=good,
+                    bad=bad,
+                    standing="detected",
+                )
+            )
+    return found
+
+
+def lasting(found: Sequence[Cause]) -> list[Cause]:
+    """What is red tonight: the newest commit first, of one night a broken limit before the rest."""
+    return [cause for cause in found if cause.standing == "detected"]
+
+
+def told(cause: Cause, book: Book) -> Told:
+    """A cause in words; its runs are the nights of the book."""
+    night, good = cause.bad, cause.good
+    red = [hit for hit in cause.hits if hit.standing == "detected"]
+    shown = red or list(cause.hits)
+    by_test: dict[str, list[Hit]] = {}
+    for hit in shown:
+        by_test.setdefault(hit.test, []).append(hit)
+    known = {test.name: test for test in book.tests}
+    failed = any(hit.stands == "fail" for hit in shown)
+    state: Class = SIGN.get(cause.standing, "fail" if failed else "watch")
+    tests = [
+        HitTest(
+            title=clean(known[name].card.title),
+            address=address(known[name]),
+            state="fail" if any(hit.stands == "fail" for hit in hits) else "watch",
+            series=len(hits),
+        )
+        for name, hits in by_test.items()
+    ]
+    ends = sorted({hit.end.index: hit.end for hit in cause.hits if hit.end is not None}.items())
+    return Told(
+        anchor=anchor(cause),
+        state=state,
+        said=SAID[cause.standing],
+        standing=cause.standing,
+        new=night.index == book.tonight.index,
+        night=night,
+        good=good,
+        subject=clean(night.engine.subject) or f"Version {version(night.engine)}",
+        author=clean(night.engine.author),
+        blame=blame(night, good),
+        damage=_damage(shown),
+        tests=tests,
+        worst=hit_row(shown[0], book),
+        replay=_replay(by_test, known, night, good, book),
+        compare=f"compare.html#after={night.id}&before={good.id}" if good is not None else "",
+        ended=[ends[0][1], ends[-1][1]] if ends else [],
+        hits=cause.hits,
+    )
+
+
+def anchor(cause: Cause) -> str:
+    """Where a cause stands on the page of regressions: the same every night."""
+    return f"c-{hashlib.sha256(cause.bad.id.encode('utf-8', 'replace')).hexdigest()[:10]}"
+
+
+def _damage(hits: Sequence[Hit]) -> list[tuple[str, int]]:
+    maps = sum(hit.definition is None for hit in hits)
+    lost = sum(hit.stands == "fail" and not math.isfinite(hit.value) for hit in hits)
+    broken = sum(hit.stands == "fail" for hit in hits) - lost
+    counts = [
+        ("limit broken" if broken == 1 else "limits broken", broken),
+        ("value lost" if lost == 1 else "values lost", lost),
+        ("worse, limits kept", len(hits) - broken - lost - maps),
+        ("stability map worse" if maps == 1 else "stability maps worse", maps),
+    ]
+    return [(words, count) for words, count in counts if count]
+
+
+def _replay(
+    by_test: dict[str, list[Hit]], known: dict[str, TestHistory], night: Night, good: Night | None, book: Book
+) -> str:
+    """The first test hit whose recorded motion differs from that of the last good night, at that moment."""
+    for name in by_test:
+        motions = {found.id: motion for found, motion in known[name].motions[:MOST_NIGHTS]}
+        if good is None or good.id not in motions or book.tonight.id not in motions:
+            continue
+        now, then = key_of(motions[book.tonight.id]), key_of(motions[good.id])
+        if now != then:
+            return f"{address(known[name])}#against={then}&at=first"
+    return ""
+
+
+def hit_row(hit: Hit, book: Book) -> dict[str, Any]:
+    """One series, or one map, of a cause as a line of a table."""
+    test = next(t for t in book.tests if t.name == hit.test)
+    d = hit.definition
+    row = {
+        "test": test.card.title,
+        "address": address(test),
+        "name": hit.name,
+        "sentence": hit.sentence,
+        "state": hit.stands if hit.standing == "detected" else SIGN[hit.standing],
+        "said": "" if hit.standing == "detected" else SAID[hit.standing],
+        "measure": hit.measure,
+        "end": hit.end,
+    }
+    if d is None:
+        found = next((m for m in test.maps if map_key(m) == hit.series), None)
+        title = f"{found.title} ({found.configuration})" if found else hit.series
+        return row | {"what": f"map: {title}", "before": "–", "after": "–", "limit": "", "kept": ""}
+    return row | {
+        "what": f"{named(d)[0]} ({conditions(d)})",
+        "before": quantity(hit.before, d.unit, 5) if math.isfinite(hit.before) else "–",
+        "after": quantity(hit.value, d.unit, 5) if math.isfinite(hit.value) else "no value",
+        "limit": "" if d.limit is None else limit(d),
+    }
+
+
+def line(cause: Cause) -> str:
+    """A cause in one line of plain text, for the feed: the commit, what it hit, how badly."""
+    count, tests = len(cause.hits), len(cause.tests)
+    series = "1 series" if count == 1 else f"{count} series"
+    damage = ", ".join(f"{number} {words}" for words, number in _damage(cause.hits))
+    engine = cause.bad.engine
+    commit = short_hash(engine) or version(engine)
+    subject = f" “{clean(engine.subject)}”" if engine.subject else ""
+    return f"{commit}{subject}: {damage} ({series} of {tests} {'test' if tests == 1 else 'tests'})"
