@@ -62,6 +62,11 @@ OBSERVE: dict[str, Observable] = {
 }
 
 
+def _vector(values: npt.NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
 def scene(load: float = HEAVY, compliance: float = 0.0) -> Scene:
     """The rods in a row, TILT off the vertical, on ball joints; the load at the end, free to turn."""
     angles = [TILT + ZIGZAG * (-1) ** k for k in range(RODS)]
@@ -73,15 +78,15 @@ def scene(load: float = HEAVY, compliance: float = 0.0) -> Scene:
             name=f"rod {k}",
             mass=MASS,
             inertia=(ACROSS, ACROSS, 1e-3),
-            position=tuple(0.5 * (ends[k] + ends[k + 1])),
+            position=_vector(0.5 * (ends[k] + ends[k + 1])),
             orientation=(math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0),
         )
         for k, angle in enumerate(angles)
     ]
-    bodies.append(RigidBody(name="load", mass=load, inertia=(0.01 * load,) * 3, position=tuple(ends[-1])))
+    bodies.append(RigidBody(name="load", mass=load, inertia=(0.01 * load,) * 3, position=_vector(ends[-1])))
     names = [WORLD, *(body.name for body in bodies)]
     joints = tuple(
-        Ball(name=f"joint {k}", between=(names[k], names[k + 1]), at=tuple(ends[k]), compliance=compliance)
+        Ball(name=f"joint {k}", between=(names[k], names[k + 1]), at=_vector(ends[k]), compliance=compliance)
         for k in range(RODS + 1)
     )
     return Scene(bodies=tuple(bodies), constraints=joints, gravity=(0.0, 0.0, -GRAVITY), contacts=False)
