@@ -30,7 +30,7 @@ from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed,
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
-from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class
+from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
 from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
@@ -351,7 +351,8 @@ def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change
     level = acceptance(accepted, change.series, float(change.after), night)
     if level is None:
         return change
-    return msgspec.structs.replace(change, word="accepted", red=False, stands="accepted", accepted=str(level))
+    word: Word = "expected" if level.expected else "accepted"
+    return msgspec.structs.replace(change, word=word, red=False, stands="accepted", accepted=str(level))
 
 
 def _blamed(change: Change, first_bad: Mapping[str, tuple[str, str]]) -> Change:

@@ -162,6 +162,20 @@ def _judge_values(
         bad = verdict.red or broken
         gone_for_good = night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
         taken = acceptance(accepted, key, night.value, night_of(night.run), gone_for_good) if bad else None
+        if taken is not None and taken.expected:  # the level from before stays
+            words = f"expected to fail; {verdict.sentence}"
+            known = replace(verdict, word="expected", sentence=words, name="")
+            ended: State = "accepted" if red is not None else "green"
+            red, calm = None, None
+            yield Judged(
+                night=night,
+                verdict=known,
+                state=ended,
+                stands="accepted",
+                against=against,
+                accepted=str(taken),
+            )
+            continue
         if bad and taken is None:
             worse = red is None or _worsened(definition, red.night, night)
             good = (
