@@ -42,8 +42,13 @@ class Comparisons:
     """The versions to choose from, and what became of every ordered pair."""
 
     nights: list[Night]
-    pairs: dict[str, Any]  # "run id before/run id after" to what the page shows
+    pairs: dict[str, Any]  # by `pair_name` to what the page shows
     texts: list[str] = field(default_factory=list)
+
+
+def pair_name(before: Night, after: Night) -> str:
+    """What a comparison is stored under; an id may hold any sign."""
+    return json.dumps([before.id, after.id])
 
 
 def chosen(book: Book) -> list[Night]:
@@ -83,7 +88,7 @@ def comparisons(
         for after in nights:
             if before is after:
                 continue
-            name = f"{before.id}/{after.id}"
+            name = pair_name(before, after)
             newest = after is book.tonight
             if name not in stored or newest:
                 history_knows = known(told, before.id, after.id)
@@ -121,7 +126,7 @@ def page_data(told: Comparisons) -> dict[str, Any]:
     pairs = {}
     index = {night.id: i for i, night in enumerate(told.nights)}
     for name, pair in told.pairs.items():
-        before, _, after = name.partition("/")
+        before, after = json.loads(name)
         pairs[f"{index[before]},{index[after]}"] = {
             **pair,
             "changes": [[place(text) for text in change] for change in pair["changes"]],

@@ -11,7 +11,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import spaced
 from spook_tracker.tracker.website.causes import hit_row, told
-from spook_tracker.tracker.website.comparisons import Comparisons, choice, page_data
+from spook_tracker.tracker.website.comparisons import Comparisons, choice, page_data, pair_name
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
     grid_view,
@@ -102,7 +102,7 @@ def compare(told: Comparisons) -> Page:
     first = None
     if len(told.nights) > 1:
         before, after = told.nights[-2:]
-        pair = told.pairs[f"{before.id}/{after.id}"]
+        pair = told.pairs[pair_name(before, after)]
         counts = ", ".join(f"{n} {spaced(word)}" for word, n in pair["counts"].items())
         headline = {"identical": "Identical", "same": "No regression", "regressed": "Regressed"}
         first = {
