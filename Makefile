@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -38,6 +38,12 @@ check: develop
 	$(BIN)/lint-imports
 	sh .ci/subjects
 	$(BIN)/clang-format --dry-run -Werror $$(git ls-files 'engine/native/*.[ch]pp' 'engine/native/*.inl')
+	$(MAKE) --no-print-directory tidy
+
+# Over the core; again only when something in it has changed since it passed.
+tidy: develop
+	$(BIN)/cmake -S engine/native -B build/native-tests $(NATIVE_TESTS) -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
+	sh .ci/tidy $(BIN)/clang-tidy build/native-tests
 
 # The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
 package: develop
@@ -81,15 +87,15 @@ site: install
 serve: install
 	$(BIN)/tracker serve $(OUT)
 
+NATIVE_TESTS = -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja -DCMAKE_BUILD_TYPE=Release -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON
 native-tests: develop
-	$(BIN)/cmake -S engine/native -B build/native-tests -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
-	    -DCMAKE_BUILD_TYPE=Release -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON
+	$(BIN)/cmake -S engine/native -B build/native-tests $(NATIVE_TESTS)
 	$(BIN)/cmake --build build/native-tests
 	$(BIN)/ctest --test-dir build/native-tests --output-on-failure
 
 sanitize: develop
 	$(BIN)/cmake -S engine/native -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
-	    -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=ON
+	    -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=ON
 	$(BIN)/cmake --build build/sanitize
 	$(BIN)/ctest --test-dir build/sanitize --output-on-failure
 

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 JUDGE = "tracker/judge"
 TESTS = (
-    "tests/test_judge_rules.py", "tests/test_tracker_verdict.py", "tests/test_tracker_noise.py",
+    "tests/test_judge_rules.py", "tests/test_judge_detection.py", "tests/test_tracker_verdict.py", "tests/test_tracker_noise.py",
     "tests/test_tracker_compare.py", "tests/test_tracker_analyse.py", "tests/test_tracker_accepted.py",
 )  # fmt: skip
 RUN = "import sys; sys.path[:0] = sys.argv[1:3]; import pytest; sys.exit(pytest.main(sys.argv[3:]))"
@@ -44,15 +44,23 @@ MUTANTS = (
     mutant("three-sigmas", "noise", "SIGMAS = 4.0", "SIGMAS = 3.0"),
     mutant("short-window", "noise", "WINDOW = 30 ", "WINDOW = 8 "),
     mutant("long-window", "noise", "WINDOW = 30 ", "WINDOW = 60 "),
-    mutant("noise-times-level", "noise", "(value - level) / abs(level) for", "(value - level) * abs(level) for"),
+    mutant("noise-times-level", "noise", "in finite]) / abs(level)", "in finite]) * abs(level)"),
     mutant("no-floor", "noise", "max(FLOOR, SIGMAS * noise)", "SIGMAS * noise"),
     mutant("low-floor", "noise", "FLOOR = 0.05", "FLOOR = 0.03"),
     mutant("noise-from-four", "noise", "FEWEST = 5", "FEWEST = 4"),
     mutant("lenient-start", "noise", "FEW_NIGHTS_FLOOR = 0.5", "FEW_NIGHTS_FLOOR = 0.6"),
-    mutant("one-night-confirms", "noise", "len(suspects) > 1 or", "len(suspects) > 0 or"),
+    mutant("one-night-confirms", "noise", "len(self.suspects) > 1 or", "len(self.suspects) > 0 or"),
     mutant("no-normal", "noise", "NORMAL = 1.4826", "NORMAL = 1.0"),
-    mutant("larger-is-not-better", "noise", "return -change if larger_is_better else change", "return change"),
-    mutant("no-creep", "noise", "if change <= threshold:\n        return None", "return None"),
+    mutant("larger-is-not-better", "slower", "return -change if larger_is_better else change", "return change"),
+    mutant("no-creep", "noise", "if len(recent) < CREEP or len(old) < CREEP:", "if True:"),
+    mutant("clusters-are-not-learnt", "noise", "REACH = 1.25", "REACH = 0.0"),
+    mutant("no-visits", "noise", "VISITS = 2 ", "VISITS = 200 "),
+    mutant("one-visit-is-enough", "noise", "VISITS = 2 ", "VISITS = 1 "),
+    mutant("a-visit-may-last", "noise", "LONGER = 2 ", "LONGER = 200 "),
+    mutant("no-memory", "shifts", "return min(strongest, 0.98)", "return 0.0"),
+    mutant("no-permutations", "shifts", "if probability < RARE else None", "if probability < 1.0 else None"),
+    mutant("no-t-test", "shifts", " or rise <= standard_error(base, len(last))", ""),
+    mutant("small-shifts-count", "shifts", "LEAST = 0.01", "LEAST = 0.0"),
     mutant("bounded-is-growing", "verdict", '"bounded": 1, "growing": 2', '"bounded": 1, "growing": 1'),
     mutant("unknown-cell-is-best", "verdict", "CELL_RANK.get(cell, len(CELL_RANK))", "CELL_RANK.get(cell, 0)"),
     mutant("diverged-is-not-finite", "verdict", '"diverged": 3,\n    "crashed"', '"diverged": 2,\n    "crashed"'),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -12,7 +13,7 @@ from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.particle_program import compile_particles
 from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.rigid_program import compile_rigid, lacking
+from spook_tracker.engine.rigid_program import compile_rigid
 from spook_tracker.engine.scene import Scene
 
 NOTHING: Mapping[str, Observable] = MappingProxyType({})
@@ -36,6 +37,8 @@ def compile(
         raise MethodError(f"method must be a Method, not {method!r}")
     if isinstance(time_step, bool) or not isinstance(time_step, int | float):
         raise MethodError(f"time_step must be a number of seconds, not {time_step!r}")
+    if isinstance(time_step, int) and abs(time_step) > sys.float_info.max:
+        raise MethodError("time_step is a number too large for arithmetic")
     if not (math.isfinite(time_step) and time_step > 0.0):
         raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
     if all(isinstance(body, Particle) for body in scene.bodies) and not _forces_rigid_stages(method):
@@ -56,5 +59,4 @@ def explain(
 
 def _forces_rigid_stages(method: Method) -> bool:
     """Whether a stage only rigid bodies have is to be measured, and nothing is asked that they lack."""
-    wanted = not {"rotation", "collision"}.isdisjoint(method.force_stages)
-    return wanted and lacking(method) is None
+    return not {"rotation", "collision"}.isdisjoint(method.force_stages) and not method.string_stiffness

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,10 +15,11 @@ STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "rotation")
 class Method:
     """Options of the stepper. Anything but the defaults is a separate configuration in every table.
 
-    corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step
-    correction_cap     largest curvature correction, as a fraction of the rest length
+    corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step; each takes an
+                       order of the violation, and closed loops with redundant joints move without compliance
+    correction_cap     largest curvature correction, as a fraction of the rest length or of a joint's arms, or rad
     half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out
-    string_stiffness   treat the transverse stiffness of taut links implicitly
+    string_stiffness   treat the transverse stiffness of taut links, the geometric one of loaded joints, implicitly
     substeps           steps of h/substeps per reported step
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
@@ -53,6 +55,12 @@ class Method:
         def refuse(field: str, rule: str) -> None:
             raise MethodError(f"method: {field} must be {rule}, not {getattr(self, field)!r}")
 
+        for field in ("correction_cap", "residual_tolerance", "unsettled_residual", "floor"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                refuse(field, "a number")
+            if isinstance(value, int) and abs(value) > sys.float_info.max:
+                raise MethodError(f"method: {field} is a number too large for arithmetic")
         if self.corrections not in (0, 1, 2):
             refuse("corrections", "0, 1 or 2")
         if not 0.0 < self.correction_cap <= 1.0:
@@ -67,8 +75,8 @@ class Method:
             refuse("impacts", "simultaneous or successive")
         if not self.unsettled_residual > 0.0:
             refuse("unsettled_residual", "above 0")
-        if not isinstance(self.iterations, int) or self.iterations < 1:
-            refuse("iterations", "a whole number from 1")
+        if not isinstance(self.iterations, int) or not 1 <= self.iterations <= 1_000_000_000:
+            refuse("iterations", "a whole number from 1 to a thousand million")
         if not self.residual_tolerance >= 0.0:
             refuse("residual_tolerance", "zero or above")
         if self.friction not in ("cone", "box", "scaled_box"):

@@ -1,18 +1,21 @@
 """What to keep of a run: a quantity, reduced inside the native loop. Only what is asked for is computed.
 
 Quantities (per sample)                         shape            unit
-  Position, Velocity (body or all)              (3,) or (n, 3)   m, m/s
+  Position, Velocity (body or all)              (3,) or (n, 3)   m, m/s; of the centre of mass, or of `point` [m] of
+                                                                 one rigid body, in its axes from that centre
   Orientation (body or all)                     (4,) or (n, 4)   1, quaternion (w, x, y, z)
   AngularVelocity (body or all)                 (3,) or (n, 3)   rad/s, world axes
   KineticEnergy, PotentialEnergy, Energy        ()               J; gravity −m g·x, central −m k/r,
-                                                                 springs ½ k d²; compliant rows count nothing
+                                                                 springs, those of joints too, ½ k d²; compliant
+                                                                 rows count nothing
   Violation (constraint or all distances)       (), (n,), (rows,)  m or rad; of a distance |d| − rest_length
   ConstraintForce (constraint or all distances) (), (n,) or (6,) N, positive where the rod pulls (tension);
                                                                  joints: force [N], torque [N m] on the second
   Momentum, AngularMomentum(about)              (3,)             N s, kg m²/s
   ContactForce (body, other or all)             (3,)             N, on `body`, sum over the contact points
   ContactCount, Penetration                     ()               1; largest penetration depth, m
-  JointCoordinate (joint)                       ()               m or rad, free coordinate of an axial joint
+  JointCoordinate (joint)                       ()               m or rad, free coordinate of an axial joint;
+                                                                 a hinge counts its turns
 
 Sample k is the state after k steps, sample 0 the start; forces and contact forces belong to the step that
 ended there and are zero at sample 0. With half-step velocities, velocities and energies are those at the
@@ -39,14 +42,28 @@ class Quantity:
     """Base of what can be observed."""
 
 
+def _point_of_one(quantity: Position | Velocity) -> None:
+    object.__setattr__(quantity, "point", _point("point", quantity.point))
+    if quantity.body is None and any(quantity.point):
+        raise MethodError(f"observe: {quantity!r} asks for a point of all bodies; name the one it belongs to")
+
+
 @dataclass(frozen=True, slots=True)
 class Position(Quantity):
     body: str | None = None
+    point: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _point_of_one(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Velocity(Quantity):
     body: str | None = None
+    point: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _point_of_one(self)
 
 
 @dataclass(frozen=True, slots=True)

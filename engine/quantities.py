@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from spook_tracker.engine import _core
+from spook_tracker.engine.bodies import Particle
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.joints import AxialJoint, Distance
@@ -74,7 +75,13 @@ def _request(quantity: Quantity, scene: Scene) -> tuple[_core.QuantityRequest, S
         name, width = _OF_BODIES[kind]
         if quantity.body is None:
             return _ask(name), (len(scene.bodies), width)
-        return _ask(name, _body(scene, quantity.body)), (width,)
+        point = quantity.point if isinstance(quantity, Position | Velocity) else _ORIGIN
+        index = _body(scene, quantity.body)
+        if any(point) and isinstance(scene.bodies[index], Particle):
+            raise MethodError(
+                f"observe: {quantity!r} asks for a point of a particle, which is one; leave it out"
+            )
+        return _ask(name, index, point), (width,)
     if isinstance(quantity, Violation | ConstraintForce):
         return _of_constraint(quantity, scene)
     if isinstance(quantity, Momentum):

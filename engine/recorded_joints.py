@@ -113,7 +113,7 @@ def violation(scene: Scene, constraint: Constraint, positions: Array, orientatio
 
 
 def coordinate(scene: Scene, joint: Constraint, positions: Array, orientations: Array) -> Array:
-    """Free coordinate (s,) of a hinge [rad] or prismatic joint [m]; followed over turns where it has a limit or spring."""
+    """Free coordinate (s,) of a hinge [rad] or prismatic joint [m]; turns are counted."""
     if not isinstance(joint, AxialJoint):
         raise MethodError(f"observe: {joint.name!r} is no hinge or prismatic joint and has no coordinate")
     first, second = (_End(scene, name, positions, orientations) for name in joint.between)
@@ -122,10 +122,7 @@ def coordinate(scene: Scene, joint: Constraint, positions: Array, orientations: 
         at = joint_point(scene, joint)
         return np.asarray((first.direction(axis) * (second.point(at) - first.point(at))).sum(axis=1))
     relative = _relative(first, second)
-    angle = 2.0 * np.arctan2(relative[:, 1:] @ axis, relative[:, 0])
-    if joint.limit is not None or joint.spring is not None:
-        return np.unwrap(angle, period=2.0 * math.pi)
-    return np.asarray(angle)
+    return np.unwrap(2.0 * np.arctan2(relative[:, 1:] @ axis, relative[:, 0]), period=2.0 * math.pi)
 
 
 def _relative(first: _End, second: _End) -> Array:

@@ -120,7 +120,14 @@ def quantity(scene: Scene, recording: Recording, asked: Quantity) -> Array:
             Orientation: recording.orientations,
             AngularVelocity: recording.angular_velocities,
         }[type(asked)]
-        return states if asked.body is None else states[:, _index(scene, asked.body)]
+        if asked.body is None:
+            return states
+        index = _index(scene, asked.body)
+        if not isinstance(asked, Position | Velocity) or not any(asked.point):
+            return states[:, index]
+        arm = turned(recording.orientations[:, index], np.broadcast_to(asked.point, states[:, index].shape))
+        moved = np.cross(recording.angular_velocities[:, index], arm) if isinstance(asked, Velocity) else arm
+        return np.asarray(states[:, index] + moved)
     if isinstance(asked, KineticEnergy):
         return _kinetic(scene, recording)
     if isinstance(asked, PotentialEnergy):

@@ -20,7 +20,6 @@ import numpy as np
 from spook_tracker.engine import _core
 from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.check import Vector
-from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import (
     AxialJoint,
@@ -60,9 +59,6 @@ def compile_rigid(
     scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable]
 ) -> Program:
     """The Program of a scene with at least one rigid body."""
-    field = lacking(method)
-    if field is not None:
-        raise MethodError(f"method: {field} is for scenes of particles only; leave it out for rigid bodies")
     quantities, shapes = requests(scene, observe)
     native = _core.RigidProgram(
         **pack(scene, time_step, method), quantities=quantities, observations=observations(observe)
@@ -136,6 +132,7 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "composition": ORDERS[method.composition],
+            "string_stiffness": method.string_stiffness,
             "half_step_velocities": method.half_step_velocities,
             "corrections": method.corrections,
             "correction_cap": method.correction_cap,
@@ -143,15 +140,6 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
             "force_rotation": "rotation" in method.force_stages,
         },
     }
-
-
-def lacking(method: Method) -> str | None:
-    """The first option that scenes with rigid bodies do not have and that is not at its default; None if all is
-    well."""
-    for field, plain in (("string_stiffness", False),):
-        if getattr(method, field) != plain:
-            return field
-    return None
 
 
 def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from typing import SupportsFloat
 
@@ -36,6 +37,8 @@ def simulate(
     if duration is not None:
         if isinstance(duration, bool | str) or not isinstance(duration, SupportsFloat):
             raise MethodError(f"duration must be a number of seconds, not {duration!r}")
+        if isinstance(duration, int) and abs(duration) > sys.float_info.max:
+            raise MethodError("duration is a number too large for arithmetic")
         if not (math.isfinite(duration) and duration >= 0.0):
             raise MethodError(f"duration must be finite and not negative, not {duration!r}")
         steps = round(duration / time_step)

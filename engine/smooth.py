@@ -38,6 +38,8 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
         if method.half_step_velocities
         else f"corrections={method.corrections}"
         if method.corrections
+        else "string_stiffness"
+        if method.string_stiffness
         else None
     )
     if wanted is None:
@@ -58,6 +60,12 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
             )
     if composed:
         check_smooth(scene, method)
+    distance = next((row.name for row in scene.constraints if isinstance(row, Distance)), None)
+    if method.string_stiffness and distance is not None:
+        raise MethodError(
+            f"method: string_stiffness of distances is for scenes of particles only, and {distance!r} is one here; "
+            f"use a Ball at its ends, or leave it out"
+        )
 
 
 def _bounded(joint: Constraint) -> str | None:

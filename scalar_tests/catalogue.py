@@ -16,7 +16,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "n_pendulum": "n_pendulum.question",
     "planetarium": "planetarium.question",
     # its other studies
-    "cantilever": "cantilever",
+    "cantilever": "cantilever.question",
     "slip_angle": "inclined_plane.slip_angle",
     "force_ratio": "inclined_plane.force_ratio",
     "oscillator_spring": "oscillator.spring",

@@ -42,6 +42,7 @@ from spook_tracker.engine import (
     Spring,
     Trace,
     Universal,
+    Velocity,
     Violation,
     compile,
     simulate,
@@ -187,6 +188,10 @@ METHODS: list[dict[str, Any]] = [
     {"composition": "order5"},
     {"solver": "magic"},
     {"iterations": 0},
+    {"iterations": 10**400},
+    {"correction_cap": "0.3"},
+    {"residual_tolerance": True},
+    {"unsettled_residual": 10**400},
     {"residual_tolerance": math.nan},
     {"friction": "pyramid"},
     {"refinements": -1},
@@ -218,6 +223,18 @@ def test_observe_must_be_a_mapping_and_quantities_numbers() -> None:
     for point in (math.nan, (0.0, math.nan, 0.0), ("x", 0.0, 0.0)):
         with pytest.raises(MethodError, match="observe: about"):
             AngularMomentum(about=point)  # type: ignore[arg-type]
+    for make in (Position, Velocity):
+        with pytest.raises(MethodError, match="observe: point"):
+            make("stone", point=(math.nan, 0.0, 0.0))
+        with pytest.raises(MethodError, match="a point of all bodies"):
+            make(point=(1.0, 0.0, 0.0))
+        with pytest.raises(MethodError, match="a point of a particle"):
+            compile(
+                particles(), time_step=0.01, observe={"x": Final(quantity=make("a", point=(1.0, 0.0, 0.0)))}
+            )
+    for too_large in ({"time_step": 10**400, "steps": 1}, {"time_step": 0.01, "duration": 10**400}):
+        with pytest.raises(MethodError, match="too large for arithmetic"):
+            simulate(particles(), **too_large)  # type: ignore[arg-type]
     with pytest.raises(MethodError, match="duration must be a number of seconds, not '1'"):
         simulate(particles(), time_step=0.01, duration="1")  # type: ignore[arg-type]
 

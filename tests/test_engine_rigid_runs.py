@@ -26,7 +26,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Mean,
     Method,
-    MethodError,
     Minimum,
     Momentum,
     Motor,
@@ -147,9 +146,23 @@ def test_what_a_scene_does_not_need_is_left_out() -> None:
     assert all(choice.reason for choice in compile(hanging, time_step=0.01).explain())
 
 
-def test_the_option_that_only_particles_have_is_refused_by_name() -> None:
-    with pytest.raises(MethodError, match="string_stiffness"):
-        compile(Scene(bodies=(body(),)), time_step=0.01, method=Method(string_stiffness=True))
+@pytest.mark.parametrize(
+    ("options", "stage"),
+    [
+        ({"corrections": 1}, "correct_curvature"),
+        ({"half_step_velocities": True}, "half_step"),
+        ({"string_stiffness": True}, "string_stiffness"),
+        ({"composition": "order4"}, "half_step"),
+    ],
+)
+def test_an_option_is_a_stage_of_rigid_bodies_too(options: dict[str, object], stage: str) -> None:
+    hanging = Scene(
+        bodies=(body(),),
+        constraints=(Hinge(name="hinge", between=(WORLD, "body"), at=(1.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
+    )
+
+    assert stage in compile(hanging, time_step=0.01, method=Method(**options)).stages  # type: ignore[arg-type]
+    assert stage not in compile(hanging, time_step=0.01).stages
 
 
 def test_a_particle_among_rigid_bodies_is_still_a_particle() -> None:
@@ -266,3 +279,33 @@ def test_a_hinge_counts_its_turns() -> None:
 
     assert np.diff(angle).min() > 0.0
     assert angle[-1] == pytest.approx(20.0 * math.pi, rel=1e-4)
+
+
+def test_a_point_of_a_body_is_read_where_it_is() -> None:
+    """A box on a fixed axis through its centre: a corner goes round at w × r, whatever way the box lay at the start."""
+    half = math.sqrt(0.5)
+    spun = RigidBody(
+        name="box",
+        mass=2.0,
+        inertia=(1.0, 1.0, 1.0),
+        position=(1.0, 2.0, 3.0),
+        orientation=(half, half, 0.0, 0.0),  # body y is world z, body z is world −y
+        velocity=(0.5, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 2.0),
+    )
+    point = (0.4, 0.7, -0.3)  # world (0.4, 0.3, 0.7)
+    observe = {
+        "x": Trace(quantity=Position("box", point=point)),
+        "v": Trace(quantity=Velocity("box", point=point)),
+    }
+    run = simulate(Scene(bodies=(spun,)), time_step=0.001, steps=1000, observe=observe)
+    time = run.sample_times["x"]
+    angle = 2.0 * time + math.atan2(0.3, 0.4)
+    exact = np.column_stack(
+        [1.0 + 0.5 * time + 0.5 * np.cos(angle), 2.0 + 0.5 * np.sin(angle), 3.7 + 0.0 * time]
+    )
+    speed = np.column_stack([0.5 - np.sin(angle), np.cos(angle), 0.0 * time])
+
+    # The variational turn is fast by (h w)²/6 of the angle.
+    assert np.abs(run["x"] - exact).max() < 0.5 * 2.0 * 0.002**2 / 6.0 * 1.01
+    assert np.abs(run["v"] - speed).max() < 2.0 * 0.5 * 2.0 * 0.002**2 / 6.0 * 1.01

@@ -144,8 +144,3 @@ def test_a_singular_system_without_a_floor_is_reported() -> None:
 
     assert result.status == "not_finite"
     assert "cannot be solved" in result.failure
-
-
-def test_options_of_particles_are_refused_for_rigid_bodies() -> None:
-    with pytest.raises(engine.MethodError, match="string_stiffness is for scenes of particles only"):
-        engine.compile(Scene(bodies=(body(),)), time_step=TIME_STEP, method=Method(string_stiffness=True))

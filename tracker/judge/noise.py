@@ -2,19 +2,34 @@
 
 Usual is the median of the nights that hold, noise their median absolute deviation. What counts is a relative
 change above a floor that follows the noise, and above what the nights that hold have reached themselves: two
-clusters, spikes and slow waves are learnt. One slow night is only suspected; if the next one holds, it joins
-what is usual. Two fast nights in a row are a new level, so that a slow-down after them is seen. Slow creep
-is found by the median of the last nights against those at the last release.
+clusters and spikes are learnt. One slow night is only suspected; if the next one holds, it joins
+what is usual. Smaller changes are found by several nights together (tracker/judge/shifts.py) and stay red until
+the last nights came halfway back. Two fast nights in a row are a new level, so that a slow-down after them is
+seen. A level that was left again twice is one of the machine's: a third visit that is no longer than those
+before is no news. Slow creep is found by the median of the last nights against those at the last release.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from heapq import nlargest
 from statistics import median
 from typing import Literal
 
+import numpy as np
+
+from spook_tracker.tracker.judge.shifts import (
+    BASE,
+    FEWEST_BASE,
+    SPANS,
+    Values,
+    remembered,
+    shift,
+    standard_error,
+)
+from spook_tracker.tracker.judge.slower import Usual, change_in_words, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
 
 WINDOW = 30  # nights that say what is usual
@@ -24,13 +39,18 @@ FLOOR = 0.05  # relative; less where the noise is less than an eighth of it, of 
 ENOUGH = 20  # nights
 CLEAR = 8.0  # noises, below the floor: the noise of few nights may be told too small
 REACH = 1.25  # times the second largest deviation of nights that hold
+UNSEEN = 25  # nights: of fewer, as much again may be reached by those to come
+REACHED = 200  # nights of which that is remembered, whatever their level
 FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
 SIGMAS = 4.0
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CREEP = 5  # nights in each median that is compared for drift
+BACK = 4  # nights whose mean must have come halfway back from a shift
+VISITS = 2  # to a level, before it is known as one of the machine's
+LONGER = 2  # times its longest visit, and it is no visit any more
 
 
-Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
+State = Literal["green", "detected", "accepted", "recovered", "suspected"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +58,7 @@ class Noisy:
     """One night's verdict; `against`, `first_bad`, `last_good` are places in the sequence."""
 
     verdict: Verdict
-    state: Literal["green", "detected", "accepted", "recovered", "suspected"]
+    state: State
     against: int | None = None
     first_bad: int | None = None
     last_good: int | None = None
@@ -54,167 +74,293 @@ def judge_noisy(
     accepted: Sequence[bool] | None = None,
 ) -> list[Noisy]:
     """A verdict for each value of one machine, oldest first. Values are positive; worse is larger."""
+    walk = _Walk(values, larger_is_better)
     releases = releases or [False] * len(values)
     accepted = accepted or [False] * len(values)
-    usual: list[int] = []  # places of nights that hold
-    anchor: list[int] = []  # places of the nights at the last release
-    suspects: list[int] = []  # unusual nights in a row, not yet or already red
-    gains: list[int] = []  # fast nights in a row
-    red_since: int | None = None
-    found: list[Noisy] = []
-    levels: list[Usual] = []  # before each night but the first
-    for place, value in enumerate(values):
-        if not usual:
-            usual, anchor = [place], [place]
-            found.append(Noisy(verdict=Verdict(word="new", sentence="the first value"), state="green"))
-            continue
-        level, threshold = _usual([values[i] for i in usual], larger_is_better)
-        levels.append((level, threshold))
-        change = _worse_by(level, value, larger_is_better)
-        if change > threshold:
-            suspects.append(place)
-            gains = []
-            confirmed = len(suspects) > 1 or not math.isfinite(value)
-            verdict = _verdict(change, level, value, "slower" if confirmed else "")
-            if accepted[place]:
-                found.append(Noisy(verdict=verdict, state="accepted", against=usual[-1]))
-                usual, anchor, suspects, red_since = [place], [place], [], None
-            elif confirmed:
-                red_since = suspects[0] if red_since is None else red_since
-                found.append(
-                    Noisy(
-                        verdict=verdict,
-                        state="detected",
-                        against=usual[-1],
-                        first_bad=red_since,
-                        last_good=usual[-1],
-                    )
-                )
-            else:
-                found.append(Noisy(verdict=verdict, state="suspected", against=usual[-1]))
-            continue
-        recovered = red_since is not None
-        dismissed = [] if recovered else suspects  # what no second night confirmed is noise
-        suspects, red_since = [], None
-        gains = [*gains, place] if -change > threshold else []
-        if gains and recovered:
-            usual = usual[-1:]
-        elif len(gains) > 1:
-            usual = gains[:-1]  # two fast nights are a new level
-        usual = [*usual, *dismissed, place][-WINDOW:]
-        anchor = _anchor(anchor, place, releases[place])
-        creep = _creep(values, usual, anchor, larger_is_better)
-        if creep is not None and not accepted[place]:
-            found.append(Noisy(verdict=creep, state="detected", against=anchor[0], first_bad=anchor[-1]))
-        else:
-            faster = Verdict(word="improved", sentence=_words(change)) if -change > threshold else None
-            same = Verdict(word="same", sentence=f"{_words(change)}, inside the noise")
-            found.append(
-                Noisy(verdict=faster or same, state="recovered" if recovered else "green", against=usual[0])
-            )
-    if found:
-        levels.append(_usual([values[i] for i in usual], larger_is_better))
+    found = [walk.night(place, releases[place], accepted[place]) for place in range(len(values))]
+    levels = [*walk.levels[1:], walk.usual_now()] if found else []
     return [replace(night, usual=after) for night, after in zip(found, levels, strict=True)]
 
 
-def to_be_confirmed(verdict: Verdict) -> Verdict:
-    """A slow night that no second one has confirmed yet is not red."""
-    if not verdict.red:
-        return verdict
-    return replace(
-        verdict, word="same", name="", sentence=f"{verdict.sentence}, to be confirmed by another night"
-    )
+@dataclass
+class _Visited:
+    """A level for the worse that was left again: how often, how far off, and for how long at most."""
+
+    change: float
+    times: int
+    longest: int
 
 
-def only_followed(verdict: Verdict) -> Verdict:
-    """A time read off a ladder is not red: the ladder's errors and its run time are judged themselves.
+@dataclass
+class _Walk:
+    """What is known of a series, night after night."""
 
-    Between two rungs a little noise of time moves it by the order times as much, or by a whole rung.
-    """
-    if not verdict.red:
-        return verdict
-    words = f"{verdict.sentence}; the ladder's errors and its run time decide"
-    return replace(verdict, word="changed", name="", sentence=words)
+    values: Sequence[float]
+    larger_is_better: bool
+    usual: list[int] = field(default_factory=list)  # places of the last nights that hold
+    level_since: list[int] = field(default_factory=list)  # the same, back to where the level began
+    reached: list[float] = field(default_factory=list)  # deviations of nights that hold; worse is positive
+    anchor: list[int] = field(default_factory=list)  # places of the nights at the last release
+    suspects: list[int] = field(default_factory=list)  # unusual nights in a row, not yet or already red
+    gains: list[int] = field(default_factory=list)  # fast nights in a row
+    red_since: int | None = None
+    shifted: tuple[int, float] | None = None  # the place and the size of a shift that is red
+    visited: list[_Visited] = field(default_factory=list)
+    staying: list[int] = field(default_factory=list)  # nights in a row at a level that was visited before
+    levels: list[Usual] = field(default_factory=list)  # before each night
+    _told: tuple[list[int], Usual] | None = None  # what was asked last, of which nights
+    _known_spread: tuple[list[int], tuple[float, float]] | None = None
 
+    def usual_now(self) -> Usual:
+        """The level, and what stands clear of it for the worse."""
+        if self._told is None or self._told[0] is not self.usual:
+            self._told = self.usual, self._clear(nlargest(2, self.reached))
+        return self._told[1]
 
-def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Verdict:
-    """One value against what was usual: red if it stands clear of the noise."""
-    level, threshold = usual
-    change = _worse_by(level, value, larger_is_better)
-    if change > threshold:
-        return _verdict(change, level, value, "slower")
-    if -change > threshold:
-        return Verdict(word="improved", sentence=_words(change))
-    return Verdict(word="same", sentence=f"{_words(change)}, inside the noise (±{100.0 * threshold:.0f} %)")
+    def night(self, place: int, release: bool, accepted: bool) -> Noisy:
+        """The verdict of one more night."""
+        if not self.usual:
+            self.levels.append((self.values[place], FEW_NIGHTS_FLOOR))
+            self._begin(place)
+            return Noisy(verdict=Verdict(word="new", sentence="the first value"), state="green")
+        level, threshold = self.usual_now()
+        self.levels.append((level, threshold))
+        value = self.values[place]
+        change = worse_by(level, value, self.larger_is_better)
+        if not accepted and self._visits(place, change, threshold):
+            words = f"{change_in_words(change)}, at a level that was left again before"
+            return Noisy(verdict=Verdict(word="same", sentence=words), state="green", against=self.usual[-1])
+        if self.shifted is not None and not change > threshold:
+            return self._after_shift(place, change, level, accepted)
+        if self._stands_clear(change, threshold):
+            self.gains = []
+            return self._slow(place, change, level, accepted)
+        return self._holds(place, change, threshold, release, accepted)
 
+    def _stands_clear(self, change: float, threshold: float) -> bool:
+        """Whether a night is beyond what is usual; a red stretch lasts until a night came halfway back."""
+        if self.shifted is not None:
+            return change > threshold
+        if self.red_since is not None:
+            return change > min(threshold, 0.5 * self._size(self.red_since, self.suspects[-1] + 1))
+        return change > threshold and not self._remembers(change)
 
-def _usual(values: Sequence[float], larger_is_better: bool = False) -> Usual:
-    """Level, and the relative change that stands clear of it."""
-    finite = [value for value in values if math.isfinite(value)]
-    if not finite:
-        return math.inf, FLOOR
-    level = median(finite)
-    if len(finite) < FEWEST or level == 0.0:
-        return level, FEW_NIGHTS_FLOOR
-    deviations = sorted(abs(value - level) / abs(level) for value in finite)
-    noise = NORMAL * median(deviations)
-    worse = sorted(_worse_by(level, value, larger_is_better) for value in finite)
-    clear = max(FLOOR, SIGMAS * noise)
-    if len(finite) >= ENOUGH:
-        clear = max(LEAST, min(clear, CLEAR * noise))
-    return level, max(clear, REACH * worse[-2])
+    def _size(self, start: int, end: int) -> float:
+        """How far the nights of a stretch lie off, in the middle."""
+        level, _ = self._spread()
+        return median(worse_by(level, self.values[i], self.larger_is_better) for i in range(start, end))
 
+    def _begin(self, place: int) -> None:
+        """A level that starts here."""
+        self.usual, self.level_since, self.anchor = [place], [place], [place]
+        self.suspects, self.gains, self.red_since, self.shifted = [], [], None, None
+        self.visited, self.staying = [], []
 
-def _worse_by(level: float, value: float, larger_is_better: bool) -> float:
-    """Relative change for the worse; infinite for what is not finite."""
-    if not math.isfinite(value):
-        return math.inf if math.isfinite(level) else 0.0
-    if not math.isfinite(level):
-        return -math.inf
-    if level == 0.0:
-        return 0.0 if value == 0.0 else math.inf
-    change = value / level - 1.0
-    return -change if larger_is_better else change
+    def _slow(self, place: int, change: float, level: float, accepted: bool) -> Noisy:
+        """A night that stands clear of what is usual."""
+        value, against = self.values[place], self.usual[-1]
+        self.suspects.append(place)
+        confirmed = len(self.suspects) > 1 or self.shifted is not None or not math.isfinite(value)
+        verdict = slower(change, level, value, "slower" if confirmed else "")
+        if accepted:
+            self._begin(place)
+            return Noisy(verdict=verdict, state="accepted", against=against)
+        if not confirmed:
+            return Noisy(verdict=verdict, state="suspected", against=against)
+        if self.red_since is None:
+            self.red_since = self.suspects[0]
+        return self._red(verdict)
 
-
-def _anchor(anchor: list[int], place: int, release: bool) -> list[int]:
-    """The nights at the last release: it and the ones after it, until there are enough for a median."""
-    if release and len(anchor) >= CREEP:
-        return [place]
-    return [*anchor, place] if len(anchor) < CREEP else anchor
-
-
-def _creep(
-    values: Sequence[float], usual: Sequence[int], anchor: Sequence[int], larger_is_better: bool
-) -> Verdict | None:
-    """Drift against the last release, where both ends have nights enough."""
-    recent = [values[i] for i in usual[-CREEP:] if math.isfinite(values[i])]
-    old = [values[i] for i in anchor if math.isfinite(values[i])]
-    if len(recent) < CREEP or len(old) < CREEP:
-        return None
-    _, threshold = _usual([values[i] for i in usual], larger_is_better)
-    change = _worse_by(median(old), median(recent), larger_is_better)
-    if change <= threshold:
-        return None
-    return Verdict(
-        word="regressed", sentence=f"{_words(change)}, little by little since the last release", name="drift"
-    )
-
-
-def _verdict(change: float, level: float, value: float, name: str) -> Verdict:
-    if not math.isfinite(value):
-        return Verdict(
-            word="regressed", sentence=f"no finite value any more, {level:g} before", name="not finite"
+    def _red(self, verdict: Verdict) -> Noisy:
+        good = self.usual[-1]
+        return Noisy(
+            verdict=verdict, state="detected", against=good, first_bad=self.red_since, last_good=good
         )
-    if not name:
-        return Verdict(word="same", sentence=f"{_words(change)}, to be confirmed by another night")
-    return Verdict(
-        word="regressed",
-        sentence=_words(change),
-        name=name,
-        decades=math.log10(abs(value / level)) if level else None,
-    )
+
+    def _remembers(self, change: float) -> bool:
+        """Whether nights that remember each other go so far by themselves."""
+        base = self._base()
+        if len(base) < FEWEST_BASE or not math.isfinite(change) or not remembered(base):
+            return False
+        return change * self._spread()[0] <= standard_error(base, 1)
+
+    def _base(self) -> Values:
+        """The values of the present level."""
+        finite = [self.values[i] for i in self.level_since if math.isfinite(self.values[i])]
+        return np.array(finite[-BASE:])
+
+    def _visits(self, place: int, change: float, threshold: float) -> bool:
+        """Whether the night is at a level that the machine went to and left again, and no longer than it does."""
+        known = self._known(change)
+        stays = known is not None and (bool(self.staying) or change > threshold)
+        if known is None or not stays or self.red_since is not None:
+            self.staying = []
+            return False
+        self.staying.append(place)
+        if len(self.staying) <= LONGER * known.longest:
+            return True
+        self.suspects, self.staying = self.staying[:-1], []  # it stays: red since it came
+        self.visited.remove(known)
+        return False
+
+    def _known(self, change: float) -> _Visited | None:
+        """The level so far off that is known as one of the machine's; halfway to it is enough to stay there."""
+        for known in self.visited:
+            if known.times >= VISITS:
+                near = abs(change - known.change) <= self._noise()
+                if near or (self.staying and 0.5 * known.change < change < 1.5 * known.change):
+                    return known
+        return None
+
+    def _noise(self) -> float:
+        """The relative change that may be noise about a level, its clusters apart."""
+        _, deviation = self._spread()
+        return max(LEAST, SIGMAS * deviation)
+
+    def _leave(self, place: int) -> None:
+        """A red stretch that ends by itself is a visit to a level."""
+        assert self.red_since is not None
+        change, nights = self._size(self.red_since, place), place - self.red_since
+        if not math.isfinite(change):
+            return
+        for known in self.visited:
+            if abs(change - known.change) <= self._noise():
+                known.times += 1
+                known.longest = max(known.longest, nights)
+                return
+        self.visited.append(_Visited(change, 1, nights))
+
+    def _after_shift(self, place: int, change: float, level: float, accepted: bool) -> Noisy:
+        """A night not clear of what is usual, while several nights together were: red until they came back."""
+        assert self.shifted is not None
+        since, size = self.shifted
+        verdict = slower(change, level, self.values[place], "slower")
+        if accepted:
+            self._begin(place)
+            return Noisy(verdict=verdict, state="accepted", against=self.usual[-1])
+        last = range(max(since, place - BACK + 1), place + 1)
+        mean = sum(worse_by(level, self.values[i], self.larger_is_better) for i in last) / len(last)
+        if mean > 0.5 * size:
+            return self._red(replace(verdict, sentence=f"{change_in_words(mean)} over the last nights"))
+        self._leave(place)
+        self.shifted, self.red_since, self.suspects, self.gains = None, None, [], []
+        self._join([place])
+        words = f"{change_in_words(change)}, inside the noise"
+        return Noisy(verdict=Verdict(word="same", sentence=words), state="recovered", against=self.usual[0])
+
+    def _holds(self, place: int, change: float, threshold: float, release: bool, accepted: bool) -> Noisy:
+        """A night that is usual, or better."""
+        recovered = self.red_since is not None
+        if recovered:
+            self._leave(place)
+        dismissed = [] if recovered else self.suspects  # what no second night confirmed is noise
+        self.suspects, self.red_since = [], None
+        fast = -change > threshold and -change > self._clear(nlargest(2, [-x for x in self.reached]))[1]
+        self.gains = [*self.gains, place] if fast else []
+        if self.gains and recovered:
+            self.usual, self.level_since = self.usual[-1:], self.usual[-1:]
+        elif len(self.gains) > 1:
+            self.usual, self.level_since = self.gains[:-1], self.gains[:-1]  # two fast nights are a new level
+        self._join([*dismissed, place])
+        if release and len(self.anchor) >= CREEP:
+            self.anchor = [place]
+        elif len(self.anchor) < CREEP:
+            self.anchor = [*self.anchor, place]
+        creep = self._creep()
+        if creep is not None and not accepted:
+            first = self.anchor
+            return Noisy(verdict=creep, state="detected", against=first[0], first_bad=first[-1])
+        if not fast and not accepted and (together := self._shift()) is not None:
+            return together
+        faster = Verdict(word="improved", sentence=change_in_words(change)) if fast else None
+        same = Verdict(word="same", sentence=f"{change_in_words(change)}, inside the noise")
+        state: State = "recovered" if recovered else "green"
+        return Noisy(verdict=faster or same, state=state, against=self.usual[0])
+
+    def _join(self, places: list[int]) -> None:
+        """Nights that hold join what is usual; how far they lay off is remembered."""
+        level, _ = self._spread()
+        if len(self.usual) >= FEWEST:
+            off = [worse_by(level, self.values[i], self.larger_is_better) for i in places]
+            self.reached = [*self.reached, *(x for x in off if math.isfinite(x))][-REACHED:]
+        self.usual = [*self.usual, *places][-WINDOW:]
+        self.level_since = [*self.level_since, *places][-BASE - max(SPANS) :]
+
+    def _shift(self) -> Noisy | None:
+        """Red if the last nights together lie above those of the level before them; they leave what is usual."""
+        level, deviation = self._spread()
+        if not 0.0 < level < math.inf:
+            return None
+        last = self.level_since[-min(SPANS) :]
+        near = sum(worse_by(level, self.values[i], self.larger_is_better) for i in last) / len(last)
+        if near < LEAST or near < deviation:
+            return None  # most nights: nothing to count
+        sign = -1.0 if self.larger_is_better else 1.0
+        values = [sign * self.values[i] for i in self.level_since]
+        found = shift(values)
+        if found is None:
+            return None
+        nights = self.level_since[-found.span :]
+        self.level_since = self.level_since[: -found.span]
+        self.usual = [i for i in self.usual if i not in nights] or self.level_since[-WINDOW:]
+        self.reached = self.reached[: -found.span]
+        if self._known(found.change) is not None:
+            self.staying = nights
+            return None
+        self.red_since, self.shifted = nights[0], (nights[0], found.change)
+        words = f"{change_in_words(found.change)} over {found.span} nights, by chance once in {1.0 / found.probability:.0e}"
+        return self._red(
+            Verdict(word="regressed", sentence=words, name="slower", decades=math.log10(1.0 + found.change))
+        )
+
+    def _spread(self) -> tuple[float, float]:
+        """Level and noise of the nights that are usual."""
+        if self._known_spread is None or self._known_spread[0] is not self.usual:
+            self._known_spread = self.usual, _level_and_noise([self.values[i] for i in self.usual])
+        return self._known_spread[1]
+
+    def _clear(self, outermost: Sequence[float]) -> Usual:
+        """The level, and what stands clear of it on the side where nights that hold have reached so far."""
+        level, noise = self._spread()
+        if not math.isfinite(level):
+            return math.inf, FLOOR
+        count = sum(map(math.isfinite, (self.values[i] for i in self.usual)))
+        if (count < FEWEST and len(self.reached) < FEWEST) or level == 0.0:
+            return level, FEW_NIGHTS_FLOOR
+        clear = max(FLOOR, SIGMAS * noise)
+        if count >= ENOUGH:
+            clear = max(LEAST, min(clear, CLEAR * noise))
+        if len(outermost) < 2:
+            return level, clear
+        return level, max(clear, REACH * (1.0 + UNSEEN / len(self.reached)) * outermost[1])
+
+    def _wanders(self) -> float:
+        """How far the means of two spans of nights may lie apart, a trend of these nights taken out."""
+        base = self._base()
+        if len(base) < FEWEST_BASE:
+            return 0.0
+        nights = np.arange(len(base))
+        level = base - np.polyval(np.polyfit(nights, base, 1), nights)
+        return math.sqrt(2.0) * standard_error(level, CREEP) if remembered(level) else 0.0
+
+    def _creep(self) -> Verdict | None:
+        """Drift against the last release, where both ends have nights enough."""
+        recent = [self.values[i] for i in self.usual[-CREEP:] if math.isfinite(self.values[i])]
+        old = [self.values[i] for i in self.anchor if math.isfinite(self.values[i])]
+        if len(recent) < CREEP or len(old) < CREEP:
+            return None
+        _, threshold = self.usual_now()
+        change = worse_by(median(old), median(recent), self.larger_is_better)
+        if change <= threshold or change * median(old) <= self._wanders():
+            return None
+        words = f"{change_in_words(change)}, little by little since the last release"
+        return Verdict(word="regressed", sentence=words, name="drift")
 
 
-def _words(change: float) -> str:
-    return f"{100.0 * change:+.1f} % for the {'worse' if change > 0.0 else 'better'}"
+def _level_and_noise(values: Sequence[float]) -> tuple[float, float]:
+    """The median, and the relative standard deviation that the median deviation from it tells."""
+    finite = [value for value in values if math.isfinite(value)]
+    level = median(finite) if finite else math.inf
+    if level in (0.0, math.inf):
+        return level, 0.0
+    return level, NORMAL * median([abs(value - level) for value in finite]) / abs(level)

@@ -18,7 +18,8 @@ from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.noise import Usual, judge_noisy, only_followed
+from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.slower import Usual, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class, State

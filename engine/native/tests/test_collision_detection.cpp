@@ -1,4 +1,6 @@
 // Broad phase against brute force; detection's filters, order and keys.
+#include <cmath>
+#include <limits>
 #include <random>
 
 #include "collision/detection.hpp"
@@ -8,8 +10,17 @@ using namespace spook;
 
 namespace {
 
-void sweep_finds_what_brute_force_finds() {
+std::vector<IndexPair> by_brute_force(const std::vector<Bounds>& all) {
+    std::vector<IndexPair> pairs;
+    for (int i = 0; i < static_cast<int>(all.size()); ++i)
+        for (int j = i + 1; j < static_cast<int>(all.size()); ++j)
+            if (overlap(all[i], all[j])) pairs.emplace_back(i, j);
+    return pairs;
+}
+
+void the_grid_finds_what_brute_force_finds() {
     std::mt19937_64 random(3);
+    BroadPhase phase;
     for (const int count : {0, 1, 2, 32, 33, 400}) {
         std::uniform_real_distribution<double> unit(0.0, 1.0);
         std::vector<Bounds> all(count);
@@ -18,13 +29,36 @@ void sweep_finds_what_brute_force_finds() {
             b.high = b.low + Vec3{unit(random), 0.3 * unit(random), 0.3 * unit(random)};
         }
         if (count > 40) all[5] = all[17];  // ties
-        std::vector<IndexPair> reference, found;
-        for (int i = 0; i < count; ++i)
-            for (int j = i + 1; j < count; ++j)
-                if (overlap(all[i], all[j])) reference.emplace_back(i, j);
-        overlapping_pairs(all, found);
-        EXPECT(found == reference);
+        std::vector<IndexPair> found;
+        phase.overlapping_pairs(all, found);
+        EXPECT(found == by_brute_force(all));
         EXPECT(count < 400 || found.size() > 100);
+    }
+}
+
+/// Grains, boulders and ground: twelve orders of size, far from the origin on both sides, points, half-spaces.
+void sizes_and_places_do_not_matter() {
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    BroadPhase phase;
+    for (const Vec3 origin : {Vec3{}, Vec3{-1e7, 3e5, 1e12}, Vec3{1e300, -1e300, 0}}) {
+        std::vector<Bounds> all;
+        for (int k = 0; k < 500; ++k) {
+            const double size = std::pow(10.0, 6.0 * unit(random));
+            const Vec3 centre =
+                origin + (k % 2 ? 1.0 : 30.0) * Vec3{unit(random), unit(random), unit(random)};
+            const Vec3 half = size * Vec3{0.5, 0.5 + 0.4 * unit(random), 0.01};
+            all.push_back({centre - half, centre + half});
+        }
+        all[7].high = all[7].low;
+        all[40] = {{-infinite, -infinite, -infinite}, {infinite, infinite, infinite}};
+        all[41] = {{-infinite, -1, -1}, {infinite, 1, 1}};
+        all[300] = all[40];
+        std::vector<IndexPair> found;
+        phase.overlapping_pairs(all, found);
+        EXPECT(found == by_brute_force(all));
+        EXPECT(found.size() > 1000);
     }
 }
 
@@ -32,7 +66,7 @@ void not_a_number_touches_nothing() {
     std::vector<Bounds> all(40, {{0, 0, 0}, {1, 1, 1}});
     all[3].low.x = all[3].high.x = NAN;
     std::vector<IndexPair> found;
-    overlapping_pairs(all, found);
+    BroadPhase().overlapping_pairs(all, found);
     EXPECT(found.size() == 39u * 38u / 2u);
 }
 
@@ -92,7 +126,8 @@ void keys_last_while_the_touching_features_do() {
 }  // namespace
 
 int main() {
-    sweep_finds_what_brute_force_finds();
+    the_grid_finds_what_brute_force_finds();
+    sizes_and_places_do_not_matter();
     not_a_number_touches_nothing();
     filters_and_order();
     keys_last_while_the_touching_features_do();

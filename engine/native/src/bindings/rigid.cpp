@@ -143,6 +143,7 @@ RigidMethod to_method(const nb::dict& method) {
     options.read_kind("impacts", out.impacts);
     options.read("unsettled_residual", out.unsettled_residual);
     options.read("composition", out.composition);
+    options.read("string_stiffness", out.string_stiffness);
     options.read("half_step_velocities", out.half_step_velocities);
     options.read("corrections", out.corrections);
     options.read("correction_cap", out.correction_cap);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "collision/narrow_phase.hpp"
+#include "collision/sweep.hpp"
 
 namespace spook {
 
@@ -37,6 +38,7 @@ Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
         for (std::size_t j = i + 1; j < colliders_.size() && !possible_; ++j)
             possible_ = may_touch(static_cast<int>(i), static_cast<int>(j));
     poses_.resize(colliders_.size());
+    for (const Collider& c : colliders_) arms_.push_back(turning_arm(c.shape, c.part));
     bounds_.resize(bounded_.size());
 }
 
@@ -52,7 +54,7 @@ bool Detection::may_touch(int i, int j) const noexcept {
     if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;
     if (colliders_[i].shape.kind == ShapeKind::plane && colliders_[j].shape.kind == ShapeKind::plane)
         return false;
-    return !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
+    return excluded_.empty() || !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
 }
 
 void Detection::add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const {
@@ -78,26 +80,31 @@ void Detection::touch(IndexPair pair, const Pose& first, const Pose& second, dou
 
 const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
                                               const std::vector<double>& margin) {
-    near_.clear();
     for (std::size_t k = 0; k < colliders_.size(); ++k)
         poses_[k] = placed(bodies[colliders_[k].body], colliders_[k].part);
     for (std::size_t k = 0; k < bounded_.size(); ++k) {
         const Collider& c = colliders_[bounded_[k]];
         bounds_[k] = bounds(c.shape, poses_[bounded_[k]], margin[c.body]);
     }
-    overlapping_pairs(bounds_, pairs_);
+    broad_phase_.overlapping_pairs(bounds_, pairs_);
+    std::size_t kept = 0;
     for (auto [p, q] : pairs_)
-        if (may_touch(bounded_[p], bounded_[q])) near_.emplace_back(bounded_[p], bounded_[q]);
+        if (may_touch(bounded_[p], bounded_[q])) pairs_[kept++] = {bounded_[p], bounded_[q]};
+    pairs_.resize(kept);
+    on_planes_.clear();
     for (int plane : planes_) {
         const Vec3 normal = poses_[plane].rotation * colliders_[plane].shape.normal;
         for (int k : bounded_) {
-            if (!may_touch(plane, k)) continue;
             const double sum = margin[colliders_[plane].body] + margin[colliders_[k].body];
-            if (dot(normal, poses_[k].position - poses_[plane].position) <= reach(colliders_[k].shape) + sum)
-                near_.emplace_back(std::min(plane, k), std::max(plane, k));
+            if (dot(normal, poses_[k].position - poses_[plane].position) <=
+                    reach(colliders_[k].shape) + sum &&
+                may_touch(plane, k))
+                on_planes_.emplace_back(std::min(plane, k), std::max(plane, k));
         }
     }
-    std::sort(near_.begin(), near_.end());
+    std::sort(on_planes_.begin(), on_planes_.end());
+    near_.resize(pairs_.size() + on_planes_.size());
+    std::merge(pairs_.begin(), pairs_.end(), on_planes_.begin(), on_planes_.end(), near_.begin());
     return near_;
 }
 

@@ -48,6 +48,10 @@ public:
     void touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
                std::vector<Contact>& out) const;
     const Collider& collider(int index) const noexcept { return colliders_[index]; }
+    /// Where a collider stood in the last near(), world axes.
+    const Pose& pose(int index) const noexcept { return poses_[index]; }
+    /// Of a collider, see turning_arm().
+    double arm(int index) const noexcept { return arms_[index]; }
 
     /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.
     const std::vector<double>& radius() const noexcept { return radius_; }
@@ -65,9 +69,11 @@ private:
     std::vector<double> radius_;
     std::vector<int> bounded_, planes_;  // indices into colliders_
     bool possible_ = false;
-    std::vector<Pose> poses_;
+    std::vector<Pose> poses_;  // of colliders
+    std::vector<double> arms_;
     std::vector<Bounds> bounds_;
-    std::vector<IndexPair> pairs_, near_;
+    BroadPhase broad_phase_;
+    std::vector<IndexPair> pairs_, on_planes_, near_;
 };
 
 }  // namespace spook

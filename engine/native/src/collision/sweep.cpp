@@ -93,12 +93,6 @@ Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& p
     }
 }
 
-/// How far from the body's centre its spin can move the surface: a sphere's own turning moves nothing.
-double arm(const Mover& m) noexcept {
-    const double offset = norm(m.part.position);
-    return m.shape.kind == ShapeKind::sphere ? offset : offset + reach(m.shape);
-}
-
 }  // namespace
 
 Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second,
@@ -129,9 +123,15 @@ Pose Mover::body_at(double time) const noexcept {
     return pose;
 }
 
+double turning_arm(const Primitive& shape, const Pose& part) noexcept {
+    const double offset = norm(part.position);
+    return shape.kind == ShapeKind::sphere ? offset : offset + reach(shape);
+}
+
 double first_touch(const Mover& first, const Mover& second, double duration, double slop) noexcept {
     const double far =
         norm(first.body.position - second.body.position) + duration * norm(first.velocity - second.velocity);
+    const auto arm = [](const Mover& m) { return turning_arm(m.shape, m.part); };
     const auto sweep = [&](const Mover& m, const Mover& other) {
         const double rate = norm(m.spin);
         return rate == 0.0 ? 0.0 : rate * (m.shape.kind == ShapeKind::plane ? far + arm(other) : arm(m));

@@ -26,6 +26,9 @@ struct Mover {
     Pose at(double time) const noexcept { return placed(body_at(time), part); }
 };
 
+/// How far from its body's centre a body's spin can move the shape's surface, m: a ball's own turning moves nothing.
+double turning_arm(const Primitive& shape, const Pose& part) noexcept;
+
 /// The first time [s] in 0 … duration at which the shapes overlap by more than `slop` [m], carried back to where
 /// they touch; negative if there is none. Conservative advancement (Mirtich 1996): a direction that separates two
 /// shapes by a gap keeps them apart until their approach along it has used the gap up. Shapes that slide along

@@ -16,6 +16,7 @@ constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
 std::uint64_t pair_of(IndexPair pair) noexcept {
     return (static_cast<std::uint64_t>(pair.first) << 24) | static_cast<std::uint64_t>(pair.second);
 }
+bool round_or_plane(const Primitive& shape) noexcept { return shape.kind != ShapeKind::box; }
 constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
 
 }  // namespace
@@ -72,6 +73,13 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     impact_rounds_ = 0;
 
     set_margins(velocity, free_velocity);
+    search_ = margin_;
+    if (options_.solver == SolverKind::iterative) {  // room for those that are only pushed in this step
+        double squares = 0.0;
+        for (const double margin : margin_) squares += margin * margin;
+        const double room = std::sqrt(squares / static_cast<double>(margin_.size()));
+        for (double& margin : search_) margin += room;
+    }
     find_open();
     predicted_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b)
@@ -97,17 +105,26 @@ void ContactStage::find_open() {
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
     open_.clear();
-    for (const IndexPair& pair : detection_.near(poses_, margin_)) {
+    for (const IndexPair& pair : detection_.near(poses_, search_)) {
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
+        const double reach = search_[first.body] + search_[second.body];
+        OpenPair open{
+            pair, first.body, second.body,
+            separation(first.shape, detection_.pose(pair.first), second.shape, detection_.pose(pair.second))};
+        const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
+        if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
+            if (open.apart.gap <= reach) open_.push_back(open);  // clearly apart: no need for its points
+            continue;
+        }
         scratch_.clear();
-        detection_.touch(pair, margin_[first.body] + margin_[second.body], scratch_);
+        detection_.touch(pair, reach, scratch_);
         const bool touching =
             std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
         // Any two shapes apart give a point, if they are near enough to meet; but not boxes corner to corner.
         const bool boxes = first.shape.kind == ShapeKind::box && second.shape.kind == ShapeKind::box;
         if (!touching) {
-            if (!scratch_.empty() || boxes) open_.push_back(pair);
+            if (!scratch_.empty() || boxes) open_.push_back(open);
             continue;
         }
         for (const Contact& contact : scratch_) {
@@ -132,6 +149,37 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     points_.push_back(point);
 }
 
+/// The overlap at which a pair counts as met. Bodies sunk into a seamless support meet the sides of its next part as
+/// deep as they are sunk; round shapes and planes have no sides.
+double ContactStage::slop(const OpenPair& open) const noexcept {
+    const int a = open.first, b = open.second;
+    const ShapeKind one = detection_.collider(open.pair.first).shape.kind;
+    const ShapeKind two = detection_.collider(open.pair.second).shape.kind;
+    const bool balls = one == ShapeKind::sphere && two == ShapeKind::sphere;
+    const bool sides = !balls && one != ShapeKind::plane && two != ShapeKind::plane;
+    return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
+           (sides ? 2.0 * std::max(depth_[a], depth_[b]) : 0.0);
+}
+
+/// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first
+/// round of first_touch(), without what that needs before.
+bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocity) const {
+    const auto [i, j] = open.pair;
+    const int a = open.first, b = open.second;
+    if (event_time_[a] >= 0.0 || event_time_[b] >= 0.0) return false;
+    double turning = 0.0;
+    for (const int k : {i, j}) {
+        const Vec3 spin = angular(velocity[k == i ? a : b]);
+        if (is_zero(spin)) continue;
+        if (detection_.collider(k).shape.kind == ShapeKind::plane) return false;
+        turning += norm(spin) * detection_.arm(k);
+    }
+    const double slop = this->slop(open);
+    const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
+    return open.apart.gap > -0.5 * slop &&
+           !((std::max(0.0, closing) + turning) * options_.time_step > open.apart.gap + slop);
+}
+
 /// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
 /// for an impact: if they need one, it is the next step's.
 int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
@@ -143,15 +191,15 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
             pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
         return pose;
     };
-    std::erase_if(open_, [&](const IndexPair pair) {
+    std::erase_if(open_, [&](const OpenPair& open) {
+        if (passes(open, velocity)) return false;
+        const IndexPair pair = open.pair;
         const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
         const int a = one.body, b = two.body;
         const Pose at_a = moved(a), at_b = moved(b);
         const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
         const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
-        const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
-        const double time =
-            first_touch(first, second, h, closed * radius + 2.0 * std::max(depth_[a], depth_[b]));
+        const double time = first_touch(first, second, h, slop(open));
         if (time < 0.0) return false;
         const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
         found += met;
@@ -189,40 +237,38 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
 /// taken back half-way between both bodies.
 void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity) {
     const double h = options_.time_step;
-    for (std::size_t k = from; k < points_.size();) {
-        const Point point = points_[k];
+    strikes_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
+    points_.resize(from);
+    for (std::size_t k = 0; k < strikes_.size();) {
+        const Contact meeting = strikes_[k].contact;
+        const double strike = strikes_[k].strike;
         std::size_t end = k;
-        while (end < points_.size() &&
-               (points_[end].contact.key >> feature_bits) == (point.contact.key >> feature_bits))
+        while (end < strikes_.size() &&
+               (strikes_[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
             ++end;
-        if (point.strike < 0.0 || point.event) {
-            k = end;
+        if (strike < 0.0 || strikes_[k].event) {
+            for (; k < end; ++k) points_.push_back(strikes_[k]);
             continue;
         }
-        const Contact& meeting = point.contact;
         const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
                              static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
-        std::vector<Contact> now;
-        detection_.touch(pair, margin_[meeting.first] + margin_[meeting.second], now);
+        scratch_.clear();
+        detection_.touch(pair, search_[meeting.first] + search_[meeting.second], scratch_);
         const std::size_t old = points_.size();
         bool stops = false;
-        for (const Contact& contact : now) {
-            add_point(contact, poses_[contact.first], poses_[contact.second], point.strike);
+        for (const Contact& contact : scratch_) {
+            add_point(contact, poses_[contact.first], poses_[contact.second], strike);
             stops =
                 stops ||
                 contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
         }
         if (stops) {
-            std::rotate(points_.begin() + static_cast<std::ptrdiff_t>(end),
-                        points_.begin() + static_cast<std::ptrdiff_t>(old), points_.end());
-            points_.erase(points_.begin() + static_cast<std::ptrdiff_t>(k),
-                          points_.begin() + static_cast<std::ptrdiff_t>(end));
-            k += now.size();
+            k = end;
             continue;
         }
         points_.resize(old);
         for (; k < end; ++k) {
-            Point& p = points_[k];
+            Point& p = points_.emplace_back(strikes_[k]);
             const Vec3 way = linear(velocity[p.contact.first]) + linear(velocity[p.contact.second]);
             p.contact.point.position -= 0.5 * p.strike * way;
             p.first_arm = p.contact.point.position - poses_[p.contact.first].position;
@@ -252,7 +298,7 @@ void ContactStage::find_events() {
 
     std::vector<std::size_t> members(unknown_.size(), 0);
     std::vector<std::uint64_t> struck(unknown_.size(), 0);  // the pair of the island's strike, plus one
-    std::vector<char> plain(unknown_.size(), 1);
+    std::vector<char> plain(unknown_.size(), 1), bouncy(unknown_.size(), 0);
     std::vector<double> when(unknown_.size(), -1.0);
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0) {
@@ -273,6 +319,21 @@ void ContactStage::find_events() {
         if (struck[island] != 0 && struck[island] != pair) plain[island] = 0;
         struck[island] = pair;
         when[island] = point.strike;
+        bouncy[island] = bouncy[island] || point.material.restitution > 0.0;
+    }
+    // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
+    // others will: bodies led to an event's time would not be where such rows expect them.
+    std::vector<double> speed(unknown_.size(), 0.0);
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        double& fastest = speed[unknown_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
+        fastest = std::max(fastest, norm(linear(predicted_[b])));
+    }
+    const auto island = [&](int b) { return unknown_[b] >= 0 ? root(b) : b; };
+    for (const OpenPair& open : open_) {
+        const int a = island(open.first), b = island(open.second);
+        if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
+        plain[a] = plain[a] && bouncy[a];
+        plain[b] = plain[b] && bouncy[b];
     }
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         if (unknown_[b] < 0) continue;
@@ -300,6 +361,7 @@ void ContactStage::order_points() {
         while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
         if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
         point.before = touches_[old].normal;
+        point.parting_before = touches_[old].parting;
         std::copy_n(touches_[old].tangent, 2, point.tangent_before);
     }
 }

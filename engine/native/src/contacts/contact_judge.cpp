@@ -75,14 +75,18 @@ void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPo
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
     if (report.converged || !report.finite) return;
+    const RowsResidual worst = rows_residual(system, points, options_.friction);
+    const RowBlock& block = system.rows[worst.row];
+    blame(worst.residual, std::max(block.first, block.second));
+}
+
+/// Takes down who is off by more than the method allows.
+void ContactStage::blame(double residual, int unknown) {
     double speed = 0.0;
     for (const Vec6& v : velocity_) speed = std::max(speed, norm(linear(v)));
-    const RowsResidual worst = rows_residual(system, points, options_.friction);
     // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
-    if (!(worst.residual > options_.unsettled_residual + 1e-6 * speed)) return;
-    unsettled_by_ = worst.residual;
-    const RowBlock& block = system.rows[worst.row];
-    const int unknown = std::max(block.first, block.second);
+    if (!(residual > options_.unsettled_residual + 1e-6 * speed)) return;
+    unsettled_by_ = residual;
     unsettled_body_ =
         static_cast<int>(std::find(unknown_.begin(), unknown_.end(), unknown) - unknown_.begin());
 }

@@ -105,27 +105,38 @@ double ContactStage::explained_depth(const Point& point) const noexcept {
     return 2.0 * point.material.compliance * carried + closed * size(point.contact);
 }
 
-/// The resting row of a point; the tangents' bounds are left to the friction law.
-RowBlock ContactStage::resting_row(Point& point) const {
+/// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
+double ContactStage::resting_right(Point& point) const {
     const double h = options_.time_step, gap = point.contact.point.gap;
-    const SurfaceMaterial& material = point.material;
-    const Regularisation row = regularise(material.compliance, material.damping, h);
-    RowBlock block = row_block(point, material.friction > 0.0);
     point.approach = relative(point, point.contact.point.normal, velocity_, false);
     point.push = relative(point, point.contact.point.normal, kick_, false);
     // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
     if (point.approach < -point.rounding) point.approach = 0.0;
     const bool touching = is_closed(point.contact);
     if (point.event)  // another point of a pair that meets may still be open
-        block.right[0] -= touching ? 0.0 : gap / time_left(point);
-    else
-        block.right[0] += !touching ? -gap / h
-                                    : -row.violation_gain * std::max(gap, -explained_depth(point)) +
-                                          row.upsilon * point.approach;
-    block.softness[0] = row.softness;
-    const bool pressed = point.before > 0.0 || point.strike >= 0.0 ||
-                         (point.before < 0.0 && (touching || gap + h * (point.approach + point.push) < 0.0));
-    block.state[0] = pressed ? RowState::free : RowState::at_lower;
+        return -(touching ? 0.0 : gap / time_left(point));
+    const Regularisation row = regularise(point.material.compliance, point.material.damping, h);
+    return !touching
+               ? -gap / h
+               : -row.violation_gain * std::max(gap, -explained_depth(point)) + row.upsilon * point.approach;
+}
+
+/// Whether a point is likely to push: what a solver starts from.
+bool ContactStage::is_pressed(const Point& point) const noexcept {
+    const double h = options_.time_step, gap = point.contact.point.gap;
+    return point.before > 0.0 || point.strike >= 0.0 ||
+           (point.before < 0.0 &&
+            (is_closed(point.contact) || gap + h * (point.approach + point.push) < 0.0));
+}
+
+/// The resting row of a point; the tangents' bounds are left to the friction law.
+RowBlock ContactStage::resting_row(Point& point) const {
+    const double h = options_.time_step;
+    const SurfaceMaterial& material = point.material;
+    RowBlock block = row_block(point, material.friction > 0.0);
+    block.right[0] += resting_right(point);
+    block.softness[0] = regularise(material.compliance, material.damping, h).softness;
+    block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
     block.multiplier[0] = std::max(0.0, point.before);
     if (block.size == 3) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
@@ -137,6 +148,7 @@ RowBlock ContactStage::resting_row(Point& point) const {
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
+    if (options_.solver == SolverKind::iterative) return solve_by_sweeps(system);
     std::vector<FrictionPoint> friction;
     std::vector<Vec6> next;
     FrictionReport report;
@@ -166,30 +178,34 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     }
     judge(system, friction, report);
 
-    touches_.assign(points_.size(), {});
+    touches_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const RowBlock& block = system.rows[joints + k];
-        const Point& point = points_[k];
-        const Vec3 normal = point.contact.point.normal;
-        Touch& touch = touches_[k];
-        touch.contact = point.contact;
-        touch.normal = block.multiplier[0];
-        touch.impact = point.impact;
         Vec3 along;
         for (int i = 1; i < block.size;
              ++i)  // the solver may have turned the tangents: read them from the rows
             along += block.multiplier[i] *
                      (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
-        touch.impulse = touch.normal * normal + along + point.impact_impulse;
-        touch.tangent[0] = dot(along, point.tangent);
-        touch.tangent[1] = dot(along, cross(normal, point.tangent));
-        touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
+        record(points_[k], block.multiplier[0], along);
     }
     if (report.finite) {
         part_overlaps(system, joints);
         correct_events(system);
     }
     return report.finite;
+}
+
+/// Takes down what a point did: its normal impulse, and that along the surface.
+void ContactStage::record(const Point& point, double normal, Vec3 along) {
+    Touch& touch = touches_.emplace_back();
+    const Vec3 n = point.contact.point.normal;
+    touch.contact = point.contact;
+    touch.normal = normal;
+    touch.impact = point.impact;
+    touch.impulse = normal * n + along + point.impact_impulse;
+    touch.tangent[0] = dot(along, point.tangent);
+    touch.tangent[1] = dot(along, cross(n, point.tangent));
+    touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
 }
 
 void ContactStage::mark_held(const MixedSystem& system) {
@@ -209,15 +225,17 @@ void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
     }
 }
 
-/// Whether some body goes further than the search for pairs allowed for; if so, the margins are widened.
+/// Whether some body goes further than the search for pairs allowed for; if so, the search is widened.
 bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
     before_ = margin_;
     set_margins(velocity, velocity);
     bool faster = false;
     for (std::size_t b = 0; b < margin_.size(); ++b) {
-        faster = faster || margin_[b] > before_[b] * (1.0 + 1e-9);
+        faster = faster || margin_[b] > search_[b] * (1.0 + 1e-9);
         margin_[b] = std::max(margin_[b], before_[b]);
     }
+    if (faster)
+        for (std::size_t b = 0; b < margin_.size(); ++b) search_[b] = std::max(search_[b], margin_[b]);
     return faster;
 }
 
@@ -233,11 +251,15 @@ void ContactStage::correct_events(const MixedSystem& system) {
     }
 }
 
+/// Whether two bodies overlap by more than their contact's compliance explains.
+bool ContactStage::some_overlap() const {
+    return std::any_of(points_.begin(), points_.end(), [this](const Point& point) {
+        return point.contact.point.gap < -explained_depth(point);
+    });
+}
+
 void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) {
-    bool overlap = false;
-    for (std::size_t k = 0; k < points_.size() && !overlap; ++k)
-        overlap = points_[k].contact.point.gap < -explained_depth(points_[k]);
-    if (!overlap) return;
+    if (!some_overlap()) return;
     ++counters_.corrections;
     const double h = options_.time_step;
     MixedSystem parting;

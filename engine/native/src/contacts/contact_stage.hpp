@@ -8,7 +8,8 @@
 //                    −(4/h) Ups g + Ups C v   for a closed gap (the SPOOK row; without Ups C v if it is hit: a
 //                                             plastic impact, with friction), and
 //                    −g/h                     for an open one: it may close, no more;
-//                  then pairs that touch only because of these impulses are looked for, and all is solved again;
+//                  then pairs that touch only because of these impulses are looked for, and all is solved again
+//                  (the iterative solver looks between its sweeps, and gives them rows in the same solve);
 //   4. correction  an extra displacement velocity that parts overlapping bodies and leaves no trace in v.
 //
 // What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
@@ -41,8 +42,10 @@
 #include <vector>
 
 #include "collision/detection.hpp"
+#include "collision/sweep.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_material.hpp"
+#include "contacts/contact_sweeps.hpp"
 #include "contacts/friction_direct.hpp"
 #include "contacts/friction_sweeps.hpp"
 #include "run/named_enum.hpp"
@@ -119,6 +122,7 @@ public:
         double normal = 0.0;             // nu of the resting stage, N s
         double impact = 0.0;             // normal impulse of the impact, N s
         double tangent[2] = {0.0, 0.0};  // of the resting stage along world tangents, for a warm start
+        double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
         bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
@@ -160,8 +164,14 @@ private:
         double rounding = 0.0;       // approaches slower than this are none, m/s
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0};
+        double parting_before = 0.0;
         double impact = 0.0;
         Vec3 impact_impulse;
+    };
+    struct OpenPair {  // apart at the start of the step; they may still meet
+        IndexPair pair;
+        int first, second;  // bodies
+        Separation apart;
     };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void find_open();
@@ -184,9 +194,21 @@ private:
     void mark_held(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
     bool outrun(const std::vector<Vec6>& velocity);
+    double slop(const OpenPair& open) const noexcept;
+    bool passes(const OpenPair& open, const std::vector<Vec6>& velocity) const;
+    double resting_right(Point& point) const;
+    bool is_pressed(const Point& point) const noexcept;
     RowBlock resting_row(Point& point) const;
+    void record(const Point& point, double normal, Vec3 along);
+    // contact_iterative.cpp: the same by sweeps over compact contacts
+    bool solve_by_sweeps(MixedSystem& system);
+    bool find_more();
+    void hand_over();
+    void part_by_sweeps(const MixedSystem& system);
+    bool some_overlap() const;
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
+    void blame(double residual, int unknown);
     void correct_events(const MixedSystem& system);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
     double time_left(const Point& point) const noexcept;
@@ -202,20 +224,24 @@ private:
     std::vector<char> jointed_;  // bodies with rows of joints
     std::vector<char> ball_;     // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
+    ContactSweeps sweeps_, parting_sweeps_;
+    MixedSystem parting_;
+    std::vector<Vec6> next_;  // velocities between sweeps, per body of the scene
+    std::size_t handed_over_ = 0;
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
-    std::vector<IndexPair> open_;                    // pairs that may still meet in this step
-    std::vector<char> supported_;                    // bodies with a closed contact
-    std::vector<double> depth_;                      // of a body's closed contacts, m
+    std::vector<OpenPair> open_;
+    std::vector<char> supported_;  // bodies with a closed contact
+    std::vector<double> depth_;    // of a body's closed contacts, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
     std::vector<double> lead_, event_time_;
-    std::vector<Point> points_;
-    std::vector<Touch> touches_;  // of the last step until the end of solve()
-    std::vector<double> margin_, before_;
-    std::vector<char> held_;        // moving bodies with rows, by unknown
+    std::vector<Point> points_, strikes_;
+    std::vector<Touch> touches_;                    // of the last step until the end of solve()
+    std::vector<double> margin_, search_, before_;  // where bodies may get, and where they are looked for, m
+    std::vector<char> held_;                        // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;

@@ -94,9 +94,11 @@ private:
             if (gone_[other] || !is_constraint_[other] || sizes_[other] <= sizes_[block]) continue;
             if (sizes_[other] > budget || sizes_[other] <= budget - sizes_[block]) continue;
             std::int64_t dragged = 0;
-            for (int third : neighbours_[other])
-                if (!gone_[third] && is_constraint_[third] && (dragged += sizes_[third]) > kDraggedRows)
-                    break;
+            for (int third : neighbours_[other]) {
+                if (gone_[third] || !is_constraint_[third]) continue;
+                dragged += sizes_[third];
+                if (dragged > kDraggedRows) break;
+            }
             if (dragged <= kDraggedRows) worst = std::max<std::int64_t>(worst, sizes_[other]);
         }
         return worst;

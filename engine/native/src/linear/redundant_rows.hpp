@@ -18,12 +18,19 @@ class RedundantRows {
 public:
     void prepare(const BlockLdlt& matrix) { left_.assign(static_cast<std::size_t>(matrix.unknowns()), 0.0); }
     /// As if no redundant row had been met yet.
-    void reset(BlockLdlt& matrix) { restore(matrix, 0.0); }
-    double share() const noexcept { return share_; }
-    void restore(BlockLdlt& matrix, double share) {
-        share_ = share;
-        matrix.shift_constraints(std::max(0.0, share));
+    void reset(BlockLdlt& matrix) { restore(matrix, {}); }
+    /// What is kept from step to step.
+    struct Memory {
+        double share = 0.0;   // the softness, 1/kg; −1: rows cannot share their load
+        bool shared = false;  // they did, before
+    };
+    const Memory& memory() const noexcept { return memory_; }
+    void restore(BlockLdlt& matrix, const Memory& memory) {
+        memory_ = memory;
+        matrix.shift_constraints(std::max(0.0, memory.share));
     }
+    /// Rows that were redundant and shared their load are independent of the others by now: they say other things.
+    bool parted() const noexcept { return finite_ && !floored_ && memory_.shared && memory_.share < 0.0; }
 
     /// False when a value was not finite: nothing the factor gives may be used.
     bool factor(BlockLdlt& matrix, double floor) {
@@ -39,14 +46,14 @@ public:
     template <class Settled>
     bool solve(BlockLdlt& matrix, double floor, const double* rhs, double* x, int refinements,
                Settled settled) {
-        if (floored_ && share_ == 0.0) {
-            share_ = 1e-7 * matrix.largest_constraint_scale();
-            matrix.shift_constraints(share_);
+        if (floored_ && memory_.share == 0.0) {
+            memory_.share = 1e-7 * matrix.largest_constraint_scale();
+            matrix.shift_constraints(memory_.share);
             factor(matrix, floor);
         }
-        if (share_ > 0.0) {
+        if (memory_.share > 0.0) {
             if (finite_ && shares(matrix, rhs, x, std::max(2, refinements), settled)) return false;
-            share_ = -1.0;
+            memory_.share = -1.0;
             matrix.shift_constraints(0.0);
             factor(matrix, floor);
         }
@@ -58,14 +65,14 @@ public:
     template <class Settled>
     bool factor_and_solve(BlockLdlt& matrix, double floor, const double* rhs, double* x, int refinements,
                           Settled settled) {
-        if (share_ > 0.0) {
+        if (memory_.share > 0.0) {
             factor(matrix, floor);
             return solve(matrix, floor, rhs, x, refinements, settled);
         }
         const std::uint64_t before = matrix.counters().floored_pivots;
         finite_ = matrix.factor_and_solve(floor, rhs, x, refinements);
         floored_ = finite_ && matrix.counters().floored_pivots != before;
-        if (!floored_ || share_ < 0.0) return floored_;
+        if (!floored_ || memory_.share < 0.0) return floored_;
         return solve(matrix, floor, rhs, x, refinements, settled);
     }
 
@@ -80,14 +87,14 @@ private:
     bool shares(BlockLdlt& matrix, const double* rhs, double* x, int refinements, Settled settled) {
         matrix.solve_refined(rhs, x, refinements);
         for (int round = 0;; ++round) {
-            if (settled(residual(matrix, rhs, x))) return true;
+            if (settled(residual(matrix, rhs, x))) return memory_.shared = true;
             if (round == 6) return false;
             matrix.solve(left_.data());
             for (std::size_t i = 0; i < left_.size(); ++i) x[i] += left_[i];
         }
     }
 
-    double share_ = 0.0;  // the softness, 1/kg; −1: rows cannot share their load
+    Memory memory_;
     bool floored_ = false, finite_ = true;
     std::vector<double> left_;
 };

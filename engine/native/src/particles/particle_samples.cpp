@@ -48,7 +48,7 @@ void ParticleSystem::save() {
     for (std::size_t k = 0; k < rows_.size(); ++k) saved_.lambda[k] = rows_.link[k].lambda;
     saved_.velocity_ready = velocity_ready_;
     saved_.sweeps = parts_.sweeps.work;
-    saved_.share = parts_.saddle.share();
+    saved_.redundancy = parts_.saddle.memory();
     if (composition_) composition_->save();
 }
 
@@ -58,7 +58,7 @@ void ParticleSystem::restore() {
     for (std::size_t k = 0; k < rows_.size(); ++k) rows_.link[k].lambda = saved_.lambda[k];
     velocity_ready_ = saved_.velocity_ready;
     parts_.sweeps.work = saved_.sweeps;
-    parts_.saddle.restore(saved_.share);
+    parts_.saddle.restore(saved_.redundancy);
     if (composition_) composition_->restore();
 }
 

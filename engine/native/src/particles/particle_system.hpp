@@ -100,7 +100,7 @@ private:
         std::vector<double> lambda;
         bool velocity_ready = false;
         RowSweeps::Work sweeps;
-        double share = 0.0;
+        RedundantRows::Memory redundancy;
     } saved_;
     StageClock* clock_ = nullptr;
 };

@@ -46,10 +46,10 @@ public:
         redundant_.reset(ldlt_);
         count_from_here();
     }
-    double share() const noexcept { return redundant_.share(); }
-    void restore(double share) {
+    const RedundantRows::Memory& memory() const noexcept { return redundant_.memory(); }
+    void restore(const RedundantRows::Memory& memory) {
         contradicted_ = -1;
-        redundant_.restore(ldlt_, share);
+        redundant_.restore(ldlt_, memory);
     }
     void count_from_here() noexcept { operations_before_ = ldlt_.counters().block_operations; }
     std::int64_t operations() const noexcept {

@@ -52,6 +52,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             }
             if (spec.has_spring) {
                 axial.spring_rest = spec.spring_rest;
+                axial.spring_stiffness = spec.spring_stiffness;
                 axial.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
                 block.softness[block.size++] = axial.spring.softness;
             }
@@ -165,6 +166,17 @@ double JointSet::coordinate(int index, std::span<const BodyState> bodies) const 
     const Joint& joint = joints_[index];
     const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
     return joint.tracked ? unwrapped(joint, row.coordinate, states[index].angle) : row.coordinate;
+}
+
+double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept {
+    double sum = 0.0;
+    for (int joint = 0; joint < count(); ++joint) {
+        const int axial = joints_[joint].axial;
+        if (axial < 0 || !axials_[axial].has_spring) continue;
+        const double turned = coordinate(joint, bodies) - axials_[axial].spring_rest;
+        sum += 0.5 * axials_[axial].spring_stiffness * turned * turned;
+    }
+    return sum;
 }
 
 }  // namespace spook

@@ -68,7 +68,16 @@ public:
     /// Free coordinate of a hinge (unwrapped) or prismatic joint.
     double coordinate(int joint, std::span<const BodyState> bodies) const noexcept;
     /// From now on the turns of this hinge are counted.
-    void track(int joint) noexcept { joints_[joint].tracked = true; }
+    void track(int joint) noexcept {
+        joints_[joint].tracked = true;
+        if (joints_[joint].axial < 0) followed_.push_back(joint);
+    }
+    /// Counts the turns of tracked hinges that no drive follows anyway; after every step.
+    void follow(std::span<const BodyState> bodies) noexcept {
+        for (const int joint : followed_) states[joint].angle = coordinate(joint, bodies);
+    }
+    /// Energy of the springs of free coordinates [J].
+    double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
     LargeArray<State> states;
 
@@ -84,7 +93,7 @@ private:
     struct Axial {
         bool has_motor = false, has_limit = false, has_spring = false;
         double speed = 0.0, impulse = 0.0;
-        double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0;
+        double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0, spring_stiffness = 0.0;
         Regularisation limit, spring;
     };
 
@@ -99,6 +108,7 @@ private:
     BodyState world_;
     LargeArray<Joint> joints_;
     std::vector<Axial> axials_;
+    std::vector<int> followed_;
     LargeArray<JointBlock> blocks_;
 };
 

@@ -9,7 +9,7 @@
 // add the static stretch eps F.
 //
 // Λ is found by iteration with the matrix at the start of the stage, which contracts by about the angle turned in
-// it, from forces extrapolated from the same stage of the steps before.
+// it, accelerated, from forces extrapolated from the same stage of the steps before.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -23,6 +23,10 @@ namespace {
 
 constexpr double SETTLED = 2e-15;  // of the joint's size: rounding level
 constexpr int MOST_ITERATIONS = 30;
+constexpr int MIXED = 6;           // rounds that are remembered
+constexpr double SINGULAR = 1e-4;  // of its scale: pivots below it belong to rows that become redundant
+constexpr double NEAR =
+    1e-11;  // of the joint's size: what rounds show below it is the rounding of redundant rows
 constexpr double FARTHEST = 0.3;  // of the joint's size, at the prediction: beyond it lie other solutions
 
 }  // namespace
@@ -34,6 +38,8 @@ void RigidSystem::start_composition() {
     violation_.assign(rows, 0.0);
     bias_.assign(rows, 0.0);
     multiplier_.assign(rows, 0.0);
+    change_ = last_plain_ = last_step_ = multiplier_;
+    mixing_.assign(2 * rows * MIXED, 0.0);
     if (solver_ != RigidSolver::block) return;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i) matrix_.diagonal(k)[i] = -0.0;
@@ -41,7 +47,10 @@ void RigidSystem::start_composition() {
 
 void RigidSystem::compose(std::int64_t steps) {
     if (clock_) clock_->start();
-    for (; steps > 0; --steps) composed_step(h_, 0);
+    for (; steps > 0; --steps) {
+        composed_step(h_, 0);
+        joints_.follow(live_.bodies);
+    }
 }
 
 /// One step of length h. Where the equations have no solution near, the step is taken back and done in two halves,
@@ -123,6 +132,76 @@ double RigidSystem::violations_ahead(double tau) {
     return worst;
 }
 
+/// Anderson's mixing (J. ACM 12 (1965) 547): takes out of the step bias_ what the rounds before this one have shown of
+/// the difference between the matrix at the start of the stage and the true derivative. `kept` pairs are remembered.
+void RigidSystem::mix(int iteration, int& kept) {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    if (iteration > 0 && kept < MIXED) {
+        // One more pair: how the plain step changed (made orthonormal) when Λ went on by so much.
+        double* turned = mixing_.data() + 2 * rows * static_cast<std::size_t>(kept);
+        double* moved = turned + rows;
+        for (std::size_t row = 0; row < rows; ++row) {
+            turned[row] = bias_[row] - last_plain_[row];
+            moved[row] = last_step_[row] + turned[row];
+        }
+        double all = 0.0, left = 0.0;
+        for (std::size_t row = 0; row < rows; ++row) all += turned[row] * turned[row];
+        for (int k = 0; k < kept; ++k) {
+            const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
+            double share = 0.0;
+            for (std::size_t row = 0; row < rows; ++row) share += q[row] * turned[row];
+            for (std::size_t row = 0; row < 2 * rows; ++row) turned[row] -= share * q[row];
+        }
+        for (std::size_t row = 0; row < rows; ++row) left += turned[row] * turned[row];
+        if (left > 1e-8 * all) {
+            const double scale = 1.0 / std::sqrt(left);
+            for (std::size_t row = 0; row < 2 * rows; ++row) turned[row] *= scale;
+            ++kept;
+        }
+    }
+    std::copy(bias_.begin(), bias_.end(), last_plain_.begin());
+    for (int k = 0; k < kept; ++k) {
+        const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
+        double share = 0.0;
+        for (std::size_t row = 0; row < rows; ++row) share += q[row] * last_plain_[row];
+        for (std::size_t row = 0; row < rows; ++row) bias_[row] -= share * q[rows + row];
+    }
+}
+
+/// Iterates Λ until the rows hold where the momenta lead in τ, each round with the matrix at the start of the stage.
+/// change_: what Λ has gained. False if it does not come near.
+bool RigidSystem::hold_rows(double tau, double floor) {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    change_.assign(rows, 0.0);
+    if (!matrix_.factor(floor)) return false;
+    double before = std::numeric_limits<double>::infinity();
+    int kept = 0;
+    bool plain = false;
+    for (int iteration = 0;; ++iteration) {
+        const double off = violations_ahead(tau), ratio = off / before;
+        ++live_.newton_iterations;
+        if (off <= SETTLED) return true;
+        if (off < 1e-12 &&
+            ratio > 0.5) {  // down in the rounding, which mixing of redundant rows makes larger
+            if (plain) return true;
+            plain = true;
+        }
+        if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
+        std::fill(solution_.begin(), solution_.end(), 0.0);
+        for (std::size_t row = 0; row < rows; ++row) solution_[row] = -violation_[row] / tau;
+        matrix_.solve(solution_.data());
+        for (std::size_t row = 0; row < rows; ++row) bias_[row] = -solution_[row];
+        if (!plain) mix(iteration, kept);
+        std::copy(bias_.begin(), bias_.end(), last_step_.begin());
+        for (std::size_t row = 0; row < rows; ++row) {
+            multiplier_[row] += bias_[row];
+            change_[row] += bias_[row];
+        }
+        push(bias_.data());
+        before = off;
+    }
+}
+
 /// `history` holds this stage's forces one, two and three steps ago. False if no solution was found.
 bool RigidSystem::composed_stage(double tau, double* history) {
     const std::size_t rows = static_cast<std::size_t>(rows_);
@@ -140,22 +219,13 @@ bool RigidSystem::composed_stage(double tau, double* history) {
             multiplier_[row] = span * (a1 * one[row] + a2 * two[row] + a3 * three[row]);
         push(multiplier_.data());
         if (clock_) clock_->mark(Stage::assemble_rows);
-        if (!matrix_.factor(method_.floor)) return false;
-        double before = std::numeric_limits<double>::infinity();
-        for (int iteration = 0;; ++iteration) {
-            const double off = violations_ahead(tau), ratio = off / before;
-            ++live_.newton_iterations;
-            if (off <= SETTLED || (off < 1e-12 && ratio > 0.5)) break;  // settled, or down in the rounding
-            if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
-            std::fill(solution_.begin(), solution_.end(), 0.0);
-            for (std::size_t row = 0; row < rows; ++row) solution_[row] = -violation_[row] / tau;
-            matrix_.solve(solution_.data());
-            for (std::size_t row = 0; row < rows; ++row) {
-                bias_[row] = -solution_[row];
-                multiplier_[row] += bias_[row];
-            }
+        if (!hold_rows(tau, method_.floor)) {
+            // Near a singular position the chord along the rows that become redundant points the wrong way:
+            // again from the same momenta, with little trust in those rows.
+            for (std::size_t row = 0; row < rows; ++row) bias_[row] = -change_[row];
             push(bias_.data());
-            before = off;
+            for (std::size_t row = 0; row < rows; ++row) multiplier_[row] += bias_[row];
+            if (!hold_rows(tau, SINGULAR)) return false;
         }
         for (std::size_t row = 0; row < rows; ++row) {
             three[row] = two[row];

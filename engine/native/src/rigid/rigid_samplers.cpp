@@ -26,6 +26,12 @@ Sampler joint_sampler(const RigidSystem* s, int joint, bool force) {
     return {s->joints().rows(joint), [=](double* out) { s->violation(joint, out); }};
 }
 
+/// From the centre of mass to a point given in body axes, world axes.
+Vec3 arm(const RigidSystem& system, int body, Vec3 point) {
+    if (point.x == 0.0 && point.y == 0.0 && point.z == 0.0) return {};
+    return axes(system.constants(body), system.state(body)) * point;
+}
+
 Sampler momentum_sampler(const RigidSystem* s, bool angular, Vec3 about) {
     return {3, [=](double* out) {
                 Vec3 sum;
@@ -58,9 +64,13 @@ Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
     const int index = request.index, other = request.other, count = system.bodies();
     switch (from_text<Quantity>(request.kind, "quantity")) {
         case Quantity::position:
-            return one_or_all(index, count, 3, [s](int i, double* out) { put(out, s->position_of(i)); });
+            return one_or_all(index, count, 3, [s, point = request.point](int i, double* out) {
+                put(out, s->position_of(i) + arm(*s, i, point));
+            });
         case Quantity::velocity:
-            return one_or_all(index, count, 3, [s](int i, double* out) { put(out, s->state(i).velocity); });
+            return one_or_all(index, count, 3, [s, point = request.point](int i, double* out) {
+                put(out, s->state(i).velocity + cross(s->state(i).angular_velocity, arm(*s, i, point)));
+            });
         case Quantity::angular_velocity:
             return one_or_all(index, count, 3,
                               [s](int i, double* out) { put(out, s->state(i).angular_velocity); });

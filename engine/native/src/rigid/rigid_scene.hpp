@@ -75,6 +75,7 @@ struct RigidMethod {
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;    // m/s
     int composition = 2;                // order; above 2 a symmetric composition of constrained steps
+    bool string_stiffness = false;      // the geometric stiffness of loaded joints, implicitly
     bool half_step_velocities = false;  // velocities live at mid-step
     int corrections = 0;                // extra solves per step for the curvature of the rows
     double correction_cap = 0.3;        // of the joint's arms, or rad

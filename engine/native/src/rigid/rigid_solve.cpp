@@ -88,25 +88,29 @@ void RigidSystem::fill_inertias() {
         const BodyState& s = live_.bodies[tied_[k]];
         double* diagonal = matrix_.diagonal(row_blocks + static_cast<int>(k)) + 21;
         for (int row = 0; row < 3; ++row) std::copy_n(s.inertia.m + 3 * row, 3, diagonal + 6 * row);
+        for (int i = 0; stiff_ && i < 9; ++i) diagonal[6 * (i / 3) + i % 3] += stiffness_[k].m[i];
     }
 }
 
 void RigidSystem::fill_block_momenta() {
     double* right = right_.data() + rows_;
-    for (int i : tied_) {
+    for (std::size_t k = 0; k < tied_.size(); ++k) {
+        const int i = tied_[k];
         const BodyConstants& body = constants_[i];
         const BodyState& s = live_.bodies[i];
         const Vec3 p = body.mass * (s.velocity + kick(i));
         right[0] = p.x, right[1] = p.y, right[2] = p.z;
         right += 3;
         if (body.particle) continue;
-        const Vec3 l = s.angular_momentum + h_ * body.torque;
+        Vec3 l = s.angular_momentum + h_ * body.torque;
+        if (stiff_) l += stiffness_[k] * s.angular_velocity;
         right[0] = l.x, right[1] = l.y, right[2] = l.z;
         right += 3;
     }
 }
 
 void RigidSystem::solve_block() {
+    if (stiff_) stiffen();
     assemble_blocks();
     fill_inertias();
     fill_block_momenta();
@@ -118,6 +122,7 @@ void RigidSystem::solve_block() {
         return;
     }
     if (method_.corrections > 0) correct_curvature();
+    if (stiff_) keep_angular_momentum();
     take_block_solution();
     if (clock_) clock_->mark(Stage::solve_block);
 }
@@ -149,6 +154,8 @@ bool RigidSystem::factor_and_solve() {
         matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
         [this](std::span<const double> left) { return settled(left); });
     if (redundant_.finite() && doubtful) find_contradiction();
+    if (redundant_.parted() && method_.corrections == 0 && !composed_)
+        live_.locked = body_of(busiest_block());
     return redundant_.finite();
 }
 
@@ -183,9 +190,22 @@ void RigidSystem::find_contradiction() {
     // hold together keep one of the size of the speeds they ask for.
     const Worst worst = worst_row(redundant_.residual(matrix_, right_.data(), solution_.data()));
     if (worst.residual <= 1e-3 * worst.speed) return;
-    const JointBlock& block = joints_.blocks()[worst.block];
-    const bool second = block.second >= 0 && constants_[block.second].moves();
-    live_.contradicted = second ? block.second : block.first;
+    live_.contradicted = body_of(worst.block);
+}
+
+int RigidSystem::body_of(int row_block) const noexcept {
+    const JointBlock& block = joints_.blocks()[row_block];
+    return block.second >= 0 && constants_[block.second].moves() ? block.second : block.first;
+}
+
+/// The block that carries the largest force: of rows that contradict each other, one of those.
+int RigidSystem::busiest_block() const noexcept {
+    int worst = 0, row = 0;
+    double largest = -1.0;
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row)
+            if (std::abs(solution_[row]) > largest) largest = std::abs(solution_[row]), worst = k;
+    return worst;
 }
 
 void RigidSystem::fill_rows() {

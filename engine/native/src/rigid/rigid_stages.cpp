@@ -45,7 +45,7 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
     const bool rows = is.joints || is.contacts, direct = method.solver != SolverKind::iterative;
     const bool pivots = direct && (is.contacts || (is.joints && is.bounded));
     const std::string no_rows = "no joints and no contacts, so nothing to solve";
-    const std::string particles_only = "rigid scenes do not have it", forced = "forced by the method";
+    const std::string forced = "forced by the method";
     const std::string asks_iterative = "the method asks for the iterative solver";
     const std::string no_contact = !scene.contacts ? "the scene switches contacts off"
                                    : is.with_surface < 2
@@ -97,7 +97,10 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                  : no_rows);
             case Stage::friction:
                 return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
-            case Stage::string_stiffness: return leave_out(particles_only);
+            case Stage::string_stiffness:
+                return choose_if(method.string_stiffness && is.joints,
+                                 "the method treats the geometric stiffness of loaded joints implicitly",
+                                 is.joints ? "the method does not ask for it" : no_rows);
             case Stage::correct_curvature:
                 return choose_if(
                     is.joints && (composed || method.corrections > 0),

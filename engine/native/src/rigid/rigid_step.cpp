@@ -34,7 +34,9 @@ void RigidSystem::step() {
     if (clock_) clock_->start();
     if (!live_.velocity_ready) velocity_stage();
     live_.velocity_ready = false;
+    if (replaying_ && early_joints_.empty()) early_joints_ = joints_.states;
     integrate_all();
+    joints_.follow(live_.bodies);
 }
 
 void RigidSystem::velocity_stage() {

@@ -80,6 +80,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     }
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
+    stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
     if (solver_ == RigidSolver::block) analyse_block();
     reset(nullptr);
 }
@@ -106,6 +107,7 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     stages_.take(Stage::apply_loads);
     if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
     if (stages_.take(Stage::apply_springs)) springs_ = scene.springs;
+    stages_.take(Stage::string_stiffness);
     stages_.take(Stage::half_step);
     stages_.take(Stage::correct_curvature);
     stages_.take(Stage::integrate_positions);
@@ -117,6 +119,8 @@ void RigidSystem::take_stages(const RigidScene& scene) {
 void RigidSystem::reset(StageClock* clock) {
     live_ = {};
     tied_are_moved_ = false;
+    replaying_ = false;
+    early_joints_.clear();
     live_.bodies = start_;
     redundant_.reset(matrix_);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
@@ -132,6 +136,7 @@ void RigidSystem::reset(StageClock* clock) {
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
     if (composed_) start_composition();
+    if (stiff_) find_tensions();
     if (half_step_ || method_.corrections > 0) start_half_step();
     if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
     mixed_.mass.assign(tied_.size(), Mat6{});
@@ -175,9 +180,11 @@ void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
 }
 
 Health RigidSystem::health() const {
-    if (live_.too_fast >= 0)
+    if (live_.too_fast >= 0) {
+        const char* tension = cause();
         return {Status::diverged, live_.too_fast,
-                "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+                *tension ? tension : "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+    }
     if (live_.lost >= 0)
         return {
             Status::diverged, live_.lost,
@@ -186,14 +193,19 @@ Health RigidSystem::health() const {
     if (live_.contradicted >= 0)
         return {Status::diverged, live_.contradicted,
                 "is held by rows that contradict each other; give one of them a compliance"};
+    if (live_.locked >= 0)
+        return {
+            Status::diverged, live_.locked,
+            "is held by redundant joints without compliance, which linearised rows pull apart until they lock; "
+            "use corrections=1 or a composition, or give the joints a compliance"};
     for (int body = 0; body < bodies(); ++body) {
         const BodyState& s = live_.bodies[body];
         if (!finite(s.displacement) || !finite(s.velocity) || !finite(s.angular_momentum) ||
             !finite(s.angular_velocity))
-            return {Status::not_finite, body};
+            return {Status::not_finite, body, cause()};
         for (int k = 0; k < 3; ++k)
             if (std::abs(s.displacement[k]) > RUNAWAY || std::abs(s.velocity[k]) > RUNAWAY)
-                return {Status::diverged, body};
+                return {Status::diverged, body, cause()};
     }
     if (live_.not_solved >= 0)
         return {
@@ -224,7 +236,7 @@ double RigidSystem::potential_energy() const noexcept {
     }
     for (const SpringForce& spring : springs_)
         sum += energy(spring, place(spring.ends[1]) - place(spring.ends[0]));
-    return sum;
+    return sum + joints_.spring_energy(live_.bodies);
 }
 
 std::vector<double> RigidSystem::final_state() {

@@ -44,14 +44,16 @@ public:
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const;
     void save() {
-        saved_share_ = redundant_.share();
+        saved_redundancy_ = redundant_.memory();
         saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_;
         if (contacts_) saved_contacts_ = contacts_->memory();
     }
     void restore() {
-        redundant_.restore(matrix_, saved_share_);
+        redundant_.restore(matrix_, saved_redundancy_);
         live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_;
         if (contacts_) contacts_->remember(saved_contacts_);
+        replaying_ = true;
+        early_joints_.clear();
     }
     /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
     std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
@@ -109,11 +111,17 @@ private:
         std::vector<double> last_violation;  // per row, where the step before began
         // Compositions:
         double pending = 0.0;  // s: half a stage still to be kicked
+        int locked = -1;       // a body of redundant rows that contradict each other by now
         int lost = -1;         // a body of rows that no motion satisfies
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         std::vector<double> history;  // stages × three steps × rows: the rows' forces, N
     };
 
+    const char* cause() const noexcept;
+    void stiffen();
+    void find_tensions();
+    void find_islands();
+    void keep_angular_momentum();
     void take_stages(const RigidScene& scene);
     void step();
     void velocity_stage();
@@ -136,6 +144,8 @@ private:
     void kick_all(double span);
     void push(const double* multipliers);
     double violations_ahead(double tau);
+    bool hold_rows(double tau, double floor);
+    void mix(int iteration, int& kept);
     void read_composition();
 
     void assemble_blocks();
@@ -163,6 +173,8 @@ private:
     bool factor_and_solve();  // false when nothing it gives may be used
     void solve_again();       // new right sides, same matrix
     void find_contradiction();
+    int body_of(int row_block) const noexcept;
+    int busiest_block() const noexcept;
     void solve_mixed(bool touching);
     void integrate_body(int body);
     void integrate_all();
@@ -197,6 +209,8 @@ private:
     Live live_, saved_;
     JointSet joints_;
     LargeArray<JointSet::State> saved_joints_;
+    bool replaying_ = false;                    // a block that ended unfit
+    LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
 
     // One step's work.
     std::vector<Vec3> force_;         // of springs and centres, per body
@@ -206,7 +220,7 @@ private:
     std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     RedundantRows redundant_;
-    double saved_share_ = 0.0;
+    RedundantRows::Memory saved_redundancy_;
     LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
@@ -225,9 +239,12 @@ private:
     std::vector<Vec6> velocities_, free_velocities_;
     double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
-    bool composed_ = false, half_step_ = false, velocities_seen_ = false;
+    bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body
     std::vector<double> first_right_, violation_, bias_, multiplier_;
+    std::vector<double> change_, last_plain_, last_step_, mixing_;
+    std::vector<Mat3> stiffness_;            // per tied body: h²/4 of its joints' geometric stiffness, kg m²
+    std::vector<std::vector<int>> islands_;  // of tied bodies that nothing holds to the world
     static constexpr int MOST_HALVINGS = 12;
     LargeArray<BodyState> step_start_[MOST_HALVINGS];
     std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;

@@ -17,7 +17,7 @@ SPOOK_NAMED_ENUM(Quantity, position, velocity, orientation, angular_velocity, ki
 struct QuantityRequest {
     std::string kind;
     int index = -1;  // of a body, row or joint; −1: all
-    Vec3 point;      // centre of an angular momentum, m
+    Vec3 point;      // centre of an angular momentum; of a body, its axes, from the centre of mass, m
     int other = -1;  // the other body of a contact force; −1: all
 };
 

@@ -1,0 +1,148 @@
+// The contact stage by sweeps: resting contact and the parting of overlaps for as many bodies as there are.
+#include <algorithm>
+
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+#include "linear/regularisation.hpp"
+
+namespace spook {
+
+/// Gives the sweeps the points they do not have yet.
+void ContactStage::hand_over() {
+    const double h = options_.time_step;
+    for (; handed_over_ < points_.size(); ++handed_over_) {
+        Point& point = points_[handed_over_];
+        const SurfaceMaterial& material = point.material;
+        SweepContact row;
+        row.first = unknown_[point.contact.first];
+        row.second = unknown_[point.contact.second];
+        row.normal = point.contact.point.normal;
+        row.tangent = point.tangent;
+        row.first_arm = point.first_arm;
+        row.second_arm = point.second_arm;
+        row.softness = regularise(material.compliance, material.damping, h).softness;
+        row.slip_softness = material.slip_compliance / h;
+        row.friction = material.friction;
+        row.normal_before = point.before;
+        row.impulse[0] = std::max(0.0, point.before);
+        std::copy_n(point.tangent_before, 2, row.impulse + 1);
+        if (row.first < 0 || row.second < 0) {
+            const Vec3 directions[3] = {row.normal, row.tangent, cross(row.normal, row.tangent)};
+            for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
+        }
+        row.right[0] += resting_right(point);
+        sweeps_.add(row);
+    }
+}
+
+/// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
+bool ContactStage::find_more() {
+    next_.resize(unknown_.size());
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        next_[b] = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
+    if (outrun(next_)) find_open();
+    const std::size_t known = points_.size();
+    if (open_.empty() || find_strikes(next_, true) == 0) return false;
+    take_back_strikes(known, next_);
+    counters_.contacts += points_.size() - known;
+    for (std::size_t k = known; k < points_.size(); ++k) {
+        Point& point = points_[k];
+        const auto old =
+            std::lower_bound(touches_.begin(), touches_.end(), point.contact.key,
+                             [](const Touch& touch, std::uint64_t key) { return touch.contact.key < key; });
+        if (old == touches_.end() || old->contact.key != point.contact.key) continue;
+        point.before = old->normal;
+        point.parting_before = old->parting;
+        std::copy_n(old->tangent, 2, point.tangent_before);
+    }
+    hand_over();
+    return true;
+}
+
+bool ContactStage::solve_by_sweeps(MixedSystem& system) {
+    sweeps_.start(system, options_.friction);
+    handed_over_ = 0;
+    hand_over();
+    const FrictionReport report =
+        sweeps_.run(options_.iterations, options_.residual_tolerance, [this] { return find_more(); });
+    counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
+    counters_.unsettled += !report.converged;
+    sweeps_.write(system);
+
+    residual_ = report.residual;
+    unsettled_body_ = -1;
+    unsettled_by_ = 0.0;
+    if (!report.converged && report.finite) {
+        const RowsResidual contact = sweeps_.worst(), joint = rows_residual(system, {}, options_.friction);
+        if (contact.row >= 0 && contact.residual >= joint.residual) {
+            const Contact& pair = points_[contact.row].contact;
+            blame(contact.residual, std::max(unknown_[pair.first], unknown_[pair.second]));
+        } else if (!system.rows.empty()) {
+            const RowBlock& block = system.rows[joint.row];
+            blame(joint.residual, std::max(block.first, block.second));
+        }
+    }
+
+    mark_held(system);  // by joints; of contacts those that push
+    touches_.clear();
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        const double* impulse = sweeps_.impulse(static_cast<int>(k));
+        const Vec3 across = cross(point.contact.point.normal, point.tangent);
+        record(point, impulse[0], impulse[1] * point.tangent + impulse[2] * across);
+        if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
+        for (const int body : {point.contact.first, point.contact.second})
+            if (unknown_[body] >= 0) held_[unknown_[body]] = 1;
+    }
+    if (report.finite) {
+        part_by_sweeps(system);
+        correct_events(system);
+    }
+    std::stable_sort(touches_.begin(), touches_.end(),
+                     [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; });
+    return report.finite;
+}
+
+/// part_overlaps(), by sweeps.
+void ContactStage::part_by_sweeps(const MixedSystem& system) {
+    if (!some_overlap()) return;
+    ++counters_.corrections;
+    const double h = options_.time_step;
+    parting_.mass = system.mass;
+    parting_.momentum.assign(system.mass.size(), Vec6{});
+    parting_.rows = system.rows;
+    for (RowBlock& block : parting_.rows)
+        for (int i = 0; i < block.size; ++i) {
+            block.right[i] = block.multiplier[i] = 0.0;
+            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
+            if (!below && !above) block.lower[i] = block.upper[i] = 0.0;
+        }
+    parting_sweeps_.start(parting_, options_.friction);
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        next_[b] = unknown_[b] >= 0 ? system.velocity[unknown_[b]] : velocity_[b];
+    for (const Point& point : points_) {
+        SweepContact row;
+        row.first = unknown_[point.contact.first];
+        row.second = unknown_[point.contact.second];
+        row.normal = point.contact.point.normal;
+        row.tangent = point.tangent;
+        row.first_arm = point.first_arm;
+        row.second_arm = point.second_arm;
+        const double gap = point.contact.point.gap, excess = -gap - explained_depth(point);
+        const double ahead = gap + h * relative(point, row.normal, next_, false);
+        const double rate = regularise(0.0, point.material.damping, h).violation_gain;
+        row.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
+        row.impulse[0] = point.parting_before;
+        parting_sweeps_.add(row);
+    }
+    const FrictionReport report =
+        parting_sweeps_.run(options_.iterations, options_.residual_tolerance, nullptr);
+    counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
+    if (!report.finite) return;
+    parting_sweeps_.write(parting_);
+    correction_ = parting_.velocity;
+    for (std::size_t k = 0; k < points_.size(); ++k)
+        touches_[k].parting = parting_sweeps_.impulse(static_cast<int>(k))[0];
+}
+
+}  // namespace spook

@@ -1,0 +1,267 @@
+#include "contacts/contact_sweeps.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contacts/contact_geometry.hpp"
+#include "run/watch.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int late_rounds = 3;  // of sweeps for contacts found after the last one
+
+Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
+
+Mat3 symmetric_inverse(const Mat6& mass) noexcept {
+    const double a = mass[21], b = mass[22], c = mass[23], d = mass[28], e = mass[29], f = mass[35];
+    if (b == 0.0 && c == 0.0 && e == 0.0) return Mat3::diagonal({1.0 / a, 1.0 / d, 1.0 / f});
+    const double A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
+    const double s = 1.0 / (a * A + b * B + c * C);
+    const double D = a * f - c * c, E = b * c - a * e, F = a * d - b * b;
+    return {{s * A, s * B, s * C, s * B, s * D, s * E, s * C, s * E, s * F}};
+}
+
+}  // namespace
+
+void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
+    model_ = model;
+    joints_.prepare(system, {}, model);
+    bodies_ = static_cast<int>(system.mass.size());
+    joint_count_ = static_cast<int>(system.rows.size());
+    inertia_.resize(bodies_ + 1);
+    for (int b = 0; b < bodies_; ++b)
+        inertia_[b] = {1.0 / system.mass[b][0], symmetric_inverse(system.mass[b])};
+    inertia_[bodies_] = {};
+    contacts_.clear();
+    parent_.resize(bodies_ + 1);
+    for (int b = 0; b <= bodies_; ++b) parent_[b] = b;
+    head_.assign(bodies_ + 1, -1);
+    tail_.assign(bodies_ + 1, -1);
+    active_.assign(bodies_ + 1, 0);
+    next_.clear();
+    body_of_.clear();
+    roots_.clear();
+    chained_ = false;
+    for (int k = 0; k < joint_count_; ++k) link(k, system.rows[k].first, system.rows[k].second);
+}
+
+int ContactSweeps::add(const SweepContact& given) {
+    Contact& c = contacts_.emplace_back();
+    c.first = given.first >= 0 ? given.first : bodies_;
+    c.second = given.second >= 0 ? given.second : bodies_;
+    c.normal = given.normal;
+    c.tangent = given.tangent;
+    c.across = cross(given.normal, given.tangent);
+    c.first_arm = given.first_arm;
+    c.second_arm = given.second_arm;
+    std::copy_n(given.right, 3, c.right);
+    std::copy_n(given.impulse, 3, c.impulse);
+    c.softness = given.softness;
+    c.slip_softness = given.slip_softness;
+    c.friction = given.friction;
+    c.normal_before = given.normal_before >= 0.0 ? given.normal_before : given.impulse[0];
+    const Inertia &one = inertia_[c.first], &two = inertia_[c.second];
+    const double inverse_mass = one.inverse_mass + two.inverse_mass;
+    const Vec3 direction[3] = {c.normal, c.tangent, c.across};
+    Vec3 first[3], second[3], first_push[3], second_push[3];
+    for (int i = 0; i < 3; ++i) {
+        first[i] = cross(c.first_arm, direction[i]);
+        second[i] = cross(c.second_arm, direction[i]);
+        first_push[i] = one.inverse * first[i];
+        second_push[i] = two.inverse * second[i];
+    }
+    const auto part = [&](int i, int j) {
+        return dot(first[i], first_push[j]) + dot(second[i], second_push[j]);
+    };
+    c.own = inverse_mass + part(0, 0) + c.softness;
+    c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
+    c.coupling[0] = part(1, 0);
+    c.coupling[1] = part(2, 0);
+    c.slip[0] = inverse_mass + part(1, 1) + c.slip_softness;
+    c.slip[1] = part(1, 2);
+    c.slip[2] = inverse_mass + part(2, 2) + c.slip_softness;
+    const double largest = 0.5 * (c.slip[0] + c.slip[2]) + length(0.5 * (c.slip[0] - c.slip[2]), c.slip[1]);
+    c.step = largest > 0.0 ? 1.0 / largest : 0.0;
+    if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
+    if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
+        push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * c.across);
+    const int index = static_cast<int>(contacts_.size()) - 1;
+    link(joint_count_ + index, given.first, given.second);
+    return index;
+}
+
+int ContactSweeps::root(int body) noexcept {
+    while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
+    return body;
+}
+
+/// Joins the islands of both bodies, and once sweeping has begun their chains, too.
+void ContactSweeps::link(int item, int first, int second) {
+    next_.push_back(-1);
+    const int body = first >= 0 ? first : second;
+    body_of_.push_back(body);
+    if (body < 0) return;
+    if (first >= 0 && second >= 0) {
+        int a = root(first), b = root(second);
+        if (a != b) {
+            if (a > b) std::swap(a, b);
+            parent_[b] = a;
+            if (chained_ && head_[b] >= 0) {
+                if (head_[a] >= 0) {
+                    next_[tail_[a]] = head_[b];
+                    roots_.erase(std::find(roots_.begin(), roots_.end(), b));
+                } else {
+                    head_[a] = head_[b];
+                    *std::find(roots_.begin(), roots_.end(), b) = a;
+                }
+                tail_[a] = tail_[b];
+                head_[b] = -1;
+            }
+        }
+    }
+    if (chained_) chain(item);
+}
+
+void ContactSweeps::chain(int item) {
+    if (body_of_[item] < 0) return;
+    const int island = root(body_of_[item]);
+    if (head_[island] < 0) {
+        head_[island] = item;
+        roots_.push_back(island);
+    } else {
+        next_[tail_[island]] = item;
+    }
+    tail_[island] = item;
+    active_[island] = 1;
+}
+
+void ContactSweeps::push(const Contact& c, Vec3 impulse) noexcept {
+    const Inertia &one = inertia_[c.first], &two = inertia_[c.second];
+    Vec6 &v = joints_.velocity()[c.first], &w = joints_.velocity()[c.second];
+    const Vec3 turn = one.inverse * cross(c.first_arm, impulse),
+               back = two.inverse * cross(c.second_arm, impulse);
+    v[0] += one.inverse_mass * impulse.x;
+    v[1] += one.inverse_mass * impulse.y;
+    v[2] += one.inverse_mass * impulse.z;
+    v[3] += turn.x;
+    v[4] += turn.y;
+    v[5] += turn.z;
+    w[0] -= two.inverse_mass * impulse.x;
+    w[1] -= two.inverse_mass * impulse.y;
+    w[2] -= two.inverse_mass * impulse.z;
+    w[3] -= back.x;
+    w[4] -= back.y;
+    w[5] -= back.z;
+}
+
+/// One contact; the largest change of a row, as a velocity.
+double ContactSweeps::update(Contact& c) noexcept {
+    const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
+                   add_turn(joints_.velocity()[c.second], c.second_arm);
+    const double old = c.impulse[0];
+    const double nu = std::max(0.0, old - (dot(c.normal, u) + c.softness * old - c.right[0]) * c.own_inverse);
+    const double dn = nu - old;
+    c.impulse[0] = nu;
+    double change = std::abs(dn) * c.own, d1 = 0.0, d2 = 0.0;
+    const double bound = c.friction * (model_ == FrictionModel::box ? c.normal_before : nu);
+    const double b1 = c.impulse[1], b2 = c.impulse[2];
+    if (bound > 0.0 || b1 != 0.0 || b2 != 0.0) {
+        const double s1 = dot(c.tangent, u) + c.coupling[0] * dn + c.slip_softness * b1 - c.right[1];
+        const double s2 = dot(c.across, u) + c.coupling[1] * dn + c.slip_softness * b2 - c.right[2];
+        if (model_ == FrictionModel::cone) {
+            double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
+            const double reach = length(z1, z2);
+            if (reach > bound) z1 *= bound / reach, z2 *= bound / reach;
+            d1 = z1 - b1, d2 = z2 - b2;
+            change = std::max(change, length(d1, d2) / c.step);
+        } else {
+            d1 = std::clamp(b1 - s1 / c.slip[0], -bound, bound) - b1;
+            d2 = std::clamp(b2 - (s2 + c.slip[1] * d1) / c.slip[2], -bound, bound) - b2;
+            change = std::max({change, std::abs(d1) * c.slip[0], std::abs(d2) * c.slip[2]});
+        }
+        c.impulse[1] = b1 + d1;
+        c.impulse[2] = b2 + d2;
+    }
+    if (dn != 0.0 || d1 != 0.0 || d2 != 0.0) push(c, dn * c.normal + d1 * c.tangent + d2 * c.across);
+    return change;
+}
+
+double ContactSweeps::sweep_island(int island) noexcept {
+    double change = 0.0;
+    for (int item = head_[island]; item >= 0; item = next_[item]) {
+        const double own = item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
+                                               : update(contacts_[item - joint_count_]);
+        if (!(own <= change)) change = own;  // what is not a number stays
+    }
+    return change;
+}
+
+FrictionReport ContactSweeps::run(int iterations, double tolerance, const std::function<bool()>& more) {
+    FrictionReport report;
+    if (!chained_) {
+        for (int item = 0; item < static_cast<int>(next_.size()); ++item) chain(item);
+        chained_ = true;
+    }
+    std::vector<double> left(parent_.size(), 0.0);
+    int look = 2, late = 0;
+    for (int sweep = 1, until = iterations;; ++sweep) {
+        Watch::look();
+        bool any = false;
+        for (std::size_t k = 0; k < roots_.size(); ++k) {
+            const int island = roots_[k];
+            if (!active_[island]) continue;
+            left[island] = sweep_island(island);
+            ++report.sweeps;
+            active_[island] = !(left[island] <= tolerance);
+            any = any || active_[island];
+        }
+        const bool over = !any || sweep >= until;
+        if (!over && sweep < look) continue;
+        look = 2 * sweep;
+        const bool grown = more && more();
+        if (!over) continue;
+        if (!grown || late == late_rounds) break;
+        ++late;
+        until = sweep + iterations;
+        look = sweep + 2;
+    }
+    for (const int island : roots_) {
+        if (!(left[island] <= report.residual)) report.residual = left[island];
+        report.converged = report.converged && !active_[island];
+    }
+    report.finite = !std::isnan(report.residual);
+    return report;
+}
+
+RowsResidual ContactSweeps::worst() const {
+    RowsResidual worst{0.0, -1};
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& c = contacts_[k];
+        const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
+                       add_turn(joints_.velocity()[c.second], c.second_arm);
+        const double w = dot(c.normal, u) + c.softness * c.impulse[0] - c.right[0];
+        double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+        const double b1 = c.impulse[1], b2 = c.impulse[2];
+        const double s1 = dot(c.tangent, u) + c.slip_softness * b1 - c.right[1];
+        const double s2 = dot(c.across, u) + c.slip_softness * b2 - c.right[2];
+        const double bound = c.friction * (model_ == FrictionModel::box ? c.normal_before : c.impulse[0]);
+        double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
+        bool sticks = true;
+        if (model_ == FrictionModel::cone) {
+            const double reach = length(z1, z2);
+            sticks = reach <= bound;
+            if (!sticks) z1 *= bound / reach, z2 *= bound / reach;
+        } else {
+            sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
+            z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
+        }
+        if (c.friction > 0.0)
+            residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
+        if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
+    }
+    return worst;
+}
+
+}  // namespace spook

@@ -1,0 +1,84 @@
+// Projected Gauss–Seidel over contacts in compact form, with joints, for as many bodies as there are.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "contacts/friction_point.hpp"
+#include "contacts/sweep_rows.hpp"
+#include "linear/vec.hpp"
+
+namespace spook {
+
+/// One contact as the sweeps take it. The rows are C v₊ + Sig nu >= right[0] ⟂ nu >= 0 along the normal, and
+/// friction against the slip D v₊ + (gamma/h) beta − right[1 … 2] along the tangents.
+struct SweepContact {
+    int first = -1, second = -1;  // moving bodies, −1 for one that does not move
+    Vec3 normal, tangent;         // unit; the second tangent is their product
+    Vec3 first_arm, second_arm;   // from the centres of mass, m
+    double right[3] = {0, 0, 0};  // m/s
+    double softness = 0.0;        // Sig
+    double slip_softness = 0.0;   // gamma/h
+    double friction = 0.0;        // mu
+    double normal_before = -1.0;  // nu of the step before, what the box bounds friction by; negative: unknown
+    double impulse[3] = {0, 0, 0};  // nu, beta: the start, then the result
+};
+
+/// A contact costs one reading of its two bodies and one writing per sweep: the relative velocity at the point
+/// serves all three rows, their own 3×3 part of C M⁻¹ Cᵀ carries the normal's change over to the tangents.
+/// Islands are swept until they have settled, each for itself. Contacts may be added between sweeps, so that a pair
+/// that meets only because of this step's impulses has its rows in the same solve; islands then grow together.
+/// Rows are swept in the order they were given, on one thread: equal input gives equal bits. Memory is kept.
+class ContactSweeps {
+public:
+    /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
+    void start(MixedSystem& system, FrictionModel model);
+    /// Adds a contact; its index counts from 0.
+    int add(const SweepContact& contact);
+
+    /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
+    /// times. `more` is called after the 2nd, 4th, 8th … sweep and when all is done: it may add contacts and says
+    /// whether it did; those that come after the last sweep get `iterations` more, `late_rounds` times at most.
+    FrictionReport run(int iterations, double tolerance, const std::function<bool()>& more);
+
+    const Vec6& velocity(int body) const noexcept { return joints_.velocity()[body]; }
+    const double* impulse(int contact) const noexcept { return contacts_[contact].impulse; }
+    /// Multipliers of joints, and all velocities.
+    void write(MixedSystem& system) const { joints_.write(system); }
+    /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index.
+    RowsResidual worst() const;
+
+private:
+    struct Contact {
+        int first, second;
+        Vec3 normal, tangent, across, first_arm, second_arm;
+        double right[3], softness, slip_softness, friction, normal_before, impulse[3];
+        double own, own_inverse;  // of the normal, with Sig
+        double coupling[2];       // between normal and tangents
+        double slip[3];           // (t, t), (t, u), (u, u), with gamma/h
+        double step;              // 1/lambda_max of the tangents' part
+    };
+    struct Inertia {
+        double inverse_mass = 0.0;
+        Mat3 inverse;  // of the inertia, world axes, 1/(kg m²)
+    };
+    double update(Contact& contact) noexcept;
+    void push(const Contact& contact, Vec3 impulse) noexcept;
+    int root(int body) noexcept;
+    void link(int item, int first, int second);
+    void chain(int item);
+    double sweep_island(int root) noexcept;
+
+    FrictionModel model_ = FrictionModel::cone;
+    Sweeper joints_;
+    int joint_count_ = 0, bodies_ = 0;
+    std::vector<Inertia> inertia_;
+    std::vector<Contact> contacts_;
+    // Islands: bodies joined by union-find; the items of one, joints first, are a chain in the order they came.
+    std::vector<int> parent_, head_, tail_, next_, body_of_;
+    std::vector<int> roots_;
+    std::vector<char> active_;
+    bool chained_ = false;
+};
+
+}  // namespace spook

@@ -1,0 +1,213 @@
+// Rows laid out for sweeping: what projected Gauss–Seidel reads, one behind the other.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "contacts/friction_point.hpp"
+#include "contacts/pivot_solver.hpp"
+#include "linear/elementary.hpp"
+
+namespace spook {
+
+/// One row as a sweep reads it: Jacobian of both ends, M⁻¹ Gᵀ, own inertia. An end that does not move is zero and
+/// belongs to a spare body behind the others, so that no row needs a branch.
+struct SweepRow {
+    Vec6 first, second;            // G
+    Vec6 first_push, second_push;  // M⁻¹ Gᵀ
+    double own = 0.0;              // (G M⁻¹ Gᵀ + Sig)ᵢᵢ
+    double softness = 0.0, right = 0.0, lower = 0.0, upper = 0.0, multiplier = 0.0;
+};
+
+/// One block of rows, and what is solved together in it.
+struct SweepBlock {
+    enum class Kind : unsigned char { bilateral, bounded, contact } kind = Kind::bounded;
+    int first = 0, second = 0;  // bodies
+    int row = 0, size = 0;      // rows_[row] … rows_[row + size)
+    int point = -1;             // its friction point
+    int factor = -1;            // of a bilateral block, in factors_
+    double step = 0.0;          // of a contact: 1/lambda_max of the tangents' part
+};
+
+/// Lays a system out for sweeping: rows one behind the other, velocities in one array. Memory is kept from use to
+/// use, so that nothing is allocated once the largest system has been seen.
+class Sweeper {
+public:
+    void prepare(MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
+        model_ = model;
+        const std::size_t bodies = system.mass.size();
+        mass_factor_.resize(bodies);
+        velocity_.resize(bodies + 1);
+        for (std::size_t b = 0; b < bodies; ++b) {
+            mass_factor_[b] = factor_six(system.mass[b]);
+            velocity_[b] = system.momentum[b];
+            solve_six(mass_factor_[b], velocity_[b]);
+        }
+        velocity_[bodies] = Vec6{};
+        rows_.clear();
+        factors_.clear();
+        blocks_.assign(system.rows.size(), {});
+        for (std::size_t k = 0; k < points.size(); ++k) blocks_[points[k].block].point = static_cast<int>(k);
+        for (std::size_t k = 0; k < blocks_.size(); ++k)
+            add(system.rows[k], blocks_[k], static_cast<int>(bodies));
+        for (const SweepBlock& block : blocks_)
+            for (int i = 0; i < block.size; ++i)
+                push(block, rows_[block.row + i], rows_[block.row + i].multiplier);
+    }
+
+    /// One sweep; the largest change of a row, as a velocity. With `friction_only` all but tangents is held.
+    double sweep(std::vector<FrictionPoint>& points, bool friction_only) noexcept {
+        double change = 0.0;
+        for (const SweepBlock& block : blocks_) {
+            if (block.kind == SweepBlock::Kind::contact) {
+                if (!friction_only) change = std::max(change, update_row(block, rows_[block.row]));
+                change = std::max(change, update_tangents(block, points[block.point]));
+            } else if (!friction_only) {
+                change = std::max(change, update_joint(block));
+            }
+        }
+        return change;
+    }
+
+    /// The update of one block of a joint.
+    double update_joint(std::size_t block) noexcept { return update_joint(blocks_[block]); }
+
+    /// Velocities of all bodies, and of the spare one behind them, which stays at rest.
+    std::vector<Vec6>& velocity() noexcept { return velocity_; }
+    const std::vector<Vec6>& velocity() const noexcept { return velocity_; }
+
+    void write(MixedSystem& system) const {
+        system.velocity.assign(velocity_.begin(), velocity_.end() - 1);
+        for (std::size_t k = 0; k < blocks_.size(); ++k)
+            for (int i = 0; i < blocks_[k].size; ++i) {
+                const SweepRow& row = rows_[blocks_[k].row + i];
+                system.rows[k].multiplier[i] = row.multiplier;
+                system.rows[k].lower[i] = row.lower;
+                system.rows[k].upper[i] = row.upper;
+            }
+    }
+
+private:
+    void add(const RowBlock& given, SweepBlock& block, int spare) {
+        block.first = given.first >= 0 ? given.first : spare;
+        block.second = given.second >= 0 ? given.second : spare;
+        block.row = static_cast<int>(rows_.size());
+        block.size = given.size;
+        bool bilateral = true;
+        for (int i = 0; i < given.size; ++i) {
+            SweepRow& row = rows_.emplace_back();
+            if (given.first >= 0) {
+                row.first = row.first_push = given.first_jacobian[i];
+                solve_six(mass_factor_[given.first], row.first_push);
+            }
+            if (given.second >= 0) {
+                row.second = row.second_push = given.second_jacobian[i];
+                solve_six(mass_factor_[given.second], row.second_push);
+            }
+            row.softness = given.softness[i];
+            row.right = given.right[i];
+            row.lower = given.lower[i];
+            row.upper = given.upper[i];
+            row.multiplier = given.multiplier[i];
+            row.own = schur(row, row) + row.softness;
+            bilateral = bilateral && row.lower == -unbounded && row.upper == unbounded;
+        }
+        if (block.point >= 0) {
+            block.kind = SweepBlock::Kind::contact;
+            const double a = rows_[block.row + 1].own, b = rows_[block.row + 2].own;
+            const double c = schur(rows_[block.row + 1], rows_[block.row + 2]);
+            block.step = 1.0 / (0.5 * (a + b) + length(0.5 * (a - b), c));
+        } else if (bilateral) {
+            block.kind = SweepBlock::Kind::bilateral;
+            Mat6 whole{};
+            for (int i = 0; i < 6; ++i) whole[7 * i] = 1.0;
+            for (int i = 0; i < block.size; ++i)
+                for (int j = 0; j < block.size; ++j)
+                    whole[6 * i + j] =
+                        i == j ? rows_[block.row + i].own : schur(rows_[block.row + i], rows_[block.row + j]);
+            // A body tied twice to the world makes no singular block; a rigid joint without inertia would.
+            for (int i = 0; i < block.size; ++i) whole[7 * i] *= 1.0 + 1e-12;
+            block.factor = static_cast<int>(factors_.size());
+            factors_.push_back(factor_six(whole));
+        }
+    }
+
+    static double schur(const SweepRow& a, const SweepRow& b) noexcept {
+        return dot(a.first, b.first_push) + dot(a.second, b.second_push);
+    }
+
+    double residual(const SweepBlock& block, const SweepRow& row) const noexcept {
+        return dot(row.first, velocity_[block.first]) + dot(row.second, velocity_[block.second]) +
+               row.softness * row.multiplier - row.right;
+    }
+
+    void push(const SweepBlock& block, const SweepRow& row, double impulse) noexcept {
+        Vec6 &v = velocity_[block.first], &w = velocity_[block.second];
+        for (int a = 0; a < 6; ++a) v[a] += row.first_push[a] * impulse;
+        for (int a = 0; a < 6; ++a) w[a] += row.second_push[a] * impulse;
+    }
+
+    double update_row(const SweepBlock& block, SweepRow& row) noexcept {
+        if (!(row.own > 0.0)) return 0.0;
+        const double old = row.multiplier;
+        row.multiplier = std::clamp(old - residual(block, row) / row.own, row.lower, row.upper);
+        const double change = row.multiplier - old;
+        if (change == 0.0) return 0.0;
+        push(block, row, change);
+        return std::abs(change) * row.own;
+    }
+
+    double update_joint(const SweepBlock& block) noexcept {
+        if (block.kind == SweepBlock::Kind::bilateral) return update_block(block);
+        double change = 0.0;
+        for (int i = 0; i < block.size; ++i)
+            change = std::max(change, update_row(block, rows_[block.row + i]));
+        return change;
+    }
+
+    double update_block(const SweepBlock& block) noexcept {
+        Vec6 change{};
+        double largest = 0.0;
+        for (int i = 0; i < block.size; ++i) {
+            change[i] = -residual(block, rows_[block.row + i]);
+            largest = std::max(largest, std::abs(change[i]));
+        }
+        solve_six(factors_[block.factor], change);
+        for (int i = 0; i < block.size; ++i) {
+            rows_[block.row + i].multiplier += change[i];
+            push(block, rows_[block.row + i], change[i]);
+        }
+        return largest;
+    }
+
+    double update_tangents(const SweepBlock& block, const FrictionPoint& point) noexcept {
+        SweepRow &one = rows_[block.row + 1], &two = rows_[block.row + 2];
+        const double normal = model_ == FrictionModel::box ? point.normal : rows_[block.row].multiplier;
+        const double bound = point.coefficient * std::max(0.0, normal);
+        if (model_ != FrictionModel::cone) {
+            one.lower = two.lower = -bound;
+            one.upper = two.upper = bound;
+            const double change = update_row(block, one);
+            return std::max(change, update_row(block, two));
+        }
+        const double b1 = one.multiplier, b2 = two.multiplier;
+        double d1 = b1 - block.step * residual(block, one);
+        double d2 = b2 - block.step * residual(block, two);
+        const double reach = length(d1, d2);
+        if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
+        one.multiplier = d1;
+        two.multiplier = d2;
+        push(block, one, d1 - b1);
+        push(block, two, d2 - b2);
+        return length(d1 - b1, d2 - b2) / block.step;
+    }
+
+    FrictionModel model_ = FrictionModel::cone;
+    std::vector<Mat6> mass_factor_, factors_;
+    std::vector<Vec6> velocity_;
+    std::vector<SweepRow> rows_;
+    std::vector<SweepBlock> blocks_;
+};
+
+}  // namespace spook

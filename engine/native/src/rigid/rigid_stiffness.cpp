@@ -1,0 +1,153 @@
+// The geometric stiffness of loaded joints, treated implicitly, and what a divergence looks like without it.
+//
+// A force F at the arm r of a body turns it with r × F; turned on by φ, by (r·F)(1 − r̂ r̂ᵀ) φ less. Freezing r in a
+// step integrates that stiffness K explicitly: unstable where h² K exceeds 4 I. As for a compliant row the torque is
+// taken at ¼(φ₊ + 2φ + φ₋), h/4 (w₊ − w) from here: (I + h²/4 K) w₊ = ℓ + h torque + h²/4 K w + Gᵀλ, with F of the
+// step before. A steady turn feels nothing of it. Of bodies that nothing holds, the torques taken from each
+// do not add up to zero: a turn of the whole, rigid and so free for the joints, gives the angular momentum back.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double TAUT = 0.3;  // of h² F / (m r): a body that is lighter than this for its load is loaded
+
+/// x of A x = b for a symmetric positive definite A; none where A is singular (bodies in a row).
+Vec3 solved(const Mat3& a, Vec3 b) noexcept {
+    const Vec3 r0{a.m[0], a.m[1], a.m[2]}, r1{a.m[3], a.m[4], a.m[5]}, r2{a.m[6], a.m[7], a.m[8]};
+    const double det = dot(r0, cross(r1, r2)), size = a.m[0] + a.m[4] + a.m[8];
+    if (!(std::abs(det) > 1e-12 * size * size * size)) return {};
+    return (1.0 / det) * Vec3{dot(b, cross(r1, r2)), dot(r0, cross(b, r2)), dot(r0, cross(r1, b))};
+}
+
+}  // namespace
+
+/// h²/4 K of every tied body, from the forces of the step before.
+void RigidSystem::stiffen() {
+    const auto blocks = joints_.blocks();
+    std::fill(stiffness_.begin(), stiffness_.end(), Mat3{});
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        if (blocks[k].axial) continue;
+        const JointSet::State& state = joints_.states[blocks[k].joint];
+        const double* rows = jacobian(static_cast<int>(k), true);
+        Vec3 impulse;  // on the second body
+        for (int i = 0; i < blocks[k].size; ++i, rows += 6)
+            impulse += state.multiplier[i] * Vec3{rows[0], rows[1], rows[2]};
+        for (const bool second : {false, true}) {
+            const int body = second ? blocks[k].second : blocks[k].first;
+            if (body < 0 || slot_[body] < 0 || constants_[body].particle) continue;
+            const Vec3 arm = second ? state.second_reach : state.first_reach;
+            const double pull = (second ? 1.0 : -1.0) * dot(arm, impulse), length2 = dot(arm, arm);
+            if (!(pull > 0.0) || length2 == 0.0) continue;
+            Mat3& held = stiffness_[slot_[body]];
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j)
+                    held(i, j) += 0.25 * h_ * pull * ((i == j ? 1.0 : 0.0) - arm[i] * arm[j] / length2);
+        }
+    }
+}
+
+/// The forces at the start, which the stiffness of the first step is made of. The first round knows none and moves
+/// light bodies under a heavy load far too fast; its forces are right all the same.
+void RigidSystem::find_tensions() {
+    stiffness_.assign(tied_.size(), Mat3{});
+    if (islands_.empty()) find_islands();
+    if (!force_.empty()) apply_forces();
+    const auto blocks = joints_.blocks();
+    for (int round = 0; round < 3; ++round) {
+        if (round > 0) stiffen();
+        assemble_blocks();
+        fill_inertias();
+        fill_block_momenta();
+        if (!factor_and_solve()) return;  // the first step will say so
+        const double* x = solution_.data();
+        for (const JointBlock& block : blocks)
+            for (int i = 0; i < block.size; ++i, ++x)
+                if (!block.axial) joints_.states[block.joint].multiplier[i] = -*x;
+    }
+    matrix_.clear_counters();
+}
+
+/// Tied bodies by what joins them, without those that the world, a fixed or a driven body holds.
+void RigidSystem::find_islands() {
+    std::vector<int> root(tied_.size() + 1);  // the last one is all that does not float
+    std::iota(root.begin(), root.end(), 0);
+    const auto find = [&root](int i) {
+        while (root[i] != i) i = root[i] = root[root[i]];
+        return i;
+    };
+    const auto place = [this](int body) {
+        return body < 0 || slot_[body] < 0 ? static_cast<int>(tied_.size()) : slot_[body];
+    };
+    for (const JointBlock& block : joints_.blocks())
+        root[find(place(block.first))] = find(place(block.second));
+    std::vector<std::vector<int>> members(root.size());
+    for (int k = 0; k < static_cast<int>(tied_.size()); ++k) members[find(k)].push_back(k);
+    const int held = find(static_cast<int>(tied_.size()));
+    for (int k = 0; k < static_cast<int>(members.size()); ++k)
+        if (k != held && !members[k].empty()) islands_.push_back(members[k]);
+}
+
+/// Gives every floating island back the angular momentum that the stiffness took from its bodies.
+void RigidSystem::keep_angular_momentum() {
+    const int row_blocks = static_cast<int>(joints_.blocks().size());
+    const auto values = [&](int k) { return solution_.data() + matrix_.offset(row_blocks + k); };
+    for (const std::vector<int>& island : islands_) {
+        Vec3 centre, missing;
+        double mass = 0.0;
+        for (int k : island) {
+            const BodyConstants& body = constants_[tied_[k]];
+            centre += body.mass * position_of(tied_[k]);
+            mass += body.mass;
+            if (body.particle) continue;
+            const double* x = values(k);
+            missing += stiffness_[k] * (Vec3{x[3], x[4], x[5]} - live_.bodies[tied_[k]].angular_velocity);
+        }
+        centre *= 1.0 / mass;
+        Mat3 inertia;
+        for (int k : island) {
+            const BodyConstants& body = constants_[tied_[k]];
+            const Vec3 r = position_of(tied_[k]) - centre;
+            const double r2 = dot(r, r);
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j)
+                    inertia(i, j) += body.mass * ((i == j ? r2 : 0.0) - r[i] * r[j]) +
+                                     (body.particle ? 0.0 : live_.bodies[tied_[k]].inertia(i, j));
+        }
+        const Vec3 turn = solved(inertia, missing);
+        for (int k : island) {
+            double* x = values(k);
+            const Vec3 v = cross(turn, position_of(tied_[k]) - centre);
+            for (int i = 0; i < 3; ++i) x[i] += v[i];
+            for (int i = 0; i < 3 && !constants_[tied_[k]].particle; ++i) x[3 + i] += turn[i];
+        }
+    }
+}
+
+/// What made a run leave the finite numbers, as far as the joints show a few steps before: the option that cures it.
+const char* RigidSystem::cause() const noexcept {
+    if (stiff_ || composed_ || early_joints_.size() != joints_.states.size()) return "";
+    for (const JointBlock& block : joints_.blocks()) {
+        if (block.axial) continue;
+        const JointSet::State& state = early_joints_[block.joint];
+        double impulse = 0.0;
+        const int linear = std::min(block.size, 3);
+        for (int i = 0; i < linear; ++i) impulse = std::max(impulse, std::abs(state.multiplier[i]));
+        for (const bool second : {false, true}) {
+            const int body = second ? block.second : block.first;
+            if (body < 0 || !constants_[body].moves()) continue;
+            const double arm = norm(second ? state.second_reach : state.first_reach);
+            if (arm > 0.0 && h_ * impulse > TAUT * constants_[body].mass * arm)
+                return "ran away: its joints carry more tension than so light a body can take in a step "
+                       "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
+        }
+    }
+    return "";
+}
+
+}  // namespace spook

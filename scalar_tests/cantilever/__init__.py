@@ -1,0 +1,1 @@
+"""A clamped steel beam: scene, statics, question."""

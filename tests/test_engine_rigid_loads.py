@@ -1,0 +1,177 @@
+"""Loaded chains, redundant loops and singular positions of rigid bodies: right, or refused with the cure."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    AngularMomentum,
+    Ball,
+    Distance,
+    Energy,
+    Hinge,
+    JointCoordinate,
+    JointSpring,
+    MaximumAbsolute,
+    Method,
+    MethodError,
+    Momentum,
+    Position,
+    RigidBody,
+    Scene,
+    Trace,
+    compile,
+    simulate,
+)
+from spook_tracker.scalar_tests.multibody import bricard, four_bars
+
+G = 9.81  # m/s²
+LINKS, LENGTH = 10, 1.0
+STIFF = Method(string_stiffness=True)
+ORDER6 = Method(composition="order6")
+
+
+def chain(load: float, start: float = 0.01) -> Scene:
+    """Ten rods of 1 kg and 1 m in a row on ball joints, a load at the end, `start` rad off the vertical."""
+    along = np.array([math.sin(start), 0.0, -math.cos(start)])
+    turn = (math.cos(0.5 * start), 0.0, -math.sin(0.5 * start), 0.0)
+    bodies = [
+        RigidBody(
+            name=f"link {k}",
+            mass=1.0,
+            inertia=(1 / 12, 1 / 12, 1e-3),
+            position=tuple((k + 0.5) * along),
+            orientation=turn,
+        )
+        for k in range(LINKS)
+    ]
+    bodies.append(
+        RigidBody(name="load", mass=load, inertia=(0.01 * load,) * 3, position=tuple(LINKS * along))
+    )
+    names = [WORLD, *(body.name for body in bodies)]
+    joints = [
+        Ball(name=f"ball {k}", between=(names[k], names[k + 1]), at=tuple(k * along), compliance=1e-12)
+        for k in range(LINKS + 1)
+    ]
+    return Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=(0.0, 0.0, -G), contacts=False)
+
+
+def straight_period(load: float) -> float:
+    """Of small swings of the straight chain, as one compound pendulum."""
+    inertia = load * (LINKS**2 + 0.01) + sum(1 / 12 + (k + 0.5) ** 2 for k in range(LINKS))
+    return 2.0 * math.pi * math.sqrt(inertia / (G * (load * LINKS + sum(k + 0.5 for k in range(LINKS)))))
+
+
+@pytest.mark.parametrize("load", [300.0, 1e6])
+@pytest.mark.parametrize("half", [False, True])
+def test_a_loaded_chain_swings_with_its_period(load: float, half: bool) -> None:
+    method = Method(string_stiffness=True, half_step_velocities=half)
+    observe = {"x": Trace(quantity=Position("load"))}
+    x = simulate(chain(load), time_step=1 / 60, duration=20.0, method=method, observe=observe)["x"][:, 0]
+    before = np.nonzero((x[:-1] > 0.0) != (x[1:] > 0.0))[0]
+    zero = (before + x[before] / (x[before] - x[before + 1])) / 60.0
+
+    assert 2.0 * np.mean(np.diff(zero)) == pytest.approx(straight_period(load), rel=1e-3)
+    assert np.abs(x[-420:]).max() == pytest.approx(np.abs(x).max(), rel=0.01)
+
+
+def test_a_divergence_under_tension_names_it_and_its_cure() -> None:
+    result = simulate(chain(1e4), time_step=1 / 60, duration=5.0)
+
+    assert result.status == "diverged"
+    assert "tension" in result.failure and "string_stiffness=True" in result.failure
+
+
+@pytest.mark.parametrize("h", [1 / 60, 0.5])
+def test_stiffness_takes_no_momentum_from_what_floats(h: float) -> None:
+    """Were the torques not given back, this chain would lose 1e-4 of it and more."""
+    links = tuple(
+        RigidBody(
+            name=f"link {k}",
+            mass=1.0,
+            inertia=(0.01, 1 / 12, 1 / 12),
+            position=(k + 0.5, 0.0, 0.0),
+            velocity=(0.0, 0.3 * (k - 2) ** 2, 0.2 * k),
+            angular_velocity=(0.0, -0.2, 0.6 * (k - 2)),
+        )
+        for k in range(5)
+    )
+    balls = tuple(
+        Ball(name=f"ball {k}", between=(f"link {k}", f"link {k + 1}"), at=(k + 1.0, 0.0, 0.0))
+        for k in range(4)
+    )
+    observe = {
+        "l": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
+        "p": MaximumAbsolute(quantity=Momentum(), from_start=True),
+    }
+    scene = Scene(bodies=links, constraints=balls, contacts=False)
+    run = simulate(scene, time_step=h, steps=400, method=STIFF, observe=observe)
+
+    assert run.status == "completed"
+    assert run["l"].max() < 1e-11 and run["p"].max() < 1e-12
+
+
+def test_stiffness_of_distances_is_refused_beside_rigid_bodies() -> None:
+    rod = RigidBody(name="rod", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, -1.0))
+    rope = Distance(name="rope", between=((0.0, 0.0, 0.0), "rod"))
+
+    with pytest.raises(MethodError, match=r"string_stiffness of distances.*'rope'"):
+        compile(Scene(bodies=(rod,), constraints=(rope,)), time_step=0.01, method=STIFF)
+
+
+def off_after_a_second(method: Method, h: float) -> float:
+    place, _ = bricard._third(simulate, h, 1.0, 0.0, method)
+    return float(np.linalg.norm(place[-1] - bricard.EXACT[1.0]))
+
+
+def test_a_redundant_loop_without_compliance_moves_or_is_refused() -> None:
+    """Bricard's mechanism: linearised rows lock it, rows with their curvature kept do not."""
+    scene = bricard.scene(1 / 240, 0.0)
+    plain = simulate(scene, time_step=1 / 240, duration=1.0)
+
+    assert plain.status == "diverged"
+    assert "redundant joints without compliance" in plain.failure and "corrections=1" in plain.failure
+    assert off_after_a_second(Method(half_step_velocities=True, corrections=1), 1 / 240) < 1e-4
+    assert off_after_a_second(Method(composition="order4"), 1 / 60) < 5e-9  # the reference has nine digits
+
+
+@pytest.mark.parametrize(("method", "h"), [(ORDER6, 1 / 100), (Method(composition="order8"), 1 / 40)])
+def test_compositions_go_through_singular_positions(method: Method, h: float) -> None:
+    """Four-bars lie flat twice a turn, where each could fold another way."""
+    assert four_bars.answers(simulate, 2, h, 5.0, method)["library_error"] < 1e-7
+
+
+def spun(speed: float, spring: JointSpring | None = None) -> Scene:
+    wheel = RigidBody(
+        name="wheel",
+        mass=1.0,
+        inertia=(0.2, 0.2, 0.4),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, speed),
+    )
+    axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), spring=spring)
+    return Scene(bodies=(wheel,), constraints=(axle,))
+
+
+@pytest.mark.parametrize("method", [Method(), Method(half_step_velocities=True), ORDER6], ids=str)
+def test_a_hinge_counts_its_turns(method: Method) -> None:
+    # The variational turn is fast by (h w)²/6, and the composition's hardly at all.
+    observe = {"angle": Trace(quantity=JointCoordinate("axle"), every=50)}
+    run = simulate(spun(4.0), time_step=0.01, steps=1000, method=method, observe=observe)
+
+    assert np.abs(run["angle"] - 4.0 * run.sample_times["angle"]).max() < 40.0 * 0.04**2 / 6.0 * 1.01
+
+
+def test_the_energy_of_a_joint_spring_counts() -> None:
+    """½ I w² at the start goes into ½ k φ² and back; without damping nothing is lost but by the start offset."""
+    spring = JointSpring(stiffness=0.4, damping=0.0)
+    observe = {"energy": Trace(quantity=Energy())}
+    method = Method(half_step_velocities=True)
+    energy = simulate(spun(1.0, spring), time_step=0.01, steps=700, method=method, observe=observe)["energy"]
+
+    assert energy[0] == pytest.approx(0.2, rel=1e-4)
+    assert np.abs(energy / energy[0] - 1.0).max() < 1e-3

@@ -1,0 +1,127 @@
+"""Did the last few nights shift? A permutation test of their mean against the nights of the level before.
+
+Under "nothing happened" every choice of m nights among all is as likely to be the last m as any other, whatever
+the distribution: clusters, spikes and tails included (Pitman 1937). The share of choices whose sum is at least
+as large as that of the last m is counted exactly, by sums over choices of a fixed size on a grid. Nights that
+remember each other are not exchangeable: the shift must also stand clear of a t test whose standard error and
+degrees of freedom follow their autocorrelation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Values = npt.NDArray[np.float64]
+
+SPANS = (4, 6)  # last nights looked at together
+BASE = 100  # nights of the level before they are compared with
+FEWEST_BASE = 16  # fewer give no probability as small as this:
+RARE = 5e-5  # by permutation, of a shift in one series on one night
+RARER = 4.265  # standard deviations, by the t test: one in a hundred thousand
+LEAST = 0.01  # relative: no shift below is told
+ROUNDING = 1e-12  # relative: nights that differ by less are equal
+CLIP = 6.0  # noises: what lies further out counts as if it lay there
+GRID = 300  # steps between the smallest and the largest value
+NORMAL = 1.4826  # standard deviations in a median absolute deviation
+CHANCE = 2.6  # standard deviations of an autocorrelation that is none
+MEMORY = (1, 5)  # lags, nights, at which nights that remember each other are noticed
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """The last `span` nights lie `change` of the level above it, which chance does with `probability`."""
+
+    span: int
+    change: float
+    probability: float
+
+
+def shift(values: Sequence[float]) -> Shift | None:
+    """The most probable shift for the worse of the last nights, None if there is none. Worse is larger.
+
+    Values are positive, of one level until the shift, oldest first.
+    """
+    found: Shift | None = None
+    for span in SPANS:
+        base, last = values[-BASE - span : -span], values[-span:]
+        if len(base) < FEWEST_BASE or min(last) <= min(base):
+            continue
+        tried = _tried(np.array(base), np.array(last))
+        if tried is not None and (found is None or tried.probability < found.probability):
+            found = tried
+    return found
+
+
+def _tried(base: Values, last: Values) -> Shift | None:
+    pooled = np.concatenate([base, last])
+    middle = float(np.median(base))
+    noise = NORMAL * float(np.median(np.abs(base - middle)))
+    if noise > 0.0:
+        far = max(CLIP * noise, 2.0 * LEAST * middle)
+        pooled = np.clip(pooled, middle - far, middle + far)
+        base, last = pooled[: len(base)], pooled[len(base) :]
+    level = float(np.mean(base))
+    rise = float(np.mean(last)) - level
+    if rise <= LEAST * level or rise <= standard_error(base, len(last)):
+        return None
+    probability = permutation_probability(base, last)
+    return Shift(len(last), rise / level, probability) if probability < RARE else None
+
+
+def standard_error(base: Values, span: int) -> float:
+    """What the mean of `span` more nights may lie above that of these by rare chance.
+
+    For nights that remember each other as a first-order process does; the spread of few such nights is too small
+    by what their mean takes up.
+    """
+    count, memory = len(base), remembered(base)
+    together = (1.0 + memory) / (1.0 - memory)
+    independent = count / together
+    if independent <= 2.0:
+        return math.inf
+    own = sum((1.0 - k / span) * memory**k for k in range(1, span))
+    variance = float(np.var(base, ddof=1)) / (1.0 - together / count if memory else 1.0)
+    return student(independent - 1.0) * math.sqrt(variance * ((1.0 + 2.0 * own) / span + together / count))
+
+
+def remembered(base: Values) -> float:
+    """Autocorrelation from one night to the next, zero unless it is told from chance; at most 0.98."""
+    centred = base - np.mean(base)
+    total = float(centred @ centred)
+    if total <= len(base) * (ROUNDING * float(np.max(np.abs(base)))) ** 2:
+        return 0.0
+    strongest = 0.0
+    for lag in MEMORY:
+        found = float(centred[lag:] @ centred[:-lag]) / total
+        if found > CHANCE / math.sqrt(len(base)):
+            found += (1.0 + 3.0 * found) / len(base)  # few nights show too little of it
+            strongest = max(strongest, min(found, 1.0) ** (1.0 / lag))
+    return min(strongest, 0.98)
+
+
+def student(freedom: float) -> float:
+    """The quantile of Student's t that is exceeded with one probability in 100 000 (Wallace 1959)."""
+    z = RARER * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0)
+    return math.sqrt(freedom * math.expm1(min(z * z / freedom, 700.0)))
+
+
+def permutation_probability(base: Values, last: Values) -> float:
+    """The share of choices of as many values among all whose sum is at least that of the last."""
+    pooled = np.concatenate([base, last])
+    low, high = float(np.min(pooled)), float(np.max(pooled))
+    if high <= low:
+        return 1.0
+    steps = np.rint((pooled - low) * (GRID / (high - low))).astype(np.int64)
+    span = len(last)
+    ways = np.zeros((span + 1, span * GRID + 1))  # by how many were chosen and by their sum
+    ways[0, 0] = 1.0
+    for step in steps:
+        size = ways.shape[1] - step
+        ways[1:, step:] += ways[:-1, :size].copy()
+    reached = int(np.sum(steps[len(base) :]))
+    return float(np.sum(ways[span, reached:])) / math.comb(len(pooled), span)

@@ -1,0 +1,76 @@
+"""How a change of a noisy series is put: slower or faster, by how much, to be confirmed, or only followed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from spook_tracker.tracker.judge.verdict import Verdict
+
+Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
+
+
+def to_be_confirmed(verdict: Verdict) -> Verdict:
+    """A slow night that no second one has confirmed yet is not red."""
+    if not verdict.red:
+        return verdict
+    return replace(
+        verdict, word="same", name="", sentence=f"{verdict.sentence}, to be confirmed by another night"
+    )
+
+
+def only_followed(verdict: Verdict) -> Verdict:
+    """A time read off a ladder is not red: the ladder's errors and its run time are judged themselves.
+
+    Between two rungs a little noise of time moves it by the order times as much, or by a whole rung.
+    """
+    if not verdict.red:
+        return verdict
+    words = f"{verdict.sentence}; the ladder's errors and its run time decide"
+    return replace(verdict, word="changed", name="", sentence=words)
+
+
+def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Verdict:
+    """One value against what was usual: red if it stands clear of the noise."""
+    level, threshold = usual
+    change = worse_by(level, value, larger_is_better)
+    if change > threshold:
+        return slower(change, level, value, "slower")
+    if -change > threshold:
+        return Verdict(word="improved", sentence=change_in_words(change))
+    return Verdict(
+        word="same", sentence=f"{change_in_words(change)}, inside the noise (±{100.0 * threshold:.0f} %)"
+    )
+
+
+def worse_by(level: float, value: float, larger_is_better: bool) -> float:
+    """Relative change for the worse; infinite for what is not finite."""
+    if not math.isfinite(value):
+        return math.inf if math.isfinite(level) else 0.0
+    if not math.isfinite(level):
+        return -math.inf
+    if level == 0.0:
+        return 0.0 if value == 0.0 else math.inf
+    change = value / level - 1.0
+    return -change if larger_is_better else change
+
+
+def slower(change: float, level: float, value: float, name: str) -> Verdict:
+    """The verdict on a time so much worse; without a name it is to be confirmed first."""
+    if not math.isfinite(value):
+        return Verdict(
+            word="regressed", sentence=f"no finite value any more, {level:g} before", name="not finite"
+        )
+    if not name:
+        return Verdict(word="same", sentence=f"{change_in_words(change)}, to be confirmed by another night")
+    return Verdict(
+        word="regressed",
+        sentence=change_in_words(change),
+        name=name,
+        decades=math.log10(abs(value / level)) if level else None,
+    )
+
+
+def change_in_words(change: float) -> str:
+    """A relative change, and for whom."""
+    return f"{100.0 * change:+.1f} % for the {'worse' if change > 0.0 else 'better'}"
