@@ -56,7 +56,7 @@ def pages(
     yield Planned("error-time.html", "Error against run time", partial(page_overviews.error_time, book))
     yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, events))
     yield Planned("live.html", "Live", partial(live_page, module))
-    yield Planned("compare.html", "Compare", lambda: page_overviews.compare(compared()))
+    yield Planned("compare.html", "Compare", lambda: page_overviews.compare(compared(), book))
     yield Planned("regressions.html", "Regressions", partial(page_overviews.regressions, book, causes))
     yield Planned("versions.html", "Versions", partial(page_overviews.versions, book))
     yield Planned("data.html", "Data", partial(page_overviews.data, book, events))

@@ -21,9 +21,16 @@ from spook_tracker.tracker.document.wording import clean, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.website import data_files, feed
+from spook_tracker.tracker.website import data_files, feed, judged_nights
 from spook_tracker.tracker.website.causes import causes_of
-from spook_tracker.tracker.website.comparisons import FILE, Comparisons, comparisons, read_known, stored
+from spook_tracker.tracker.website.comparisons import (
+    FILE,
+    Comparisons,
+    comparisons,
+    page_files,
+    read_known,
+    stored,
+)
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import module_script
@@ -40,6 +47,8 @@ ASSETS = {  # name in templates: file under site/static
     "css": "site.css",
     "theme": "theme.js",
     "site": "site.js",
+    "judge": "judge.js",
+    "nights": "compare-nights.js",
     "compare": "compare.js",
     "plotly": "plotly-cartesian.min.js",
     "three": "three-scene.min.js",
@@ -119,7 +128,9 @@ def publish(
             folder.add(planned.path, source, partial(bytes, text))
         files = _data(told, events, causes)
         if told.nights:
-            files = chain(files, _stored(compared, levels))
+            files = chain(
+                files, _stored(compared, levels, told, accepted), judged_nights.files(history, told)
+            )
         if database is not None:
             files = chain(files, [("data/tracker.db", database, partial(bytes, database))])
         for path, made_from, make in _surviving(files, failed):
@@ -143,9 +154,13 @@ def _surviving(files: Iterator[File], failed: list[str]) -> Iterator[File]:
         failed.append(f"data: {type(error).__name__}: {clean(str(error))[:300]}")
 
 
-def _stored(compared: Callable[[], Comparisons], levels: str) -> Iterator[File]:
+def _stored(
+    compared: Callable[[], Comparisons], levels: str, told: Book, accepted: Sequence[Accepted]
+) -> Iterator[File]:
     pairs = stored(compared(), levels)
     yield FILE, pairs, partial(bytes, pairs)
+    script = page_files(compared(), told, accepted)
+    yield "compare/newest.js", script, partial(bytes, script)
 
 
 def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause]) -> Iterator[File]:
