@@ -18,12 +18,19 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.lane import Records, asked_for, asked_in, asked_whole, histories, line_of
-from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off, judge_all, red_class
+from spook_tracker.tracker.judge.series_history import (
+    Judged,
+    Told,
+    commit_of,
+    is_read_off,
+    judge_all,
+    red_class,
+)
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
-from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class
+from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
 from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
@@ -80,12 +87,16 @@ def known(told: Mapping[str, Told], before: str, after: str) -> Known:
         if series.definition.kind != "time" or old is None or old.usual is None:
             continue
         level, threshold = old.usual
-        usual[key] = (old.night.value, threshold) if old.red else (level, threshold)
+        usual[key] = (_time(old), threshold) if old.red else (level, threshold)
         if new is not None:
-            values[key] = (old.night.value, new.night.value)
+            values[key] = (_time(old), _time(new))
             if new.state == "suspected":
                 suspected.add(key)
     return Known(usual=usual, values=values, suspected=frozenset(suspected), first_bad=first_bad)
+
+
+def _time(judged: Judged) -> float:
+    return judged.night.value if judged.time is None else judged.time
 
 
 def side_of(run: Any) -> Side:
@@ -340,7 +351,8 @@ def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change
     level = acceptance(accepted, change.series, float(change.after), night)
     if level is None:
         return change
-    return msgspec.structs.replace(change, word="accepted", red=False, stands="accepted", accepted=str(level))
+    word: Word = "expected" if level.expected else "accepted"
+    return msgspec.structs.replace(change, word=word, red=False, stands="accepted", accepted=str(level))
 
 
 def _blamed(change: Change, first_bad: Mapping[str, tuple[str, str]]) -> Change:

@@ -6,7 +6,6 @@ are made here and nowhere else, so that whoever judges a history judges them, to
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Protocol
@@ -22,6 +21,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.document.wording import instant
+from spook_tracker.tracker.judge.calibration import ladder_timing
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings
@@ -245,13 +245,14 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
     told = []
     for found in by_run.values():
         if len(found) == len(chosen):
-            seconds = geometric_mean(min(p.sample.timing.seconds) for p in found if p.sample.timing)
-            sample = Sample(series=key, value=seconds, outcome="value", passed=True, set_point_held=True)
+            timing = ladder_timing(p.sample.timing for p in found if p.sample.timing)
+            sample = Sample(
+                series=key,
+                value=timing.seconds[0],
+                outcome="value",
+                passed=True,
+                set_point_held=True,
+                timing=timing,
+            )
             told.append(Point(found[0].run, sample, found[0].test_version))
     return SeriesHistory(definition, tuple(sorted(told, key=lambda point: order[point.run.id])))
-
-
-def geometric_mean(values: Iterable[float]) -> float:
-    """The mean of logarithms, as a value."""
-    logs = [math.log(value) for value in values]
-    return math.exp(sum(logs) / len(logs))
