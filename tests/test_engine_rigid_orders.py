@@ -121,7 +121,7 @@ def rods_error(h: float, method: Method) -> float:
 
 SCENES: dict[str, tuple[Callable[[float, Method], float], float]] = {  # error, coarsest time step
     "box": (box_error, 0.1),
-    "rods": (rods_error, 1 / 20),
+    "rods": (rods_error, 1 / 32),
     "door": (lambda h, method: swinging_door.ladder_error(simulate, h, method), 1 / 20),
     "top": (lambda h, method: spinning_top.ladder_error(simulate, h, method), 1 / 20),
 }
@@ -130,7 +130,8 @@ SCENES: dict[str, tuple[Callable[[float, Method], float], float]] = {  # error, 
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("place", SCENES)
 def test_the_order_is_the_one_claimed(place: str, name: str) -> None:
-    """Slope of log error over log h from the steps whose error is above rounding, the coarsest left out."""
+    """Slope of log error over log h from the steps whose error is above rounding, the coarsest left out: there h times
+    the fastest turn is below 1/2, where theory has the order within 0.25 (tests/test_scalar_tests_orders.py)."""
     error, coarsest = SCENES[place]
     method, order = METHODS[name]
     finest = 4 if order < 8 else 3
@@ -142,7 +143,7 @@ def test_the_order_is_the_one_claimed(place: str, name: str) -> None:
         assert errors[-1] < 1e-10
         kept = list(zip(steps[:2], errors[:2], strict=True))
     slope = np.polyfit(np.log([h for h, _ in kept]), np.log([e for _, e in kept]), 1)[0]
-    assert order - 0.3 < slope < order + 1.5, errors
+    assert order - 0.3 < slope < order + 0.3, errors
 
 
 def held(kind: str, bodies: int) -> Scene:
