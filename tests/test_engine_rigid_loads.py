@@ -195,10 +195,18 @@ def test_a_redundant_loop_without_compliance_moves_or_is_refused() -> None:
     assert off_after_a_second(Method(composition="order4"), 1 / 60) < 5e-9  # the reference has nine digits
 
 
-@pytest.mark.parametrize(("method", "h"), [(ORDER6, 1 / 100), (Method(composition="order8"), 1 / 40)])
-def test_compositions_go_through_singular_positions(method: Method, h: float) -> None:
-    """Four-bars lie flat twice a turn, where each could fold another way."""
-    assert four_bars.answers(simulate, 2, h, 5.0, method)["library_error"] < 1e-7
+@pytest.mark.parametrize(
+    ("count", "order", "steps"),
+    [(2, "order6", 100), (2, "order6", 80), (2, "order8", 40), (2, "order8", 200), (40, "order6", 60)],
+)
+def test_compositions_go_through_singular_positions(count: int, order: str, steps: int) -> None:
+    """Four-bars lie flat twice a turn, where each could fold another way; a start extrapolated over more than three
+    steps leads two of them there with an energy 2 % off."""
+    method = Method(composition=order)  # type: ignore[arg-type]
+    found = four_bars.answers(simulate, count, 1 / steps, 5.0 if count == 2 else 2.0, method)
+
+    assert found["library_error"] < 1e-7
+    assert found["energy_deviation"] < 1e-7
 
 
 def spun(speed: float, spring: JointSpring | None = None) -> Scene:
