@@ -244,6 +244,6 @@ filter();
 switches();
 openDetails();
 late();
-document.querySelectorAll("svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });
+document.querySelectorAll(".scroll > svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });
 // The page says itself when every script has run: whoever drives it need not guess.
 document.addEventListener("DOMContentLoaded", () => { document.documentElement.dataset.ready = ""; });

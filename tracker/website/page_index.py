@@ -201,6 +201,7 @@ def heat(book: Book) -> dict[str, Any]:
         "ticks": ticks,
         "width": round(left + max(step * len(shown), 46.0) + 4.0),
         "height": 26 + 22 * len(rows),
+        "left": round(left),
         "first": first,
         "description": f"{len(rows)} tests over {len(shown)} nights; "
         f"{sum(len(r['places']) for x in rows for r in x['runs'] if r['state'] == 'fail')} red.",
