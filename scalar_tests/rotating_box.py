@@ -287,7 +287,7 @@ TEST = ScalarTest(
             name="turn",
             description="largest error of a component of the orientation after 10 s against Euler's equations",
             unit="1",
-            time_steps=tuple(1.0 / n for n in (4, 6, 8, 12, 16)),
+            time_steps=tuple(1.0 / n for n in (4, 6, 8, 12, 16, 32)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=2.0),
                 *(

@@ -247,7 +247,7 @@ TEST = ScalarTest(
             ),
             error=falling_error,
             run=falling_run,
-            target_error=1e-4,
+            target_error=3e-3,
             target_seconds=0.01,
         ),
     ),
