@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy wasm three-scene nightly test check bench bench-heaps heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -13,6 +13,7 @@ help:
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
+	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
@@ -53,6 +54,9 @@ release:
 	@sh .ci/release --check "$(VERSION)"
 	$(MAKE) check test package
 	@sh .ci/release "$(VERSION)"
+
+heaps: develop
+	$(BIN)/python bench/piles.py
 
 mutants: develop
 	$(BIN)/python bench/mutants.py
