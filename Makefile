@@ -74,7 +74,7 @@ bench-heaps: develop
 wasm: develop
 	$(BIN)/cmake -S engine/native -B build/wasm -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
 	    -DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/engine/native/wasm/toolchain.cmake -DCMAKE_BUILD_TYPE=Release \
-	    -DCMAKE_CXX_FLAGS_RELEASE="-O2 -DNDEBUG" -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
+	    -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
 	$(BIN)/cmake --build build/wasm --target live
 	cp build/wasm/live.wasm site/static/live.wasm
 

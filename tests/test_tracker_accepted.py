@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
 import pytest
 
-from spook_tracker.tracker.judge.accepted import AcceptedError, acceptance, read_accepted
+from spook_tracker.tracker.judge.accepted import Accepted, AcceptedError, acceptance, read_accepted, unused
+from spook_tracker.tracker.judge.compare import compare
+from spook_tracker.tracker.judge.series_history import judge_history
+from tests.test_tracker_analyse import SERIES, history
 
 ENTRY = """
 [[accepted]]
@@ -70,3 +74,59 @@ def test_a_mistake_is_refused_with_its_place(tmp_path, old, new, sentence):
     assert old in ENTRY
     with pytest.raises(AcceptedError, match=sentence):
         read(tmp_path, ENTRY.replace(old, new))
+
+
+EXPECTED = Accepted(
+    series="t/*", low=math.inf, high=math.inf, who="Ada", why="known since spring", expected=True
+)
+
+
+def expected_of(*values: float, levels: tuple[Accepted, ...] = (EXPECTED,)) -> list[tuple[str, str, bool]]:
+    told = judge_history("t/c/m", SERIES, history(*values), levels)
+    return [(night.verdict.word, night.state, night.red) for night in told]
+
+
+def test_what_is_expected_to_fail_is_not_red_whatever_it_gives() -> None:
+    words = expected_of(0.01, 3.0, math.nan, 0.01)
+
+    assert [word for word, _, _ in words] == ["new", "expected", "expected", "identical"]
+    assert not any(red for _, _, red in words)
+
+
+def test_an_expected_failure_is_no_new_level() -> None:
+    """When its day is over the series is red against the level from before."""
+    until = replace(EXPECTED, until=date(2026, 1, 3))
+    told = judge_history("t/c/m", SERIES, history(0.01, 3.0, 3.0, 3.0), (until,))
+
+    assert [night.red for night in told] == [False, False, False, True]
+    assert told[-1].last_good is not None
+    assert told[-1].last_good.value == 0.01
+
+
+def test_the_file_may_name_expected_failures(tmp_path: Path) -> None:
+    file = tmp_path / "accepted.toml"
+    file.write_text('[[expected]]\nseries = "t/*"\nwho = "Ada"\nwhy = "known"\nuntil = 2027-01-31\n')
+    (entry,) = read_accepted(file)
+
+    assert (entry.expected, entry.series, entry.until) == (True, "t/*", date(2027, 1, 31))
+    file.write_text('[[expected]]\nseries = "t/*"\nwho = "Ada"\nwhy = "known"\nrange = [0, 1]\n')
+    with pytest.raises(AcceptedError, match="expected entry 1: 'range' is not known"):
+        read_accepted(file)
+
+
+def test_an_expected_failure_that_holds_or_is_misspelt_is_reported() -> None:
+    night = date(2026, 1, 1)
+
+    assert unused([EXPECTED], ["t/c/m"], night) == []
+    (holds,) = unused([EXPECTED], ["t/c/m"], night, held=["t/c/m"])
+    assert "expected to fail, and it holds: t/*" in holds
+    (typo,) = unused([EXPECTED], ["u/c/m"], night, held=["u/c/m"])
+    assert "no such series: t/*" in typo
+
+
+def test_a_comparison_knows_what_is_expected() -> None:
+    from tests.test_tracker_blame import _side
+
+    found = compare(_side("a", 0.01), _side("b", 3.0), [EXPECTED])
+
+    assert (found.changes[0].word, found.exit_code) == ("expected", 0)

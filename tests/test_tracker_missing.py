@@ -8,12 +8,13 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from spook_tracker.tracker.document.run_document import Asked
 from spook_tracker.tracker.judge.accepted import Accepted, read_accepted
 from spook_tracker.tracker.judge.lane import elsewhere, line_of
 from spook_tracker.tracker.judge.tonight import tonight
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import DocumentHistory, sample, series
-from tests.test_tracker_one_judge import night, one
+from tests.test_tracker_one_judge import night, one, rungs
 
 GATE = series("gone", "m", role="gate", limit=1.0)
 COMPANION = series("t", "n", role="companion", limit=1.0)
@@ -77,3 +78,51 @@ def test_where_a_way_back_breaks_off_the_order_of_commits_has_to_do() -> None:
 
     assert elsewhere(runs[:3], lost) == set()
     assert len(line_of([*runs[:3], lost], lost)) == 4
+
+
+def asked(number: int, pairs: list[Any], *tests: str, whole: bool = False) -> Any:
+    """A run that stores what it was asked for; not a nightly."""
+    wanted = Asked(tests=tests, families=("values",), whole=whole)
+    return replace(night(number, pairs), trigger="manual", asked=wanted)
+
+
+def test_a_test_that_was_asked_for_and_gave_nothing_at_all_is_missing() -> None:
+    """No value of it is there to tell by: only the request says so."""
+    runs = [both(0), asked(1, one(0.5), "t", "gone")]
+
+    assert found(runs)[GATE.key] == ("missing", True, True)
+    assert GATE.key not in found([both(0), asked(1, one(0.5), "t")])
+    assert GATE.key not in found([both(0), replace(asked(1, one(0.5), "t"), asked=None)])
+
+
+def test_a_gate_is_removed_if_the_whole_catalogue_was_asked_whoever_asked() -> None:
+    runs = [both(0), asked(1, one(0.5), "t", whole=True)]
+
+    assert found(runs)[GATE.key] == ("removed", True, True)
+
+
+def test_a_sweep_that_was_not_asked_for_is_not_missed() -> None:
+    runs = [night(0, [*one(0.5), *rungs(1e-3)]), asked(1, one(0.5), "t")]
+
+    assert set(found(runs)) == {one(0.5)[0][0].key}
+
+
+def test_a_comparison_misses_what_the_later_run_was_asked_for(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from spook_tracker.tracker.cli.main import main
+    from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.record import record
+
+    runs = [replace(both(0), trigger="manual"), asked(1, one(0.5), "t", "gone")]
+    database = f"sqlite:///{tmp_path}/t.db"
+    with session_on(database) as session:
+        for run in runs:
+            record(session, run)
+
+    shown = CliRunner().invoke(main, ["compare", "previous", "latest", "--db", database])
+    assert shown.exit_code == 1
+    assert "gone" in shown.output
+    judged = CliRunner().invoke(main, ["judge", "latest", "--db", database])
+    assert judged.exit_code == 1
+    assert "missing" in judged.output

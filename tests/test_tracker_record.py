@@ -121,9 +121,11 @@ def test_storage_knows_every_field_of_the_document():
         "runs_per_repeat",
         "instructions",
         "stage_seconds",
+        "cpu_seconds",
+        "calibration",
     )
     assert document.RunDocument.__struct_fields__ == (
         "schema_version", "id", "idempotency_key", "started", "finished", "trigger", "tracker_version",
         "ci_address", "engine", "machine", "tests", "series", "samples", "figures", "maps",
-        "trajectories", "partial",
+        "trajectories", "partial", "asked",
     )  # fmt: skip

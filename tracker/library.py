@@ -73,6 +73,18 @@ def judge(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list
     return tonight(history, history.resolve(run), accepted)
 
 
+def idle_entries(
+    history: History, run: str, findings: Sequence[Finding], accepted: Sequence[Accepted]
+) -> list[str]:
+    """A sentence for each entry of accepted.toml that does nothing to this run's findings."""
+    from spook_tracker.tracker.judge.accepted import unused
+    from spook_tracker.tracker.judge.series_history import night_of
+
+    names = {finding.series for finding in findings} | set(history.series_keys())
+    held = {f.series for f in findings if not f.red and f.verdict.word != "expected"}
+    return unused(accepted, names, night_of(history.resolve(run)), held)
+
+
 def trend(
     history: History, test: str, metric: str | None = None, accepted: Sequence[Accepted] = ()
 ) -> list[Told]:
@@ -102,11 +114,15 @@ def trend(
     return list(judge_all(found, accepted).values())
 
 
-def publish(history: History, out: Path, accepted: Sequence[Accepted] = ()) -> Any:
-    """Build the website in a folder; returns how many files were written (tracker.website.publish.Report)."""
+def publish(history: History, out: Path, accepted: Sequence[Accepted] = (), database: str = "") -> Any:
+    """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
+
+    `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
+    """
+    from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.publish import publish as build
 
-    return build(history, out, accepted)
+    return build(history, out, accepted, database_file(database) if database else None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +147,7 @@ def nightly(
     accepted: Sequence[Accepted] = (),
     watch: Callable[[Any], None] | None = None,
     tell: Callable[[Any], None] = lambda news: None,
+    with_database: bool = False,
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
@@ -139,8 +156,6 @@ def nightly(
     with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded as far as
     it came (Interrupted says which run), neither judged nor published.
     """
-    from spook_tracker.tracker.judge.accepted import unused
-    from spook_tracker.tracker.judge.series_history import night_of
     from spook_tracker.tracker.measure.run import Interrupted
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
@@ -157,9 +172,8 @@ def nightly(
         history = History(session)
         findings = judge(history, document.id, accepted)
         tell(findings)
-        names = {finding.series for finding in findings} | set(history.series_keys())
-        notes = unused(accepted, names, night_of(history.run(document.id)))
+        notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
-        published = publish(history, out, accepted)
+        published = publish(history, out, accepted, database if with_database else "")
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

@@ -228,7 +228,17 @@ function late() {
   }
 }
 
+// A table that fits needs no stop of the keyboard's.
+function scrollers() {
+  document.querySelectorAll(".scroll").forEach((box) => {
+    if (box.scrollWidth > box.clientWidth + 1) { box.tabIndex = 0; } else { box.removeAttribute("tabindex"); }
+  });
+}
+
 charts();
+scrollers();
+addEventListener("resize", scrollers);
+document.addEventListener("toggle", scrollers, true);
 document.querySelectorAll("table.sortable").forEach(sortable);
 filter();
 switches();

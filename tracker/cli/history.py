@@ -118,10 +118,12 @@ def judge_command(
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
-    from spook_tracker.tracker.library import judge
+    from spook_tracker.tracker.library import idle_entries, judge
 
+    levels = accepted_levels(accepted)
     with history_of(database) as history:
-        findings = judge(history, run, accepted_levels(accepted))
+        findings = judge(history, run, levels)
+        notes = idle_entries(history, run, findings, levels)
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -129,7 +131,7 @@ def judge_command(
     if as_json:
         click.echo(findings_json(findings))
     else:
-        say("\n".join(finding_lines(findings)))
+        say("\n".join([*finding_lines(findings), *(f"note: {note}" for note in notes)]))
     if any(finding.red for finding in findings):
         click.get_current_context().exit(RED)
 

@@ -241,7 +241,9 @@ def summary(findings: Sequence[Finding]) -> str:
     if words["new"]:
         parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
     if words["not_comparable"]:
-        parts.append(f"{words['not_comparable']} have a new definition or float environment, not compared")
+        parts.append(
+            f"{words['not_comparable']} cannot be compared (new definition, float environment, unquiet machine)"
+        )
     return click.style("✓ " + "; ".join(parts), fg="green")
 
 

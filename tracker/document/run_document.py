@@ -85,6 +85,8 @@ class Timing(Struct, frozen=True, kw_only=True):
     runs_per_repeat: int  # very short runs are repeated until the clock resolves them
     instructions: int | None = None  # retired, where the machine counts them
     stage_seconds: dict[str, float] = {}
+    cpu_seconds: tuple[float, ...] = ()  # of each repeat, without what the machine spent elsewhere
+    calibration: tuple[float, ...] = ()  # s of the calibration kernel beside each repeat
 
 
 class Sample(Struct, frozen=True, kw_only=True):
@@ -241,6 +243,17 @@ class TestCard(Struct, frozen=True, kw_only=True):
     scene: SceneDrawing | None = None
 
 
+Family = Literal["values", "sweep", "stability"]
+
+
+class Asked(Struct, frozen=True, kw_only=True):
+    """What a run was asked for: what of it is not answered is missing, not forgotten."""
+
+    tests: tuple[Name, ...]
+    families: tuple[Family, ...]
+    whole: bool  # the whole catalogue: a gate that is not in it any more was removed
+
+
 class RunDocument(Struct, frozen=True, kw_only=True):
     """One run: everything measured at one engine version on one machine."""
 
@@ -261,6 +274,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     maps: tuple[MapData, ...] = ()
     trajectories: tuple[Trajectory, ...] = ()
     partial: bool = False  # interrupted: only what was finished by then
+    asked: Asked | None = None  # None: not known, and told from what is answered
 
 
 class Run(Protocol):

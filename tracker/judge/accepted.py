@@ -9,7 +9,11 @@ accepted.toml holds tables like
     why = "one sentence"
     until = 2027-01-31                                 # optional: after this day it is red again
 
-and, for a gate that left the catalogue on purpose, `removed = true` in place of the range. A value inside the range is not red until that day. What is not finite is never accepted.
+and, for a gate that left the catalogue on purpose, `removed = true` in place of the range. A value inside the
+range is not red until that day and is the new level. What is not finite is never accepted.
+
+A table [[expected]] without a range (series, who, why, until) names what is known to fail: whatever it gives is not
+red until that day, the level from before stays the one to come back to, and once it holds the entry is reported.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ from typing import Any
 
 from spook_tracker.tracker.document.errors import TrackerError
 
+KINDS = ("accepted", "expected")
 KNOWN = {"series", "range", "removed", "who", "why", "until"}
 
 
@@ -43,6 +48,7 @@ class Accepted:
     why: str
     until: date | None = None
     removed: bool = False  # that the series is not asked for any more, instead of a range
+    expected: bool = False  # that it fails, whatever its value
 
     def names(self, key: str) -> bool:
         """Whether the entry is about that series."""
@@ -54,12 +60,13 @@ class Accepted:
 
     def takes(self, key: str, value: float, night: date) -> bool:
         """Whether that value of that series is accepted on that night."""
-        in_time = self.until is None or night <= self.until
-        return in_time and self.names(key) and math.isfinite(value) and self.low <= value <= self.high
+        if self.over(night) or not self.names(key) or self.removed:
+            return False
+        return self.expected or (math.isfinite(value) and self.low <= value <= self.high)
 
     def __str__(self) -> str:
         until = f", until {self.until}" if self.until else ""
-        return f"accepted by {self.who}: {self.why}{until}"
+        return f"{'expected' if self.expected else 'accepted'} by {self.who}: {self.why}{until}"
 
 
 def read_accepted(file: Path) -> tuple[Accepted, ...]:
@@ -70,24 +77,30 @@ def read_accepted(file: Path) -> tuple[Accepted, ...]:
         content = tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise AcceptedError(f"{file} is not valid TOML: {error}") from None
-    entries = content.get("accepted", [])
-    if not isinstance(entries, list) or set(content) - {"accepted"}:
-        raise AcceptedError(f"{file} may hold [[accepted]] tables only")
-    return tuple(_entry(f"{file}, entry {number}", entry) for number, entry in enumerate(entries, 1))
+    kinds = [content.get(kind, []) for kind in KINDS]
+    if set(content) - set(KINDS) or not all(isinstance(entries, list) for entries in kinds):
+        raise AcceptedError(f"{file} may hold [[accepted]] tables only, and [[expected]] ones")
+    return tuple(
+        _entry(f"{file}, {'entry' if kind == 'accepted' else 'expected entry'} {number}", entry, kind)
+        for kind, entries in zip(KINDS, kinds, strict=True)
+        for number, entry in enumerate(entries, 1)
+    )
 
 
-def _entry(place: str, entry: Any) -> Accepted:
+def _entry(place: str, entry: Any, kind: str) -> Accepted:
     if not isinstance(entry, dict):
-        raise AcceptedError(f"{place}: write it as a [[accepted]] table")
-    for name in sorted(set(entry) - KNOWN):
-        raise AcceptedError(f"{place}: {name!r} is not known; the names are {', '.join(sorted(KNOWN))}")
+        raise AcceptedError(f"{place}: write it as a [[{kind}]] table")
+    known = KNOWN if kind == "accepted" else KNOWN - {"range", "removed"}
+    for name in sorted(set(entry) - known):
+        raise AcceptedError(f"{place}: {name!r} is not known; the names are {', '.join(sorted(known))}")
     for name in ("series", "who", "why"):
         if not isinstance(entry.get(name), str) or not entry[name].strip():
             raise AcceptedError(f"{place}: {name} must be a text; say {name}")
     removed = entry.get("removed", False)
     if not isinstance(removed, bool) or (removed and "range" in entry):
         raise AcceptedError(f"{place}: removed must be true, without a range")
-    band = entry.get("range", [math.inf, math.inf] if removed else None)
+    expected = kind == "expected"
+    band = entry.get("range", [math.inf, math.inf] if removed or expected else None)
     if (
         not isinstance(band, list)
         or len(band) != 2
@@ -109,6 +122,7 @@ def _entry(place: str, entry: Any) -> Accepted:
         why=entry["why"],
         until=until,
         removed=removed,
+        expected=expected,
     )
 
 
@@ -117,17 +131,27 @@ def acceptance(
 ) -> Accepted | None:
     """The entry that takes this value, or that the series is gone, if one does."""
     if removed:
-        return next((x for x in levels if x.removed and x.names(key) and not x.over(night)), None)
+        gone = (x for x in levels if (x.removed or x.expected) and x.names(key) and not x.over(night))
+        return next(gone, None)
     return next((level for level in levels if level.takes(key, value, night)), None)
 
 
-def unused(levels: Sequence[Accepted], keys: Iterable[str], night: date) -> list[str]:
-    """A sentence for each entry that does nothing: its day has passed, or no series has such a name."""
-    names = list(keys)
+def unused(
+    levels: Sequence[Accepted], keys: Iterable[str], night: date, held: Iterable[str] = ()
+) -> list[str]:
+    """A sentence for each entry that does nothing.
+
+    Its day has passed, no series has such a name, or what was expected to fail is among those that held.
+    """
+    names, well = list(keys), set(held)
     said = []
     for level in levels:
+        named = [key for key in names if level.names(key)]
+        kind = "expected to fail" if level.expected else "accepted"
         if level.over(night):
-            said.append(f"accepted until {level.until} and over: {level.series}; remove the entry")
-        elif not any(level.names(key) for key in names):
-            said.append(f"accepted, but there is no such series: {level.series}; correct or remove the entry")
+            said.append(f"{kind} until {level.until} and over: {level.series}; remove the entry")
+        elif not named:
+            said.append(f"{kind}, but there is no such series: {level.series}; correct or remove the entry")
+        elif level.expected and well and well.issuperset(named):
+            said.append(f"expected to fail, and it holds: {level.series}; remove the entry")
     return said

@@ -17,13 +17,20 @@ from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesD
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
-from spook_tracker.tracker.judge.lane import Records, histories, line_of
-from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off, judge_all, red_class
+from spook_tracker.tracker.judge.lane import Records, asked_for, asked_in, asked_whole, histories, line_of
+from spook_tracker.tracker.judge.series_history import (
+    Judged,
+    Told,
+    commit_of,
+    is_read_off,
+    judge_all,
+    red_class,
+)
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
-from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class
+from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
 from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
@@ -39,6 +46,7 @@ class ComparedRun:
     samples: Samples
     maps: Sequence[MapData] = ()
     whole: bool = False  # the whole catalogue was asked: what is not there was removed
+    asked: Mapping[str, set[str]] | None = None  # tests by family; None: those it measured
 
     @property
     def night(self) -> date:
@@ -79,12 +87,16 @@ def known(told: Mapping[str, Told], before: str, after: str) -> Known:
         if series.definition.kind != "time" or old is None or old.usual is None:
             continue
         level, threshold = old.usual
-        usual[key] = (old.night.value, threshold) if old.red else (level, threshold)
+        usual[key] = (_time(old), threshold) if old.red else (level, threshold)
         if new is not None:
-            values[key] = (old.night.value, new.night.value)
+            values[key] = (_time(old), _time(new))
             if new.state == "suspected":
                 suspected.add(key)
     return Known(usual=usual, values=values, suspected=frozenset(suspected), first_bad=first_bad)
+
+
+def _time(judged: Judged) -> float:
+    return judged.night.value if judged.time is None else judged.time
 
 
 def side_of(run: Any) -> Side:
@@ -142,7 +154,7 @@ def compare_in(
     line = line_of(runs, newest)
     timed = {key for key, (d, s) in later.samples.items() if d.kind == "time" or s.timing is not None}
     told = judge_all(histories(records, line, timed)) if timed and len(line) > 1 else {}
-    later = replace(later, whole=getattr(new, "trigger", "") == "nightly")
+    later = replace(later, whole=asked_whole(new), asked=asked_for(new, later.samples))
     document = compare(earlier, later, accepted, known(told, old.id, new.id))
     reds = {change.series for change in document.changes if change.red} - told.keys()
     if not reds:
@@ -165,7 +177,7 @@ def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regress
 
 def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> list[Change]:
     old_run, new_run = before.side, after.side
-    measured = {(definition.test, FAMILIES[definition.kind]) for definition, _ in after.samples.values()}
+    asked_of = asked_in(after.samples) if after.asked is None else after.asked
     changes = []
     for key in before.samples.keys() | after.samples.keys():
         old, new = before.samples.get(key), after.samples.get(key)
@@ -176,8 +188,8 @@ def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> 
             changes.append(_change(key, new[0], None, new[1], verdict))
         elif new is None and old is not None:
             family = FAMILIES[old[0].kind]
-            asked = (old[0].test, family) in measured
-            removed = after.whole and old[0].role == "gate" and any(f == family for _, f in measured)
+            asked = old[0].test in asked_of.get(family, ())
+            removed = after.whole and old[0].role == "gate" and family in asked_of
             changes.append(_gone(key, old, asked, removed))
         elif old is not None and new is not None:
             if why := _another_question(old[0], new[0]):
@@ -339,7 +351,8 @@ def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change
     level = acceptance(accepted, change.series, float(change.after), night)
     if level is None:
         return change
-    return msgspec.structs.replace(change, word="accepted", red=False, stands="accepted", accepted=str(level))
+    word: Word = "expected" if level.expected else "accepted"
+    return msgspec.structs.replace(change, word=word, red=False, stands="accepted", accepted=str(level))
 
 
 def _blamed(change: Change, first_bad: Mapping[str, tuple[str, str]]) -> Change:

@@ -9,8 +9,8 @@ from statistics import median
 
 from spook_tracker.tracker.document.order import error_in_time, time_at_error
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing, from_number
+from spook_tracker.tracker.judge.calibration import geometric_mean
 from spook_tracker.tracker.judge.comparison_document import Change, Frontier
-from spook_tracker.tracker.judge.lane import geometric_mean
 from spook_tracker.tracker.judge.timing_statistics import compare_times
 from spook_tracker.tracker.judge.vocabulary import Word
 

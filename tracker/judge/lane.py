@@ -6,7 +6,6 @@ are made here and nowhere else, so that whoever judges a history judges them, to
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Protocol
@@ -22,6 +21,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.document.wording import instant
+from spook_tracker.tracker.judge.calibration import ladder_timing
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings
@@ -150,13 +150,14 @@ def with_missing(
 ) -> dict[str, SeriesHistory]:
     """The histories with a point for every value that was asked for and not answered.
 
-    A run asks for every value of the tests it measures, of the families (values, sweep, stability) it measures;
-    a nightly asks for the whole catalogue, so that a gate whose test is gone is removed, not forgotten. What is
-    read off the clock is not missed: a machine may be too busy for it.
+    What a run was asked for it stores. Of a run that does not say (recorded by an earlier tracker, or by another
+    tool), it is taken to be every value of the tests and families (values, sweep, stability) it measured, and for
+    a nightly the whole catalogue. If the whole catalogue was asked, a gate whose test is gone is removed, not
+    forgotten. What is read off the clock is not missed: a machine may be too busy for it.
     """
     place = {run.id: i for i, run in enumerate(runs)}
-    asked = [_asked(measured.get(run.id, {})) for run in runs]
-    whole = [getattr(run, "trigger", "") == "nightly" for run in runs]
+    asked = [asked_for(run, measured.get(run.id, {})) for run in runs]
+    whole = [asked_whole(run) for run in runs]
     told = {}
     for key, series in found.items():
         definition = series.definition
@@ -170,8 +171,10 @@ def with_missing(
             if runs[i].id in answered or runs[i].engine.name != points[0].run.engine.name:
                 continue
             family = FAMILIES[definition.kind]
-            gone = definition.test not in asked[i].get(family, ())
-            if gone and not (whole[i] and definition.role == "gate" and asked[i].get(family)):
+            if family not in asked[i]:
+                continue
+            gone = definition.test not in asked[i][family]
+            if gone and not (whole[i] and definition.role == "gate"):
                 continue
             why = "removed from the catalogue" if gone else "asked for and not answered"
             lost = Sample(
@@ -185,12 +188,26 @@ def with_missing(
     return told
 
 
-def _asked(samples: Samples) -> dict[str, set[str]]:
-    """The tests a run measured, by family."""
+def asked_for(run: Any, samples: Samples) -> dict[str, set[str]]:
+    """The tests a run was asked for, by family."""
+    stored = getattr(run, "asked", None)
+    if stored is not None:
+        return {family: set(stored.tests) for family in stored.families}
+    return asked_in(samples)
+
+
+def asked_in(samples: Samples) -> dict[str, set[str]]:
+    """The tests that were measured, by family: all that is known of a run that does not say."""
     asked: dict[str, set[str]] = {}
     for definition, _ in samples.values():
         asked.setdefault(FAMILIES[definition.kind], set()).add(definition.test)
     return asked
+
+
+def asked_whole(run: Any) -> bool:
+    """Whether a run was asked for the whole catalogue."""
+    stored = getattr(run, "asked", None)
+    return getattr(run, "trigger", "") == "nightly" if stored is None else bool(stored.whole)
 
 
 def run_times(found: Mapping[str, SeriesHistory]) -> dict[str, SeriesHistory]:
@@ -228,13 +245,14 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
     told = []
     for found in by_run.values():
         if len(found) == len(chosen):
-            seconds = geometric_mean(min(p.sample.timing.seconds) for p in found if p.sample.timing)
-            sample = Sample(series=key, value=seconds, outcome="value", passed=True, set_point_held=True)
+            timing = ladder_timing(p.sample.timing for p in found if p.sample.timing)
+            sample = Sample(
+                series=key,
+                value=timing.seconds[0],
+                outcome="value",
+                passed=True,
+                set_point_held=True,
+                timing=timing,
+            )
             told.append(Point(found[0].run, sample, found[0].test_version))
     return SeriesHistory(definition, tuple(sorted(told, key=lambda point: order[point.run.id])))
-
-
-def geometric_mean(values: Iterable[float]) -> float:
-    """The mean of logarithms, as a value."""
-    logs = [math.log(value) for value in values]
-    return math.exp(sum(logs) / len(logs))

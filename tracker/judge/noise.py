@@ -16,21 +16,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from heapq import nlargest
 from statistics import median
-from typing import Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Literal
 
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
     SPANS,
-    Values,
     remembered,
     shift,
     standard_error,
 )
 from spook_tracker.tracker.judge.slower import Usual, change_in_words, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.shifts import Values
 
 WINDOW = 30  # nights that say what is usual
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
@@ -186,6 +186,8 @@ class _Walk:
 
     def _base(self) -> Values:
         """The values of the present level."""
+        import numpy as np
+
         finite = [self.values[i] for i in self.level_since if math.isfinite(self.values[i])]
         return np.array(finite[-BASE:])
 
@@ -336,6 +338,8 @@ class _Walk:
 
     def _wanders(self) -> float:
         """How far the means of two spans of nights may lie apart, a trend of these nights taken out."""
+        import numpy as np
+
         base = self._base()
         if len(base) < FEWEST_BASE:
             return 0.0

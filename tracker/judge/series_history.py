@@ -18,6 +18,7 @@ from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
+from spook_tracker.tracker.judge.calibration import engines_own, unquiet
 from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.slower import Usual, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
@@ -45,6 +46,7 @@ class Judged:
     before_worse: Point | None = None  # the night before that
     accepted: str = ""
     usual: Usual | None = None  # of run times: level and noise after this night
+    time: float | None = None  # of run times: the value judged, in seconds of the machine as it usually is
     confirms: bool = False  # of run times: the second slow night, which makes both red
 
     @property
@@ -160,6 +162,20 @@ def _judge_values(
         bad = verdict.red or broken
         gone_for_good = night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
         taken = acceptance(accepted, key, night.value, night_of(night.run), gone_for_good) if bad else None
+        if taken is not None and taken.expected:  # the level from before stays
+            words = f"expected to fail; {verdict.sentence}"
+            known = replace(verdict, word="expected", sentence=words, name="")
+            ended: State = "accepted" if red is not None else "green"
+            red, calm = None, None
+            yield Judged(
+                night=night,
+                verdict=known,
+                state=ended,
+                stands="accepted",
+                against=against,
+                accepted=str(taken),
+            )
+            continue
         if bad and taken is None:
             worse = red is None or _worsened(definition, red.night, night)
             good = (
@@ -299,12 +315,14 @@ def _judge_times(
     found: dict[int, Judged] = {}
     old = Verdict(word="same", sentence="too long ago to be judged again")
     for every in lanes.values():
-        for place in every[:-NOISY_NIGHTS]:
+        loud = {place: why for place in every if (why := unquiet(history[place]))}
+        for place in (*every[:-NOISY_NIGHTS], *loud):
             own = standing(definition, history[place].sample)
-            found[place] = Judged(night=history[place], verdict=old, state="green", stands=own)
-        places = every[-NOISY_NIGHTS:]
+            said = Verdict(word="not_comparable", sentence=loud[place]) if place in loud else old
+            found[place] = Judged(night=history[place], verdict=said, state="green", stands=own)
+        places = [place for place in every[-NOISY_NIGHTS:] if place not in loud]
         lane = [history[place] for place in places]
-        values = [night.value for night in lane]
+        values = engines_own(lane)
         taken = [
             acceptance(accepted, key, value, night_of(night.run)) if accepted else None
             for night, value in zip(lane, values, strict=True)
@@ -337,6 +355,7 @@ def _judge_times(
                 before_worse=good,
                 accepted=str(taken[i]) if noisy.state == "accepted" else "",
                 usual=noisy.usual,
+                time=values[i],
                 confirms=noisy.state == "detected" and (i == 0 or verdicts[i - 1].state != "detected"),
             )
     return [found[place] for place in sorted(found)]

@@ -12,11 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
+if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
+    import numpy as np
+    import numpy.typing as npt
 
-Values = npt.NDArray[np.float64]
+    Values: TypeAlias = npt.NDArray[np.float64]
 
 SPANS = (4, 6)  # last nights looked at together
 BASE = 100  # nights of the level before they are compared with
@@ -46,6 +48,8 @@ def shift(values: Sequence[float]) -> Shift | None:
 
     Values are positive, of one level until the shift, oldest first.
     """
+    import numpy as np
+
     found: Shift | None = None
     for span in SPANS:
         base, last = values[-BASE - span : -span], values[-span:]
@@ -58,6 +62,8 @@ def shift(values: Sequence[float]) -> Shift | None:
 
 
 def _tried(base: Values, last: Values) -> Shift | None:
+    import numpy as np
+
     pooled = np.concatenate([base, last])
     middle = float(np.median(base))
     noise = NORMAL * float(np.median(np.abs(base - middle)))
@@ -79,6 +85,8 @@ def standard_error(base: Values, span: int) -> float:
     For nights that remember each other as a first-order process does; the spread of few such nights is too small
     by what their mean takes up.
     """
+    import numpy as np
+
     count, memory = len(base), remembered(base)
     together = (1.0 + memory) / (1.0 - memory)
     independent = count / together
@@ -91,6 +99,8 @@ def standard_error(base: Values, span: int) -> float:
 
 def remembered(base: Values) -> float:
     """Autocorrelation from one night to the next, zero unless it is told from chance; at most 0.98."""
+    import numpy as np
+
     centred = base - np.mean(base)
     total = float(centred @ centred)
     if total <= len(base) * (ROUNDING * float(np.max(np.abs(base)))) ** 2:
@@ -112,6 +122,8 @@ def student(freedom: float) -> float:
 
 def permutation_probability(base: Values, last: Values) -> float:
     """The share of choices of as many values among all whose sum is at least that of the last."""
+    import numpy as np
+
     pooled = np.concatenate([base, last])
     low, high = float(np.min(pooled)), float(np.max(pooled))
     if high <= low:

@@ -26,7 +26,9 @@ from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
+    Asked,
     EngineVersion,
+    Family,
     FigureData,
     MapData,
     RunDocument,
@@ -251,7 +253,17 @@ def _document(
         figures=tuple(figures),
         maps=tuple(maps),
         trajectories=tuple(trajectories),
+        asked=_asked(source, request),
     )
+
+
+def _asked(source: Questions, request: Request) -> Asked:
+    """What the run was asked for, whatever came of it."""
+    families: list[Family] = ["values"]
+    families += ["sweep"] if request.sweep else []
+    families += ["stability"] if request.stability else []
+    tests = tuple(select(source.tests(), request.tests))
+    return Asked(tests=tests, families=tuple(families), whole=not request.tests)
 
 
 def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:

@@ -2,7 +2,8 @@
 
 Every repeat visits all runs once before the next repeat begins, so that a slow minute of the machine falls on
 all of them alike. The minimum is the estimate; every repeat is kept, because the spread says what a
-difference means.
+difference means. Beside each stands the processor time, which leaves out what the machine spent elsewhere, and
+what the calibration kernel took just before it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Simulate
 from spook_tracker.tracker.document.run_document import Timing
+from spook_tracker.tracker.measure.calibration import calibrate
 from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
 from spook_tracker.tracker.measure.question import ask
 
@@ -36,15 +38,18 @@ class Stopwatch:
     simulate: Simulate
     options: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+    elsewhere: float = 0.0  # s that passed while the processor was not ours
     results: list[Result] = field(default_factory=list)
     counter: InstructionCounter | None = None
 
     def __call__(self, scene: Any, **options: Any) -> Result:
+        wall, own = time.perf_counter(), time.thread_time()
         if self.counter is None:
             result = self.simulate(scene, **{**options, **self.options})
         else:
             with self.counter.counting():
                 result = self.simulate(scene, **{**options, **self.options})
+        self.elsewhere += max(0.0, (time.perf_counter() - wall) - (time.thread_time() - own))
         self.seconds += result.seconds
         self.results[:] = [result]
         return result
@@ -58,16 +63,25 @@ class _Lane:
     runs: int
     repeats: int
     seconds: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+    kernel: list[float] = field(default_factory=list)
 
 
 def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> float | None:
     """Seconds of one run, None if it failed."""
+    taken = _both(run, simulate, time_limit)
+    return None if taken is None else taken[0]
+
+
+def _both(run: Timed, simulate: Simulate, time_limit: float | None = None) -> tuple[float, float] | None:
+    """Seconds of one run, and of the processor for it."""
     watch = Stopwatch(simulate, {} if time_limit is None else {"time_limit": time_limit})
     before = time.perf_counter()
     answer = ask(partial(run, watch))
     if answer.outcome != "value" or any(not result.completed for result in watch.results):
         return None
-    return watch.seconds if watch.results else time.perf_counter() - before
+    seconds = watch.seconds if watch.results else time.perf_counter() - before
+    return seconds, max(0.0, seconds - watch.elsewhere)
 
 
 def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list[Timing | None]:
@@ -91,9 +105,13 @@ def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list
         for lane in lanes:
             if lane is None or turn >= lane.repeats:
                 continue
-            taken = [once(lane.run, simulate) for _ in range(lane.runs)]
-            whole = [s for s in taken if s is not None]
-            lane.seconds += [_undisturbed(whole)] if whole else []
+            kernel = calibrate()
+            taken = [_both(lane.run, simulate) for _ in range(lane.runs)]
+            whole = [both for both in taken if both is not None]
+            if whole:
+                lane.kernel.append(kernel)
+                lane.seconds.append(_undisturbed([seconds for seconds, _ in whole]))
+                lane.cpu.append(_undisturbed([cpu for _, cpu in whole]))
     return [_timing(lane, simulate) if lane and lane.seconds else None for lane in lanes]
 
 
@@ -110,6 +128,8 @@ def _timing(lane: _Lane, simulate: Simulate) -> Timing:
         runs_per_repeat=lane.runs,
         instructions=_instructions(lane.run, simulate) if short and can_count() else None,
         stage_seconds=stage_seconds(lane.run, simulate) if short else {},
+        cpu_seconds=tuple(lane.cpu),
+        calibration=tuple(lane.kernel),
     )
 
 

@@ -169,6 +169,7 @@ class History:
             maps=self.maps(run_id),
             trajectories=self.trajectories(run_id),
             partial=stored.partial,
+            asked=run.asked,
         )
 
     def _read_runs(self) -> tuple[RunInfo, ...]:
@@ -181,12 +182,13 @@ class History:
             "id", "started", "finished", "trigger", "tracker_version", "ci_address", "key", "started_at",
             "gates", "gates_passed",
         )  # fmt: skip
-        columns = [getattr(models.Run, name) for name in (*same, "engine_version_id", "machine_id")]
+        columns = [getattr(models.Run, name) for name in (*same, "asked", "engine_version_id", "machine_id")]
         runs = [
             RunInfo(
                 engine=engines[row[-2]],
                 machine=machines[row[-1]],
-                **dict(zip(same, row[:-2], strict=True)),
+                asked=rows.asked_of(row[-3]),
+                **dict(zip(same, row[:-3], strict=True)),
             )
             for row in connection.execute(select(*columns))
         ]
@@ -259,7 +261,8 @@ class History:
             query = (
                 query.add_columns(
                     proof.failure, proof.state_hash, proof.counters, timing.seconds,
-                    timing.runs_per_repeat, timing.instructions, timing.stage_seconds,
+                    timing.runs_per_repeat, timing.instructions, timing.stage_seconds, timing.cpu_seconds,
+                    timing.calibration,
                 )
                 .outerjoin(proof, _same_place(sample, proof))
                 .outerjoin(timing, _same_place(sample, timing))
@@ -277,7 +280,7 @@ class History:
             if evidence and row[8] is not None:
                 more = {"failure": row[8], "state_hash": row[9], "counters": rows.counters_of(row[10])}
             if evidence and row[11] is not None:
-                more["timing"] = rows.timing_of(row[11], row[12], row[13], row[14])
+                more["timing"] = rows.timing_of(*row[11:17])
             read = Sample(
                 series=definition.key,
                 value=rows.joined(row[3], row[4]),

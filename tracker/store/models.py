@@ -234,6 +234,7 @@ class Run(Base):
     series_list_id: Mapped[int] = _reference("series_list.id", "definitions used")
     gates: Mapped[int] = mapped_column(BigInteger, comment="number of gate samples")
     partial: Mapped[bool] = mapped_column(comment="interrupted: only what was finished by then")
+    asked: Mapped[str] = _text("JSON of the tests and families asked for; empty if unknown")
     gates_passed: Mapped[int] = mapped_column(
         BigInteger, comment="gate samples inside their limit that night"
     )
@@ -292,6 +293,10 @@ class Timing(Base):
     runs_per_repeat: Mapped[int] = mapped_column(BigInteger, comment="simulations in one repeat")
     instructions: Mapped[int | None] = mapped_column(BigInteger, comment="retired; NULL if not counted")
     stage_seconds: Mapped[str] = _text("JSON object: seconds by stage of the step")
+    cpu_seconds: Mapped[str] = _text("JSON list: processor time of each repeat, s; empty if not taken")
+    calibration: Mapped[str] = _text(
+        "JSON list: seconds of the calibration kernel beside each repeat; empty if not taken"
+    )
 
 
 class Figure(Base):

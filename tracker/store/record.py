@@ -84,6 +84,7 @@ def _store(session: Session, run: RunDocument) -> bool:
             "ci_address": run.ci_address,
             "schema_version": run.schema_version,
             "partial": run.partial,
+            "asked": rows.asked_text(run.asked),
             "engine_version_id": engine["id"],
             "machine_id": machine["id"],
             "test_cards_id": cards["id"],

@@ -133,6 +133,14 @@ def definition_of(body: str) -> document.SeriesDefinition:
     return from_json(body, document.SeriesDefinition)
 
 
+def asked_text(asked: document.Asked | None) -> str:
+    return "" if asked is None else json_of(asked)
+
+
+def asked_of(text: str) -> document.Asked | None:
+    return from_json(text, document.Asked) if text else None
+
+
 def sample_row(sample: document.Sample) -> Row:
     value, special = split(sample.value)
     return {
@@ -157,6 +165,8 @@ def timing_row(timing: document.Timing) -> Row:
         "runs_per_repeat": timing.runs_per_repeat,
         "instructions": timing.instructions,
         "stage_seconds": json_of(timing.stage_seconds),
+        "cpu_seconds": json_of(timing.cpu_seconds) if timing.cpu_seconds else "",
+        "calibration": json_of(timing.calibration) if timing.calibration else "",
     }
 
 
@@ -165,12 +175,16 @@ _BY_STAGE = msgspec.json.Decoder(dict[str, float])
 _COUNTERS = msgspec.json.Decoder(dict[str, int])
 
 
-def timing_of(seconds: str, runs_per_repeat: int, instructions: int | None, stages: str) -> document.Timing:
+def timing_of(
+    seconds: str, runs_per_repeat: int, instructions: int | None, stages: str, cpu: str, calibration: str
+) -> document.Timing:
     return document.Timing(
         seconds=_SECONDS.decode(seconds),
         runs_per_repeat=runs_per_repeat,
         instructions=instructions,
         stage_seconds=_BY_STAGE.decode(stages),
+        cpu_seconds=_SECONDS.decode(cpu) if cpu else (),
+        calibration=_SECONDS.decode(calibration) if calibration else (),
     )
 
 

@@ -40,6 +40,7 @@ class RunInfo:
     started_at: datetime
     gates: int  # gate samples in this run
     gates_passed: int
+    asked: document.Asked | None = None  # None: not known
 
     @property
     def green(self) -> bool:

@@ -46,6 +46,7 @@ class Night:
     tracker_version: str
     engine: EngineVersion
     machine: Machine
+    asked: Any = None  # tracker.document.run_document.Asked; None: not known
 
 
 @dataclass
@@ -173,7 +174,7 @@ def _chapter(
     nights = [
         Night(
             index, run.id, run.started, run.finished, run.trigger, run.ci_address, run.tracker_version,
-            run.engine, run.machine,
+            run.engine, run.machine, getattr(run, "asked", None),
         )
         for index, run in enumerate(runs)
     ]  # fmt: skip

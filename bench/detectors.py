@@ -1,0 +1,172 @@
+"""`make detectors`: what the judge of run times finds and what it cries over, beside asv's steps and Otava.
+
+Synthetic noise and steps (tests/noise_battery.py) and, with --recorded, histories that continuous integration of
+other projects has published (the data.js of github-action-benchmark). Alarms are starts of red stretches after
+sixty nights of learning; the other tools see each history whole, which favours them, and a step of theirs counts
+where it is upward and above 5 %, asv's own threshold for a regression. Delays are of night after night for all.
+asv and apache-otava are asked where they are installed (asv with NumPy, Otava 0.8 pins its own: another
+environment will do). `--page FILE` writes the tables as Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import itertools
+
+from spook_tracker.tracker.judge.noise import judge_noisy
+from tests import noise_battery as battery
+
+LEARNING, NIGHTS = 60, 560
+AFTER = 15  # nights looked at after a step
+UPWARD = 0.05
+FEWEST_POINTS = 80  # of a recorded history
+Detector = Callable[[Sequence[float]], list[int]]  # places where it says that it became slower
+
+
+def ours(values: Sequence[float]) -> list[int]:
+    red = [night.state == "detected" for night in judge_noisy(values)]
+    return [place for place in range(1, len(red)) if red[place] and not red[place - 1]]
+
+
+def asv_steps(values: Sequence[float]) -> list[int]:
+    from asv.step_detect import detect_steps
+
+    steps = detect_steps(list(values))
+    pairs = itertools.pairwise(steps)
+    return [after[0] for before, after in pairs if after[2] > (1.0 + UPWARD) * before[2]]
+
+
+def otava(values: Sequence[float]) -> list[int]:
+    from otava.series import Metric, Series
+
+    series = Series("t", None, list(range(len(values))), {"s": Metric(1, 1.0)}, {"s": list(values)}, {})
+    points = series.analyze().change_points["s"]
+    return [p.index for p in points if p.stats.mean_2 > p.stats.mean_1]
+
+
+def detectors() -> dict[str, Detector]:
+    """Ours, and those of the others that are installed."""
+    found: dict[str, Detector] = {"ours": ours}
+    if find_spec("asv"):
+        found["asv"] = asv_steps
+    if find_spec("otava"):
+        found["Otava"] = otava
+    return found
+
+
+def alarms(detect: Detector, histories: Sequence[Sequence[float]]) -> tuple[int, int]:
+    """Alarms after the nights of learning, and night-values they were raised in."""
+    raised = sum(place >= LEARNING for values in histories for place in detect(values))
+    return raised, sum(len(values) - LEARNING for values in histories)
+
+
+def delay(detect: Detector, values: Sequence[float]) -> int | None:
+    """Nights until the step is told, the first being one; None if none of the first nights tells it."""
+    for nights in range(1, AFTER + 1):
+        if any(place >= LEARNING - 2 for place in detect(values[: LEARNING + nights])):
+            return nights
+    return None
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    rule = ["---", *["---:"] * (len(head) - 1)]
+    return ["| " + " | ".join(row) + " |" for row in (head, rule, *rows)] + [""]
+
+
+def false_alarms(found: dict[str, Detector], series: int) -> list[str]:
+    kinds: dict[str, list[list[float]]] = {
+        name: [list(map(float, battery.noise(name, s, NIGHTS))) for s in range(series)]
+        for name in battery.STATIONARY
+    }
+    kinds["two levels, ten nights each, from the third visit on"] = [
+        list(map(float, battery.visits(10, 1.08)(battery.generator("visits", s), NIGHTS)))
+        for s in range(series)
+    ]
+    for name in battery.MACHINES:
+        both = [battery.machine(name, s, NIGHTS) for s in range(series)]
+        kinds[name] = [list(map(float, seconds)) for seconds, _ in both]
+        kinds[f"{name}, by the kernel"] = [list(map(float, seconds / kernel)) for seconds, kernel in both]
+    rows = []
+    for name, histories in kinds.items():
+        cells = [name]
+        for detect in found.values():
+            raised, values = alarms(detect, histories)
+            cells.append(f"{1e4 * raised / values:.1f}")
+        rows.append(cells)
+    return table(["alarms in 10 000 night-values", *found], rows)
+
+
+def steps(found: dict[str, Detector], series: int) -> list[str]:
+    rows = []
+    for name, (_, _, nights) in battery.STEPS.items():
+        cells = [f"{name}, within {nights} nights"]
+        for detect in found.values():
+            told = [
+                delay(detect, list(map(float, battery.step(name, s, LEARNING, AFTER)))) for s in range(series)
+            ]
+            late = sorted(AFTER + 1 if d is None else d for d in told)
+            middle = late[len(late) // 2]
+            hits = sum(d is not None and d <= nights for d in told)
+            median = f"median {middle}" if middle <= AFTER else f"median above {AFTER}"
+            cells.append(f"{100.0 * hits / series:.0f} % ({median})")
+        rows.append(cells)
+    return table(["steps found", *found], rows)
+
+
+def histories_of(file: Path) -> list[list[float]]:
+    """The series of a data.js of github-action-benchmark whose values are times, in the order of the commits."""
+    text = file.read_text(encoding="utf-8")
+    entries = json.loads(text[text.index("{") :].rstrip().rstrip(";"))["entries"]
+    by_name: dict[str, list[float]] = {}
+    for runs in entries.values():
+        for run in runs:
+            for bench in run["benches"]:
+                if "ns" in bench["unit"] or "s/iter" in bench["unit"]:
+                    by_name.setdefault(bench["name"], []).append(float(bench["value"]))
+    return [values for values in by_name.values() if len(values) >= FEWEST_POINTS and min(values) > 0.0]
+
+
+def recorded(found: dict[str, Detector], files: Sequence[Path]) -> list[str]:
+    rows = []
+    for file in files:
+        histories = histories_of(file)
+        points = sum(map(len, histories))
+        cells = [f"{file.stem}: {len(histories)} series, {points} values"]
+        cells += [str(alarms(detect, histories)[0]) for detect in found.values()]
+        rows.append(cells)
+    return table(["alarms on recorded histories", *found], rows) if rows else []
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--series", type=int, default=20, help="of each kind")
+    parser.add_argument(
+        "--recorded", type=Path, nargs="*", default=[], help="files data.js, named by project"
+    )
+    parser.add_argument("--page", type=Path, help="write the tables here")
+    given = parser.parse_args()
+    found = detectors()
+    started = time.process_time()
+    lines = [
+        "# Detectors of slower run times, scored", "",
+        "Made by `make detectors`, not by hand; what is counted stands at the head of `bench/detectors.py`,",
+        f"the noise in `tests/noise_battery.py`. {given.series} series of {NIGHTS} nights of each kind.", "",
+        *false_alarms(found, given.series), *steps(found, 2 * given.series), *recorded(found, given.recorded),
+    ]  # fmt: skip
+    print("\n".join(lines))
+    print(f"{time.process_time() - started:.0f} s of processor time")
+    if given.page:
+        given.page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
