@@ -112,6 +112,8 @@ void ContactStage::find_open() {
         OpenPair open{
             pair, first.body, second.body,
             separation(first.shape, detection_.pose(pair.first), second.shape, detection_.pose(pair.second))};
+        open.first_arm = first.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.first);
+        open.second_arm = second.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.second);
         const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach) open_.push_back(open);  // clearly apart: no need for its points

@@ -9,8 +9,8 @@ namespace spook {
 
 namespace {
 
-constexpr int most_turns = 20;  // times `iterations` sweeps, for steps that would be unsettled otherwise
-constexpr double focus = 0.1;   // of the residual allowed: contacts that change less are left alone then
+constexpr int most_turns = 4;  // times `iterations` sweeps, for steps that would be unsettled otherwise
+constexpr double focus = 0.1;  // of the residual allowed: contacts that change less are left alone then
 
 }  // namespace
 
