@@ -119,7 +119,9 @@ def _draw(simulate: Simulate) -> Drawing:
     pile = read(simulate, COUNT, SWEEPS)
     times = tuple(TIME_STEP * k for k in range(len(pile.depth)))
     return Drawing(
-        curves=(Curve(name="deepest overlap", x=times, y=tuple(1e3 * float(d) for d in pile.depth), style="line"),),
+        curves=(
+            Curve(name="deepest overlap", x=times, y=tuple(1e3 * float(d) for d in pile.depth), style="line"),
+        ),
         x_label="time [s]",
         y_label="overlap [mm]",
     )
