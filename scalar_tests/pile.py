@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Momentum,
     Penetration,
     Plane,
-    Position,
     Result,
     RigidBody,
     Scene,

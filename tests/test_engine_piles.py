@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from spook_tracker.engine import (
     Maximum,
     Method,
