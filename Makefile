@@ -5,13 +5,14 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy wasm three-scene nightly test check bench bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy wasm three-scene nightly test check bench bench-publish bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
+	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
@@ -63,6 +64,9 @@ mutation: develop
 bench: develop
 	$(BIN)/python bench/run.py
 
+bench-publish: develop
+	$(BIN)/python bench/bench_publish.py
+
 bench-heaps: develop
 	$(BIN)/python bench/bench_heaps.py
 
@@ -70,7 +74,7 @@ bench-heaps: develop
 wasm: develop
 	$(BIN)/cmake -S engine/native -B build/wasm -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
 	    -DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/engine/native/wasm/toolchain.cmake -DCMAKE_BUILD_TYPE=Release \
-	    -DCMAKE_CXX_FLAGS_RELEASE="-O2 -DNDEBUG" -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
+	    -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
 	$(BIN)/cmake --build build/wasm --target live
 	cp build/wasm/live.wasm site/static/live.wasm
 

@@ -32,6 +32,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "resting_stack": "resting_stack",
     "rolling_sphere": "rolling_sphere",
     "hanging_chain": "hanging_chain.question",
+    "loaded_rods": "loaded_rods",
     "spinning_top": "spinning_top",
     "motor": "motor",
     "double_pendulum": "double_pendulum",

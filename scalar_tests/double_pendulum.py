@@ -124,6 +124,13 @@ def angles(simulate: Simulate, time_step: float, method: Method) -> tuple[np.nda
     return result.sample_times["first"], np.stack([first, first + between], axis=1)
 
 
+def error_after_a_second(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest |angle − exact angle| of both rods after 1 s [rad]; the largest on the way jumps from swing to swing."""
+    times, found = angles(simulate, time_step, method)
+    second = round(1.0 / time_step)
+    return float(np.abs(found[second] - exact(tuple(times.tolist()))[second]).max())
+
+
 def angle_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest |angle − exact angle| of both rods over 2 s [rad]."""
     times, found = angles(simulate, time_step, method)
@@ -261,6 +268,24 @@ TEST = ScalarTest(
             run=run,
             target_error=0.02,
             target_seconds=0.02,
+        ),
+        Ladder(
+            name="high-order",
+            description="angle error of both rods after 1 s against the tight integration",
+            unit="rad",
+            time_steps=tuple(1.0 / n for n in (40, 50, 60, 80)),
+            configurations=tuple(
+                Configuration(name=name, method=method, expected_order=order)
+                for name, method, order in (
+                    ("order4", ORDER_4, 4.0),
+                    ("order6", ORDER_6, 6.0),
+                    ("order8", ORDER_8, 8.0),
+                )
+            ),
+            error=error_after_a_second,
+            run=run,
+            target_error=1e-4,
+            target_seconds=0.01,
         ),
     ),
 )

@@ -24,3 +24,13 @@ def sweep(values: Iterable[float], measure: Callable[[float], float]) -> tuple[f
 def line(name: str, x: Iterable[Any], y: Iterable[Any], style: Any = "line") -> Curve:
     """A curve from anything that gives numbers."""
     return Curve(name=name, x=tuple(map(float, x)), y=tuple(map(float, y)), style=style)
+
+
+def told(value: float, digits: int = 2) -> str:
+    """A measured number for the sentence beside its figure; what is not finite says so."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "no finite value"
+
+
+def at(x: Iterable[float], y: Iterable[float], place: float) -> float:
+    """The y of the point whose x is nearest to `place`."""
+    return min(zip(x, y, strict=True), key=lambda point: abs(point[0] - place))[1]

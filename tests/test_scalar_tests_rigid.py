@@ -136,6 +136,7 @@ BROKEN: dict[str, Simulate] = {
     "rotating_box": with_scene(lopsided),
     "swinging_door": with_scene(much_lighter),
     "spinning_top": with_scene(much_lighter),
+    "loaded_rods": with_scene(much_lighter),
     "motor": with_scene(overdriven),
     "lock_ring": with_joints(compliance=1e-6),
     "resting_stack": with_scene(lighter),

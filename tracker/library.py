@@ -114,11 +114,15 @@ def trend(
     return list(judge_all(found, accepted).values())
 
 
-def publish(history: History, out: Path, accepted: Sequence[Accepted] = ()) -> Any:
-    """Build the website in a folder; returns how many files were written (tracker.website.publish.Report)."""
+def publish(history: History, out: Path, accepted: Sequence[Accepted] = (), database: str = "") -> Any:
+    """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
+
+    `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
+    """
+    from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.publish import publish as build
 
-    return build(history, out, accepted)
+    return build(history, out, accepted, database_file(database) if database else None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +147,7 @@ def nightly(
     accepted: Sequence[Accepted] = (),
     watch: Callable[[Any], None] | None = None,
     tell: Callable[[Any], None] = lambda news: None,
+    with_database: bool = False,
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
@@ -170,5 +175,5 @@ def nightly(
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
-        published = publish(history, out, accepted)
+        published = publish(history, out, accepted, database if with_database else "")
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

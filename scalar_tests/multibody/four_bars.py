@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from spook_tracker.engine import (
     PLAIN,
     WORLD,
     Energy,
+    Final,
     Hinge,
     MaximumAbsolute,
     Method,
@@ -20,7 +21,15 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
-from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
 from spook_tracker.scalar_tests.multibody.library import (
     GRAVITY,
     LOW,
@@ -37,6 +46,12 @@ ACROSS = MASS * LENGTH**2 / 12.0  # kg m²
 COMPLIANCE = 1e-13  # m/N and rad/(N m): 1e-11 yields more than the high class allows
 EVERY = 0.05  # s: 20 outputs a second
 MANY, FEW = 40, 2
+BEFORE_LEVEL = 2.0 / 3.0  # s; two linkages are level at 0.714
+ORDER_RANGES: dict[Literal["order4", "order6", "order8"], tuple[float, float]] = {  # s
+    "order4": (1 / 120, 1 / 18),
+    "order6": (1 / 60, 1 / 15),
+    "order8": (1 / 21, 1 / 12),
+}
 
 
 def scene(count: int, time_step: float) -> Scene:
@@ -138,6 +153,19 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(FEW, time_step), time_step=time_step, duration=10.0, method=method)
 
 
+def falling_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest component [m] of B0 away from the exact place after BEFORE_LEVEL, two linkages."""
+    observe = {"side": Final(quantity=Position("side 0"))}
+    built = scene(FEW, time_step)
+    result = simulate(built, time_step=time_step, duration=BEFORE_LEVEL, method=method, observe=observe)
+    return float(np.abs(2.0 * result["side"][:2] - exact(FEW, (BEFORE_LEVEL,))[0]).max())
+
+
+def falling_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(scene(FEW, time_step), time_step=time_step, duration=BEFORE_LEVEL, method=method)
+
+
 ENERGY = Metric(
     name="energy_deviation",
     description="largest |E − E₀| over the energy between upright and level, (3 N + 1)/2 m g l",
@@ -184,13 +212,43 @@ TEST = ScalarTest(
         ),
     ),
     example=lambda: Example(scene=scene(FEW, 1e-3), time_step=1e-3),
-    ladders=ladders(
-        "B0 of two linkages over 10 s",
-        {
-            "low": ((1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 1000), (PLAIN_CONFIGURATION,)),
-            "high": ((1 / 480, 1 / 1000, 1 / 2000, 1 / 4000), (PLAIN_CONFIGURATION,)),
-        },
-        ladder_error,
-        ladder_run,
+    ladders=(
+        *ladders(
+            "B0 of two linkages over 10 s",
+            {
+                "low": ((1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 1000), (PLAIN_CONFIGURATION,)),
+                "high": ((1 / 480, 1 / 1000, 1 / 2000, 1 / 4000), (PLAIN_CONFIGURATION,)),
+            },
+            ladder_error,
+            ladder_run,
+        ),
+        Ladder(
+            name="before level",
+            description="largest component of B0's error after 2/3 s, just before the linkages lie level",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (12, 15, 18, 21, 30, 60, 90, 120)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 120, 1 / 30)),
+                Configuration(
+                    name="half step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=2.0,
+                    order_range=(1 / 120, 1 / 30),
+                ),
+                *(
+                    Configuration(
+                        name=order,
+                        method=Method(composition=order),
+                        expected_order=float(order[-1]),
+                        order_range=span,
+                    )
+                    for order, span in ORDER_RANGES.items()
+                ),
+            ),
+            error=falling_error,
+            run=falling_run,
+            target_error=1e-4,
+            target_seconds=0.01,
+        ),
     ),
 )

@@ -1,10 +1,17 @@
-// Two versions side by side. Every verdict was made by the command's own code; this only shows it.
+// Two versions side by side. The newest pairs were judged by the command's own code; any other two nights are
+// judged here, by judge.js, from the files of compare/.
 "use strict";
 
 (function () {
   const source = document.getElementById("comparisons");
   if (!source) { return; }
-  const { versions, pairs, texts } = JSON.parse(source.textContent);
+  const choices = JSON.parse(source.textContent), own = choices.own;
+  const versions = choices.nights.map(([id, label, hash]) => ({ id, label, hash }));
+  let newest = null;  // pairs, texts, words of the series, accepted levels: compare/newest.js
+  window.comparedNewest = (told) => {
+    newest = told;
+    for (const level of told.accepted) { level.keys = new Set(level.keys); level.low = numberOf(level.low); level.high = numberOf(level.high); }
+  };
   const before = document.getElementById("before"), after = document.getElementById("after");
   const what = document.getElementById("what"), told = document.getElementById("told");
   const HEADLINES = {
@@ -27,7 +34,7 @@
   }
 
   function line(change) {
-    const [word, red, page, test, series, old, now, said, sentence, since] = change.map((place) => texts[place]);
+    const [word, red, page, test, series, old, now, said, sentence, since] = change;
     const head = make("th", { scope: "row" }, make("a", { href: page }, test), make("span", { class: "sub" }, series));
     const cell = make("td", { "data-name": "Verdict" });
     cell.append(verdict(red || STATES[word] || "none", said.toUpperCase()), make("span", { class: "sub" }, sentence));
@@ -40,16 +47,80 @@
     const row = make("tr");
     heads.forEach(([name, kind]) => row.append(make("th", kind ? { scope: "col", class: kind } : { scope: "col" }, name)));
     const body = make("tbody", {}, ...lines);
-    return make("div", { class: "card scroll" }, make("table", { class: "cards" }, make("caption", {}, caption), make("thead", {}, row), body));
+    return make("div", { class: "card scroll", tabindex: "0", role: "group", "aria-label": "Table" }, make("table", { class: "cards" }, make("caption", {}, caption), make("thead", {}, row), body));
   }
 
-  function show() {
+  // A script of this site, once; a page opened from a file may not fetch.
+  const asked = new Map();
+  function script(address) {
+    if (!asked.has(address)) {
+      asked.set(address, new Promise((done, failed) => {
+        const tag = document.createElement("script");
+        tag.src = address;
+        tag.onload = () => done();
+        tag.onerror = () => failed(new Error(`${address} could not be loaded`));
+        document.head.append(tag);
+      }));
+    }
+    return asked.get(address);
+  }
+
+  async function nightAt(place) {
+    const number = Math.floor(place / choices.block);
+    await script(`compare/nights-${number}.js`);
+    return nightOf(nightBlocks.get(number), place % choices.block);
+  }
+
+  // Two nights judged here, in the form of a stored pair with texts in place of places.
+  async function judged(i, j) {
+    const [old, now] = [await nightAt(i), await nightAt(j)];
+    const changes = [];
+    for (const key of new Set([...old.samples.keys(), ...now.samples.keys()])) {
+      const change = judgeSeries(key, old.samples.get(key) || null, now.samples.get(key) || null, old.side, now.side, newest.accepted);
+      if (change) { changes.push(change); }
+    }
+    const counts = {};
+    for (const { word } of changes) { counts[word] = (counts[word] || 0) + 1; }
+    const verdictWord = overall(changes);
+    const shown = changes.filter((c) => !["not_measured", "same", "identical"].includes(c.word)).sort(worseFirst);
+    const words = (value, unit) => (value === null ? "–" : quantityOf(value, unit, 7));
+    return {
+      verdict: verdictWord, code: { regressed: 1, not_comparable: 3 }[verdictWord] || 0, frontiers: [],
+      counts: Object.fromEntries(Object.entries(counts).sort(([a], [b]) => (a < b ? -1 : 1))),
+      notes: ["Values, judged in this page by the command's rules. tracker compare judges the run times of whole ladders and the stability maps, too."],
+      changes: shown.map((c) => {
+        const [title, series, page] = newest.series[c.key] || [c.definition.test, c.key, "index.html"];
+        const { unit } = c.definition;
+        return [c.word, c.red ? c.stands : "", page, title, series, words(c.before, unit), words(c.after, unit), c.name || c.word.replace(/_/g, " "), c.sentence, c.blame || c.accepted];
+      }),
+    };
+  }
+
+  async function pairOf(i, j) {
+    await script("compare/newest.js");
+    const stored = newest.pairs[i + "," + j], plain = (lines) => lines.map((line) => line.map((place) => newest.texts[place]));
+    return stored ? { ...stored, changes: plain(stored.changes), frontiers: plain(stored.frontiers) } : judged(i, j);
+  }
+
+  let turn = 0;  // a choice made while an earlier one is still loading overrules it
+  async function show() {
+    const mine = turn += 1;
     const i = versions.findIndex((v) => v.id === before.value), j = versions.findIndex((v) => v.id === after.value);
     if (i === j) {
       told.replaceChildren(make("div", { class: "card pad" }, verdict("pass", "IDENTICAL"), make("p", {}, "The same run on both sides.")));
       return;
     }
-    const pair = pairs[i + "," + j];
+    if (i >= own || j >= own) {
+      const link = make("a", { href: "error-time.html" }, "Error and run time");
+      told.replaceChildren(make("div", { class: "card pad" }, make("p", {}, "Two engines are not held to each other's values; what accuracy costs in each stands on the page ", link, ".")));
+      return;
+    }
+    let pair;
+    try { pair = await pairOf(i, j); } catch (error) {
+      told.replaceChildren(make("div", { class: "card pad" }, make("p", { class: "is-fail" }, `These two cannot be compared: ${error.message}.`)));
+      return;
+    }
+    if (mine !== turn) { return; }
     const [state, word] = HEADLINES[pair.verdict];
     const counts = Object.entries(pair.counts).map(([name, n]) => n + " " + name.replace(/_/g, " ")).join(", ");
     const parts = [
@@ -58,7 +129,7 @@
       make("p", {}, counts + "."),
     ];
     pair.notes.forEach((note) => parts.push(make("p", { class: "small soft" }, note)));
-    const shown = pair.changes.filter((c) => !what.value || texts[c[1]] === what.value);
+    const shown = pair.changes.filter((c) => !what.value || (what.value === "red" ? c[1] : c[1] === what.value));
     if (shown.length) {
       parts.push(table("What is not the same, the worst first.",
         [["Series"], ["Before", "num"], ["After", "num"], ["Verdict"]], shown.slice(0, MOST).map(line)));
@@ -70,21 +141,20 @@
       parts.push(make("p", { class: "buttons" }, more));
     }
     if (pair.frontiers.length) {
-      const lines = pair.frontiers.map((f) => {
-        const [test, configuration, ladder, time, error, work] = f.map((place) => texts[place]);
-        return make("tr", {}, make("th", { scope: "row" }, test, make("span", { class: "sub" }, ladder)), make("td", { "data-name": "Configuration" }, configuration),
-          make("td", { class: "num", "data-name": "Run time" }, time), make("td", { class: "num", "data-name": "Error" }, error), make("td", { class: "num", "data-name": "Work" }, work));
-      });
+      const lines = pair.frontiers.map(([test, configuration, ladder, time, error, work]) =>
+        make("tr", {}, make("th", { scope: "row" }, test, make("span", { class: "sub" }, ladder)), make("td", { "data-name": "Configuration" }, configuration),
+          make("td", { class: "num", "data-name": "Run time" }, time), make("td", { class: "num", "data-name": "Error" }, error), make("td", { class: "num", "data-name": "Work" }, work)));
       parts.push(make("section", {}, make("h2", {}, "At equal error, at equal time"), table("After divided by before; below 1 is better.",
         [["Test"], ["Configuration"], ["Run time at equal error", "num"], ["Error at equal time", "num"], ["Work at equal error", "num"]], lines)));
     }
     told.replaceChildren(...parts);
+    told.dataset.shown = `${i},${j}`;
   }
 
   function find(name) { return name && versions.find((v) => v.id === name || (v.hash && name.length > 3 && v.hash.startsWith(name))); }
 
   function restore() {
-    const last = versions.length - 1;
+    const last = own - 1;
     before.value = (find(state.get("before")) || versions[last - 1]).id;
     after.value = (find(state.get("after")) || versions[last]).id;
     what.value = state.get("show") === "red" ? "red" : "";
@@ -103,6 +173,9 @@
     [before.value, after.value] = [after.value, before.value];
     chosen();
   });
+  for (const list of [before, after]) {
+    list.append(...versions.map(({ id, label }) => make("option", { value: id }, label)).reverse());
+  }
   addEventListener("hashchange", restore);
   document.getElementById("choice").hidden = false;
   restore();

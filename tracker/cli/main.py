@@ -21,6 +21,7 @@ from spook_tracker.tracker.cli.options import (
     refuse_unwritable,
     source_options,
     terminated_is_interrupted,
+    with_database_option,
     workers_option,
 )
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
@@ -132,12 +133,14 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@with_database_option
 @accepted_option
 @source_options
 @database_option
 def nightly(
     out: Path,
     quick: bool,
+    with_database: bool,
     workers: int,
     time_limit: float,
     accepted: Path | None,
@@ -180,6 +183,7 @@ def nightly(
             accepted=accepted_levels(accepted),
             watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
             tell=tell,
+            with_database=with_database,
             catalogue=catalogue,
             engine=first,
             limit=limit,
@@ -213,16 +217,18 @@ def engines() -> None:
 @click.option(
     "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
 )
+@with_database_option
 @accepted_option
 @database_option
-def publish(out: Path, accepted: Path | None, database: str) -> None:
+def publish(out: Path, with_database: bool, accepted: Path | None, database: str) -> None:
     """Build the website from what is recorded."""
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import History
     from spook_tracker.tracker.library import publish as build
 
     with History.open(database) as history:
-        _say_published(build(history, out, accepted_levels(accepted)), out)
+        offered = database if with_database else ""
+        _say_published(build(history, out, accepted_levels(accepted), offered), out)
 
 
 @main.command(epilog=example("tracker report --pdf night.pdf"))
@@ -343,6 +349,8 @@ def _say_published(report: Any, out: Path) -> None:
     from spook_tracker.tracker.cli.console import say
 
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
+    for sentence in report.failed:
+        click.echo(f"not made: {sentence}", err=True)
 
 
 def _json(document: Any) -> str:

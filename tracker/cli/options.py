@@ -36,6 +36,13 @@ def database_option(command: Command) -> Command:
     )(command)
 
 
+def with_database_option(command: Command) -> Command:
+    """--with-database: let readers of the website load the history."""
+    return click.option(
+        "--with-database", is_flag=True, help="Offer the SQLite file for download, as data/tracker.db."
+    )(command)
+
+
 def source_options(command: Command) -> Command:
     """Which questions are put to which engine."""
     for option in (

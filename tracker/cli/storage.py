@@ -121,3 +121,22 @@ def stats(database: str) -> None:
         click.echo(f"  from {found.first:%Y-%m-%d %H:%M} to {found.last:%Y-%m-%d %H:%M} UTC")
     for table, rows in found.rows.items():
         click.echo(f"  {rows:>9} {table}")
+
+
+@db.command(epilog=example("tracker db remove 3f2a91c0"))
+@click.argument("run", metavar="RUN")
+@database_option
+def remove(run: str, database: str) -> None:
+    """Take one run out of the history for good: by its id, the start of it, or a version."""
+    from spook_tracker.tracker.document.wording import clean, clock, version
+    from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.history import History
+    from spook_tracker.tracker.store.remove import remove as take_out
+
+    with session_on(database) as session:
+        found = History(session).resolve(run)
+        samples = take_out(session, found)
+    engine = f"{clean(found.engine.name)} {version(found.engine)}"
+    click.echo(
+        f"removed run {clean(found.id)} of {engine}, {clock(found.started)} UTC, with {samples} values"
+    )

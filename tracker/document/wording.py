@@ -129,7 +129,7 @@ def margin(definition: SeriesDefinition, value: float) -> Margin:
         )
         return Margin(over, share)
     if share < 1e-2:
-        return Margin(f"{-math.log10(share):.1f} decades inside", share)
+        return Margin(f"{math.log10(allowed) - math.log10(used):.1f} decades inside", share)
     return Margin(f"{number(100 * share, 3)} % of the limit", share)
 
 

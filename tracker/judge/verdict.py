@@ -36,6 +36,7 @@ RANK: dict[OutcomeClass, int] = {
     "missing": 4,
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
+SAID_IN_ULPS = 1e-10  # decades, a million doubles: below, a difference of logarithms is rounding
 LAST_BITS = 16  # doubles apart: a limit crossed by so few is a matter of rounding, and is said to be
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
 ROUNDING = {"ladder": 1e-10}  # of the reference or of 1: what is rounding where no limit gives a scale
@@ -253,7 +254,7 @@ def _distance(decades: float | None, ulps: int | None, what: str) -> str:
     parts = [what]
     if decades is not None and abs(decades) >= 0.05:
         parts.append(f"by {abs(decades):.1f} decades")
-    elif decades is not None and decades != 0.0:
+    elif decades is not None and abs(decades) > SAID_IN_ULPS:
         parts.append(f"by {100.0 * abs(10.0**decades - 1.0):.2g} %")
     if ulps is not None and ulps < 1_000_000:
         parts.append(f"({ulps} ULP)")

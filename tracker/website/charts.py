@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-Style = Literal["line", "points", "both", "reference", "limit", "front", "failed", "steps"]
+Style = Literal["line", "points", "both", "reference", "limit", "front", "failed", "broken", "steps"]
 Scale = Literal["linear", "log"]
 
 
@@ -26,6 +26,7 @@ class Line:
     colour: int = 0  # slot of the palette
     notes: tuple[str, ...] = ()  # what a reader sees at each point, if anything
     quiet: bool = False  # left out of the legend
+    upto: tuple[float, ...] = ()  # how far each point reaches along x: the slowest repeat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,41 +82,51 @@ class Grid:
     thesis: str = field(default="")
 
 
+LARGEST = 1e300  # what is larger cannot be drawn: the ends of its axis would overflow
+
+
+def fits(value: float) -> bool:
+    """Whether there is a place for a value on an axis."""
+    return math.isfinite(value) and abs(value) <= LARGEST
+
+
 def drawable(chart: Chart) -> Chart:
     """The chart with nothing in it that cannot be drawn.
 
     Non-finite values become failed points at the upper edge. On a logarithmic axis magnitudes are drawn and an
     exact zero sits at the lower edge, a decade under the smallest value.
     """
-    finite = [abs(y) for line in chart.lines for y in line.y if math.isfinite(y)]
+    finite = [abs(y) for line in chart.lines for y in line.y if fits(y)]
     positive = [y for y in finite if y > 0.0]
     zeros = chart.y_scale == "log" and len(positive) < len(finite)
     floor = 10.0 ** (math.floor(math.log10(min(positive))) - 1) if positive else 1e-16
     floor = floor or math.ulp(0.0)  # there is no double a decade under the smallest
     log_y = chart.y_scale == "log"
     if log_y:
-        top = 10.0 ** math.ceil(math.log10(max(positive)) + 0.3) if positive else 1.0
+        top = 10.0 ** min(308, math.ceil(math.log10(max(positive)) + 0.3)) if positive else 1.0
     else:
-        signed = [y for line in chart.lines for y in line.y if math.isfinite(y)]
+        signed = [y for line in chart.lines for y in line.y if fits(y)]
         low, high = (min(signed), max(signed)) if signed else (0.0, 1.0)
         top = high + 0.08 * (high - low or abs(high) or 1.0)
     lines: list[Line] = []
     for line in chart.lines:
-        keep_x, keep_y, keep_notes = [], [], []
+        keep_x, keep_y, keep_notes, keep_upto = [], [], [], []
         failed_x, failed_notes = [], []
         notes = line.notes or ("",) * len(line.x)
-        for x, y, note in zip(line.x, line.y, notes, strict=True):
+        for x, y, note, upto in zip(line.x, line.y, notes, line.upto or line.x, strict=True):
             if not math.isfinite(x) or (chart.x_scale == "log" and x <= 0.0):
                 continue
-            if not math.isfinite(y):
+            if not fits(y):
                 failed_x.append(x)
                 failed_notes.append(note or "failed: no finite value")
                 continue
             keep_x.append(x)
+            keep_upto.append(upto)
             keep_y.append((abs(y) or floor) if log_y else y)
             keep_notes.append(note or ("exactly 0, drawn at the lower edge" if log_y and y == 0.0 else ""))
         told = tuple(keep_notes) if any(keep_notes) else ()
-        lines.append(replace(line, x=tuple(keep_x), y=tuple(keep_y), notes=told))
+        reach = tuple(keep_upto) if line.upto else ()
+        lines.append(replace(line, x=tuple(keep_x), y=tuple(keep_y), notes=told, upto=reach))
         if failed_x:
             lines.append(
                 Line(

@@ -1,4 +1,4 @@
-"""Comparisons for the page: every ordered pair of some versions, judged by the command's own code.
+"""Comparisons for the page: every ordered pair of the newest versions, judged by the command's own code.
 
 A comparison of two runs never changes, so those of the last publication are taken over. Texts are kept once in
 a list and named by their place: a few hundred comparisons fit into one page.
@@ -7,6 +7,7 @@ a list and named by their place: a few hundred comparisons fit into one page.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,9 +28,11 @@ from spook_tracker.tracker.document.wording import (
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, known, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.series_history import is_release
-from spook_tracker.tracker.judge.vocabulary import QUIET, spaced
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
 from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.website.judged_nights import accepted_fields, described
 from spook_tracker.tracker.website.nights import Book, Night, Records
 
 NEWEST = 10  # versions to choose from
@@ -42,8 +45,13 @@ class Comparisons:
     """The versions to choose from, and what became of every ordered pair."""
 
     nights: list[Night]
-    pairs: dict[str, Any]  # "run id before/run id after" to what the page shows
+    pairs: dict[str, Any]  # by `pair_name` to what the page shows
     texts: list[str] = field(default_factory=list)
+
+
+def pair_name(before: Night, after: Night) -> str:
+    """What a comparison is stored under; an id may hold any sign."""
+    return json.dumps([before.id, after.id])
 
 
 def chosen(book: Book) -> list[Night]:
@@ -70,11 +78,13 @@ def comparisons(
 
     def side(night: Night) -> ComparedRun:
         if night.id not in sides:
+            samples = with_work(history.samples(night.id), night.engine)
             sides[night.id] = ComparedRun(
                 side=side_of(night),
-                samples=with_work(history.samples(night.id), night.engine),
+                samples=samples,
                 maps=history.maps(night.id),
-                whole=night.trigger == "nightly",
+                whole=asked_whole(night),
+                asked=asked_for(night, samples),
             )
         return sides[night.id]
 
@@ -83,7 +93,7 @@ def comparisons(
         for after in nights:
             if before is after:
                 continue
-            name = f"{before.id}/{after.id}"
+            name = pair_name(before, after)
             newest = after is book.tonight
             if name not in stored or newest:
                 history_knows = known(told, before.id, after.id)
@@ -111,23 +121,26 @@ def stored(told: Comparisons, made_from: str) -> bytes:
     return json.dumps(whole, ensure_ascii=True, separators=(",", ":"), allow_nan=False).encode()
 
 
-def page_data(told: Comparisons) -> dict[str, Any]:
-    """What the page's script reads: versions, texts once, and pairs that name texts by place."""
+def page_files(told: Comparisons, book: Book, accepted: Sequence[Accepted]) -> bytes:
+    """The script that hands the newest pairs to the page: texts once, and pairs that name texts by place."""
     texts: dict[str, int] = {}
 
     def place(text: str) -> int:
         return texts.setdefault(text, len(texts))
 
     pairs = {}
-    index = {night.id: i for i, night in enumerate(told.nights)}
+    index = {night.id: night.index for night in told.nights}
     for name, pair in told.pairs.items():
-        before, _, after = name.partition("/")
+        before, after = json.loads(name)
         pairs[f"{index[before]},{index[after]}"] = {
             **pair,
             "changes": [[place(text) for text in change] for change in pair["changes"]],
             "frontiers": [[place(text) for text in line] for line in pair["frontiers"]],
         }
-    return {"versions": [choice(night) for night in told.nights], "pairs": pairs, "texts": list(texts)}
+    series = described(book)
+    levels = accepted_fields(accepted, list(series))
+    whole = {"pairs": pairs, "texts": list(texts), "series": series, "accepted": levels}
+    return f"comparedNewest({json.dumps(whole, separators=(',', ':'), allow_nan=False)});\n".encode()
 
 
 def choice(night: Night) -> dict[str, str]:
@@ -136,9 +149,20 @@ def choice(night: Night) -> dict[str, str]:
     return {"id": night.id, "label": " · ".join(filter(None, words)), "hash": short_hash(night.engine)}
 
 
+def worst_first(changes: Sequence[Change]) -> list[Change]:
+    """By class, then by what happened, gates before the rest, then by decades."""
+
+    def rank(change: Change) -> tuple[bool, int, int, bool, float, str]:
+        far = abs(change.decades) if change.decades is not None else math.inf if change.red else 0.0
+        stands = CLASS_RANK[change.stands] if change.red else 0
+        return not change.red, stands, WORD_RANK[change.word], change.role != "gate", -far, change.series
+
+    return sorted(changes, key=rank)
+
+
 def _told(document: CompareDocument, titles: dict[str, str], descriptions: dict[str, str]) -> dict[str, Any]:
     """What a reader sees of a comparison."""
-    shown = [change for change in document.changes if change.word not in QUIET]
+    shown = worst_first([change for change in document.changes if change.word not in QUIET])
     return {
         "verdict": document.verdict,
         "code": document.exit_code,
@@ -164,15 +188,15 @@ def _change(change: Change, titles: dict[str, str], descriptions: dict[str, str]
         page_of(change.test),
         clean(titles.get(change.test, change.test)),
         clean(descriptions.get(change.series, f"{change.metric} ({change.configuration})")),
-        _value(change.before, change.unit),
-        _value(change.after, change.unit),
+        value_in_words(change.before, change.unit),
+        value_in_words(change.after, change.unit),
         said,
         clean(change.sentence),
         clean(since),
     ]
 
 
-def _value(value: Number | None, unit: str) -> str:
+def value_in_words(value: Number | None, unit: str) -> str:
     return "–" if value is None else quantity(float(value), unit, 7)
 
 

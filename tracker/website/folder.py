@@ -41,11 +41,15 @@ class Folder:
     written: int = 0
     skipped: int = 0
 
+    def unchanged(self, path: str, digest: str) -> bool:
+        """Whether the old site has the file, made from the same."""
+        return self.known.get(path) == digest and (self.old / path).is_file()
+
     def add(self, path: str, digest: str, make: Callable[[], bytes]) -> None:
         """Put a file in place: the old one if it was made from the same, else what `make` gives."""
         target, before = self.new / path, self.old / path
         target.parent.mkdir(parents=True, exist_ok=True)
-        if self.known.get(path) == digest and before.is_file():
+        if self.unchanged(path, digest):
             _keep(before, target)
             self.skipped += 1
         else:

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from spook_tracker.tracker.document.wording import slug, web_address
+from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import spaced
 from spook_tracker.tracker.website.causes import hit_row, told
-from spook_tracker.tracker.website.comparisons import Comparisons, choice, page_data
+from spook_tracker.tracker.website.comparisons import Comparisons, choice, pair_name
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
     grid_view,
@@ -22,6 +22,7 @@ from spook_tracker.tracker.website.diagrams import (
 )
 from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
+from spook_tracker.tracker.website.judged_nights import BLOCK
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
 from spook_tracker.tracker.website.page_rows import Page, address, row
@@ -96,13 +97,12 @@ def regressions(book: Book, causes: Sequence[Cause]) -> Page:
     return Page("regressions.html", "regressions.html", "Regressions", title, context)
 
 
-def compare(told: Comparisons) -> Page:
-    """Two versions chosen in the page; without scripts, the newest two."""
-    choices = [choice(night) for night in told.nights]
+def compare(told: Comparisons, book: Book) -> Page:
+    """Any two versions chosen in the page; without scripts, the newest two."""
     first = None
     if len(told.nights) > 1:
         before, after = told.nights[-2:]
-        pair = told.pairs[f"{before.id}/{after.id}"]
+        pair = told.pairs[pair_name(before, after)]
         counts = ", ".join(f"{n} {spaced(word)}" for word, n in pair["counts"].items())
         headline = {"identical": "Identical", "same": "No regression", "regressed": "Regressed"}
         first = {
@@ -113,7 +113,18 @@ def compare(told: Comparisons) -> Page:
             "changes": pair["changes"][:MOST_CHANGES],
             "left_out": max(0, len(pair["changes"]) - MOST_CHANGES),
         }
-    context = {"versions": choices, "first": first, "comparisons": page_data(told)}
+    nights = [*book.nights, *(night for night, _ in book.others)]
+    names = [f"{clean(night.engine.name)} " for night in nights]
+    names[: len(book.nights)] = [""] * len(book.nights)
+    choices = [
+        [night.id, name + choice(night)["label"], choice(night)["hash"]]
+        for night, name in zip(nights, names, strict=True)
+    ]
+    context = {
+        "versions": choices,
+        "first": first,
+        "choices": {"nights": choices, "own": len(book.nights), "block": BLOCK},
+    }
     return Page("compare.html", "compare.html", "Compare two versions", "Two versions side by side.", context)
 
 

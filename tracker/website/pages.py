@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 
+from spook_tracker.tracker.document.wording import clean
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.website import page_overviews
 from spook_tracker.tracker.website.comparisons import Comparisons
@@ -11,7 +14,7 @@ from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.live_module import live_page
 from spook_tracker.tracker.website.nights import Book
 from spook_tracker.tracker.website.page_index import index
-from spook_tracker.tracker.website.page_rows import Page
+from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.page_test import test_page
 
 NAVIGATION = (
@@ -26,21 +29,37 @@ NAVIGATION = (
 )
 
 
+@dataclass(frozen=True)
+class Planned:
+    """A page that is going to be made: where it stands, what it is called, and how."""
+
+    path: str
+    title: str
+    make: Callable[[], Page]
+
+
 def pages(
-    book: Book, events: Sequence[Event], causes: Sequence[Cause], compared: Comparisons, module: str = ""
-) -> Iterator[Page]:
+    book: Book,
+    events: Sequence[Event],
+    causes: Sequence[Cause],
+    compared: Callable[[], Comparisons],
+    module: str = "",
+) -> Iterator[Planned]:
     """Every page of the website, from the first to the pages of the tests; `module` is the live engine's script."""
     if not book.nights:
-        yield Page("index.html", "empty.html", "Nothing yet", "No night is recorded yet.")
+        words = "No night is recorded yet."
+        yield Planned(
+            "index.html", "Nothing yet", lambda: Page("index.html", "empty.html", "Nothing yet", words)
+        )
         return
-    yield index(book, causes)
-    yield page_overviews.error_time(book)
-    yield page_overviews.stability(book, events)
-    yield live_page(module)
-    yield page_overviews.compare(compared)
-    yield page_overviews.regressions(book, causes)
-    yield page_overviews.versions(book)
-    yield page_overviews.data(book, events)
-    yield page_overviews.document(book, events)
+    yield Planned("index.html", "Tonight", partial(index, book, causes))
+    yield Planned("error-time.html", "Error against run time", partial(page_overviews.error_time, book))
+    yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, events))
+    yield Planned("live.html", "Live", partial(live_page, module))
+    yield Planned("compare.html", "Compare", lambda: page_overviews.compare(compared(), book))
+    yield Planned("regressions.html", "Regressions", partial(page_overviews.regressions, book, causes))
+    yield Planned("versions.html", "Versions", partial(page_overviews.versions, book))
+    yield Planned("data.html", "Data", partial(page_overviews.data, book, events))
+    yield Planned("document.html", "Report", partial(page_overviews.document, book, events))
     for test in book.tests:
-        yield test_page(book, test, events)
+        yield Planned(address(test), clean(test.card.title), partial(test_page, book, test, events))

@@ -10,19 +10,27 @@ import dataclasses
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from spook_tracker.tracker.document.wording import slug
+from spook_tracker.tracker.document.wording import clean, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.website import data_files, feed
+from spook_tracker.tracker.website import data_files, feed, judged_nights
 from spook_tracker.tracker.website.causes import causes_of
-from spook_tracker.tracker.website.comparisons import FILE, comparisons, read_known, stored
+from spook_tracker.tracker.website.comparisons import (
+    FILE,
+    Comparisons,
+    comparisons,
+    page_files,
+    read_known,
+    stored,
+)
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import module_script
@@ -39,6 +47,8 @@ ASSETS = {  # name in templates: file under site/static
     "css": "site.css",
     "theme": "theme.js",
     "site": "site.js",
+    "judge": "judge.js",
+    "nights": "compare-nights.js",
     "compare": "compare.js",
     "plotly": "plotly-cartesian.min.js",
     "three": "three-scene.min.js",
@@ -58,6 +68,7 @@ class Report:
     written: int
     skipped: int  # unchanged since the last time
     out: Path
+    failed: tuple[str, ...] = ()  # files that could not be made, each with the reason
 
     @property
     def pages(self) -> int:
@@ -65,10 +76,14 @@ class Report:
         return self.written + self.skipped
 
 
-def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> Report:
+def publish(
+    history: Records, out: Path, accepted: Sequence[Accepted] = (), database: bytes | None = None
+) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
-    `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red.
+    `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
+    the file of the database, where readers shall be able to load it. What cannot be made says so in its place,
+    and everything else is published.
     """
     site = resource("site")
     static, templates = site / "static", site / "templates"
@@ -77,6 +92,7 @@ def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> R
     making = digest(*(path.read_bytes() for path in sorted([*templates.iterdir(), *_sources()])))
     made = environment(templates)
     told = book(history, accepted)
+    failed: list[str] = []
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
@@ -90,26 +106,65 @@ def publish(history: Records, out: Path, accepted: Sequence[Accepted] = ()) -> R
         events = all_events(told) if told.nights else []
         causes = causes_of(told)
         levels = digest(making.encode(), repr(accepted).encode())
-        compared = comparisons(history, told, accepted, read_known(out, levels))
-        for page in pages(told, events, causes, compared, module):
-            context = _context(page, names, told.nights[-1] if told.nights else None)
+        compared = cache(lambda: comparisons(history, told, accepted, read_known(out, levels)))
+        night = told.nights[-1] if told.nights else None
+
+        def render(page: Page) -> tuple[str, bytes]:
+            """The page and what it is made from."""
+            context = _context(page, names, night) | {"database": database is not None}
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
+            if folder.unchanged(page.path, source):
+                return source, b""
+            return source, made.get_template(page.template).render(context).encode("utf-8", "replace")
 
-            def render(page: Page = page, context: dict[str, Any] = context) -> bytes:
-                return made.get_template(page.template).render(context).encode("utf-8", "replace")
+        for planned in pages(told, events, causes, compared, module):
+            try:
+                source, text = render(planned.make())
+            except Exception as error:  # whatever it is, the other pages are worth publishing
+                reason = f"{type(error).__name__}: {clean(str(error))[:300]}"
+                failed.append(f"{planned.path}: {reason}")
+                context = {"what": planned.title, "reason": reason}
+                source, text = render(Page(planned.path, "failed.html", planned.title, "", context))
+            folder.add(planned.path, source, partial(bytes, text))
+        files = _data(told, events, causes)
+        if told.nights:
+            files = chain(
+                files, _stored(compared, levels, told, accepted), judged_nights.files(history, told)
+            )
+        if database is not None:
+            files = chain(files, [("data/tracker.db", database, partial(bytes, database))])
+        for path, made_from, make in _surviving(files, failed):
+            try:
+                folder.add(path, digest(making.encode(), made_from), make)
+            except OSError:
+                raise
+            except Exception as error:
+                failed.append(f"{path}: {type(error).__name__}: {clean(str(error))[:300]}")
+    return Report(folder.written, folder.skipped, folder.old, tuple(failed))
 
-            folder.add(page.path, source, render)
-        pairs = stored(compared, levels)
-        folder.add(FILE, digest(pairs), partial(bytes, pairs))
-        for path, made_from, make in _data(told, events, causes):
-            folder.add(path, digest(making.encode(), made_from), make)
-    return Report(folder.written, folder.skipped, folder.old)
+
+File = tuple[str, bytes, Callable[[], bytes]]  # path, what it is made from, and how
 
 
-def _data(
-    told: Book, events: Sequence[Event], causes: Sequence[Cause]
-) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
-    """Files of numbers: path, what they are made from, and how."""
+def _surviving(files: Iterator[File], failed: list[str]) -> Iterator[File]:
+    """The files up to one whose making fails, which is written down."""
+    try:
+        yield from files
+    except Exception as error:
+        failed.append(f"data: {type(error).__name__}: {clean(str(error))[:300]}")
+
+
+def _stored(
+    compared: Callable[[], Comparisons], levels: str, told: Book, accepted: Sequence[Accepted]
+) -> Iterator[File]:
+    pairs = stored(compared(), levels)
+    yield FILE, pairs, partial(bytes, pairs)
+    script = page_files(compared(), told, accepted)
+    yield "compare/newest.js", script, partial(bytes, script)
+
+
+def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause]) -> Iterator[File]:
+    """Files of numbers."""
     if not told.nights:
         return
     newest = _bytes_of({"nights": len(told.nights), "tonight": told.tonight})

@@ -2,6 +2,11 @@
 // orders of summation are used and contraction is off, so every instruction set rounds alike.
 
 #define SPOOK_INLINE inline __attribute__((always_inline))
+#ifdef __wasm__  // a reader's browser loads the module first: loops stay loops, the order of sums is theirs anyway
+#define SPOOK_UNROLL _Pragma("clang loop unroll(disable)")
+#else
+#define SPOOK_UNROLL _Pragma("GCC unroll 6")
+#endif
 
 namespace spook::kernel::SPOOK_ISA {
 namespace {
@@ -82,7 +87,7 @@ SPOOK_INLINE int pivot(double* u, double* inverse, const double* scale, double s
         inverse[i] = over;
         Row<N> row, other;
         row.load(u + i * N);
-#pragma GCC unroll 6
+        SPOOK_UNROLL
         for (int j = i + 1; j < N; ++j) {
             other.load(u + j * N);
             other.subtract(u[i * N + j] * over, row);
@@ -98,11 +103,11 @@ SPOOK_INLINE int pivot(double* u, double* inverse, const double* scale, double s
 template <int N, int R>
 SPOOK_INLINE void divide(const double* u, const double* inverse, double* z, double* y) {
     Row<R> rows[N];
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int i = 0; i < N; ++i) rows[i].load(y + i * R);
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int i = 0; i < N; ++i) {
-#pragma GCC unroll 6
+        SPOOK_UNROLL
         for (int j = i + 1; j < N; ++j) rows[j].subtract(u[i * N + j], rows[i]);
         rows[i].store(y + i * R);
         rows[i].scale(inverse[i]);
@@ -113,13 +118,13 @@ SPOOK_INLINE void divide(const double* u, const double* inverse, double* z, doub
 /// T −= Yᵣᵀ Zₛ.
 template <int N, int R, int S> SPOOK_INLINE void update(const double* y, const double* z, double* t) {
     Row<S> rows[N];
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int k = 0; k < N; ++k) rows[k].load(z + k * S);
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int a = 0; a < R; ++a) {
         Row<S> sum, target;
         sum.clear();
-#pragma GCC unroll 6
+        SPOOK_UNROLL
         for (int k = 0; k < N; ++k) sum.add(y[k * R + a], rows[k]);
         target.load(t + a * S);
         target.subtract(sum);
@@ -131,13 +136,13 @@ template <int N, int R, int S> SPOOK_INLINE void update(const double* y, const d
 template <int N, int R>
 SPOOK_INLINE void update_diagonal(const double* y, const double* z, double* t, double* scale, bool note) {
     Row<R> rows[N];
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int k = 0; k < N; ++k) rows[k].load(z + k * R);
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int a = 0; a < R; ++a) {
         Row<R> sum, target;
         sum.clear();
-#pragma GCC unroll 6
+        SPOOK_UNROLL
         for (int k = 0; k < N; ++k) sum.add(y[k * R + a], rows[k]);
         target.load(t + a * R);
         const double before = t[a * R + a];
@@ -151,24 +156,22 @@ SPOOK_INLINE void update_diagonal(const double* y, const double* z, double* t, d
 constexpr int packed(int n, int i, int j) { return i * n - i * (i + 1) / 2 + j - i - 1; }
 
 template <int N> SPOOK_INLINE void pack(const double* u, double* p) {
-#pragma GCC unroll 6
-    for (int i = 0; i < N; ++i)
-#pragma GCC unroll 6
-        for (int j = i + 1; j < N; ++j) p[packed(N, i, j)] = u[i * N + j];
+    SPOOK_UNROLL
+    for (int i = 0; i < N; ++i) SPOOK_UNROLL
+    for (int j = i + 1; j < N; ++j) p[packed(N, i, j)] = u[i * N + j];
 }
 
 template <int N> SPOOK_INLINE void forward_pivot(const double* p, double* x) {
-#pragma GCC unroll 6
-    for (int i = 0; i < N; ++i)
-#pragma GCC unroll 6
-        for (int j = i + 1; j < N; ++j) x[j] -= p[packed(N, i, j)] * x[i];
+    SPOOK_UNROLL
+    for (int i = 0; i < N; ++i) SPOOK_UNROLL
+    for (int j = i + 1; j < N; ++j) x[j] -= p[packed(N, i, j)] * x[i];
 }
 
 /// xᵣ −= Zᵀ x.
 template <int N, int R> SPOOK_INLINE void forward_row(const double* z, const double* x, double* xr) {
     Row<R> sum, row;
     sum.clear();
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int i = 0; i < N; ++i) {
         row.load(z + i * R);
         sum.add(x[i], row);
@@ -182,7 +185,7 @@ template <int N, int R> SPOOK_INLINE void forward_row(const double* z, const dou
 template <int N, int R> SPOOK_INLINE void backward_row(const double* z, const double* xr, double* x) {
     Row<R> row, right;
     right.load(xr);
-#pragma GCC unroll 6
+    SPOOK_UNROLL
     for (int i = 0; i < N; ++i) {
         row.load(z + i * R);
         x[i] -= row.dot(right);
@@ -190,10 +193,9 @@ template <int N, int R> SPOOK_INLINE void backward_row(const double* z, const do
 }
 
 template <int N> SPOOK_INLINE void backward_pivot(const double* p, double* x) {
-#pragma GCC unroll 6
-    for (int i = N - 1; i >= 0; --i)
-#pragma GCC unroll 6
-        for (int j = i + 1; j < N; ++j) x[i] -= p[packed(N, i, j)] * x[j];
+    SPOOK_UNROLL
+    for (int i = N - 1; i >= 0; --i) SPOOK_UNROLL
+    for (int j = i + 1; j < N; ++j) x[i] -= p[packed(N, i, j)] * x[j];
 }
 
 template <int N, int R, int S> void update_call(const double* y, const double* z, double* t) {

@@ -60,6 +60,11 @@ constexpr Vec3 operator*(const Mat3& a, Vec3 v) noexcept {
 constexpr Mat3 transpose(const Mat3& a) noexcept {
     return {{a.m[0], a.m[3], a.m[6], a.m[1], a.m[4], a.m[7], a.m[2], a.m[5], a.m[8]}};
 }
+/// aᵀ v.
+constexpr Vec3 transposed_times(const Mat3& a, Vec3 v) noexcept {
+    return {a.m[0] * v.x + a.m[3] * v.y + a.m[6] * v.z, a.m[1] * v.x + a.m[4] * v.y + a.m[7] * v.z,
+            a.m[2] * v.x + a.m[5] * v.y + a.m[8] * v.z};
+}
 constexpr Mat3 operator*(const Mat3& a, const Mat3& b) noexcept {
     Mat3 c;
     for (int i = 0; i < 3; ++i)

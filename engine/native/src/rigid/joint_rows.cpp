@@ -52,20 +52,25 @@ Quat relative_turn(const BodyState& first, const BodyState& second) noexcept {
 
 Vec3 carried(const BodyState& body, Vec3 v) noexcept { return v + body.turn_less_one * v; }
 
+/// |d| − rest of d = span + gap, and |d|. |d|² − |span|² without cancellation; span and rest differ only if the scene
+/// says so.
+double stretch(const JointConstants& joint, Vec3 gap, double& length) noexcept {
+    length = norm(joint.span + gap);
+    const double span = norm(joint.span);
+    return (dot(gap, gap) + 2.0 * dot(joint.span, gap)) / (length + span) + (span - joint.rest_length);
+}
+
 void assemble_distance(const JointConstants& joint, const BodyState& first, const BodyState& second,
                        const Ends& ends, JointRows& rows) noexcept {
-    const Vec3 d = joint.span + ends.gap;
-    const double length = norm(d), rest = joint.rest_length, span = norm(joint.span);
-    // |d|² − |span|² without cancellation; span and rest differ only if the scene says so.
-    const double stretch = (dot(ends.gap, ends.gap) + 2.0 * dot(joint.span, ends.gap)) / (length + span);
-    const Vec3 direction = (1.0 / length) * d;
+    double length = 0.0;
+    rows.violation[0] = stretch(joint, ends.gap, length);
+    const Vec3 direction = (1.0 / length) * (joint.span + ends.gap);
     const Vec3 slip = second.velocity + cross(second.angular_velocity, ends.second_arm) - first.velocity -
                       cross(first.angular_velocity, ends.first_arm);
     put(rows.first, -direction);
     put(rows.first + 3, -cross(ends.first_arm, direction));
     put(rows.second, direction);
     put(rows.second + 3, cross(ends.second_arm, direction));
-    rows.violation[0] = stretch + (span - rest);
     rows.rate[0] = dot(direction, slip);
 }
 
@@ -118,6 +123,32 @@ void assemble_joint(const JointConstants& joint, const BodyState& first, const B
         return;
     }
     write.angular(cross(carried(second, joint.axes[1]), axes[0]), dot(joint.axes[0], tilt * joint.axes[1]));
+}
+
+void joint_violation(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                     double* out) noexcept {
+    const Ends ends(joint, first, second);
+    if (joint.kind == JointKind::distance) {
+        double length = 0.0;
+        *out = stretch(joint, ends.gap, length);
+        return;
+    }
+    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
+        *out++ = dot(carried(first, joint.axes[k]), ends.gap);
+    if (joint.kind == JointKind::ball) return;
+    const Quat q = relative_turn(first, second);
+    if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
+        for (int k = 0; k < 3; ++k) *out++ = 2.0 * dot(joint.axes[k], Vec3{q.x, q.y, q.z});
+        return;
+    }
+    const Mat3 tilt = rotation_less_one(q);
+    if (joint.kind == JointKind::hinge) {
+        const Vec3 moved = tilt * joint.axes[0];
+        *out++ = -dot(joint.axes[2], moved);
+        *out++ = dot(joint.axes[1], moved);
+        return;
+    }
+    *out++ = dot(joint.axes[0], tilt * joint.axes[1]);
 }
 
 void joint_bias(const JointConstants& joint, const BodyState& first, const BodyState& second,

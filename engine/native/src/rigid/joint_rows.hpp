@@ -40,6 +40,10 @@ JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
 void assemble_joint(const JointConstants& joint, const BodyState& first, const BodyState& second,
                     JointRows& rows, Vec3& first_reach, Vec3& second_reach) noexcept;
 
+/// The violations alone, to the same bits.
+void joint_violation(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                     double* out) noexcept;
+
 /// What the rows' second time derivatives are when both ends go on with constant velocity and angular velocity.
 void joint_bias(const JointConstants& joint, const BodyState& first, const BodyState& second,
                 double* bias) noexcept;

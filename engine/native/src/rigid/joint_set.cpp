@@ -155,11 +155,7 @@ void JointSet::bias(int index, std::span<const BodyState> bodies, double* out) c
 
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {
     const Joint& joint = joints_[index];
-    double first[36], second[36];
-    JointRows rows{first, second, {}, {}};
-    Vec3 a, b;
-    assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows, a, b);
-    std::copy_n(rows.violation, joint.constants.rows, out);
+    joint_violation(joint.constants, body(joint.first, bodies), body(joint.second, bodies), out);
 }
 
 double JointSet::coordinate(int index, std::span<const BodyState> bodies) const noexcept {

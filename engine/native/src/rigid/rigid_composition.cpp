@@ -8,8 +8,7 @@
 // and `pending` is the half stage they still have to be kicked. Rows are held rigidly: their compliance would only
 // add the static stretch eps F.
 //
-// Λ is found by iteration with the matrix at the start of the stage, which contracts by about the angle turned in
-// it, accelerated, from forces extrapolated from the same stage of the steps before.
+// Λ is sought (rigid_hold.cpp) from forces extrapolated from the same stage of the steps before.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,25 +20,20 @@ namespace spook {
 
 namespace {
 
-constexpr double SETTLED = 2e-15;  // of the joint's size: rounding level
-constexpr int MOST_ITERATIONS = 30;
-constexpr int MIXED = 6;           // rounds that are remembered
-constexpr double SINGULAR = 1e-4;  // of its scale: pivots below it belong to rows that become redundant
-constexpr double NEAR =
-    1e-11;  // of the joint's size: what rounds show below it is the rounding of redundant rows
-constexpr double FARTHEST = 0.3;  // of the joint's size, at the prediction: beyond it lie other solutions
+constexpr int DIFFERENCES = 8;  // of a stage's forces from step to step, the zeroth included
 
 }  // namespace
 
 void RigidSystem::start_composition() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
-    live_.history.assign(3 * rows * composition_stages(method_.composition).size(), 0.0);
+    const std::size_t stages = composition_stages(method_.composition).size();
+    live_.history.assign(static_cast<std::size_t>(DIFFERENCES) * rows * stages, 0.0);
+    live_.guess_order.assign(stages, 0);
     trial_ = live_.bodies;
     violation_.assign(rows, 0.0);
     bias_.assign(rows, 0.0);
     multiplier_.assign(rows, 0.0);
-    change_ = last_plain_ = last_step_ = multiplier_;
-    mixing_.assign(2 * rows * MIXED, 0.0);
+    prepare_hold();
     if (solver_ != RigidSolver::block) return;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i) matrix_.diagonal(k)[i] = -0.0;
@@ -58,13 +52,12 @@ void RigidSystem::compose(std::int64_t steps) {
 void RigidSystem::composed_step(double h, int depth) {
     if (live_.lost >= 0) return;
     const std::span<const double> stages = composition_stages(method_.composition);
-    const std::size_t rows = static_cast<std::size_t>(rows_);
     LargeArray<BodyState>& start = step_start_[depth];
     start = live_.bodies;
     const double pending = live_.pending;
     bool solved = true;
     for (std::size_t stage = 0; stage < stages.size() && solved; ++stage)
-        solved = composed_stage(stages[stage] * h, live_.history.data() + 3 * rows * stage);
+        solved = composed_stage(stages[stage] * h, stage);
     ++live_.stage_steps;
     if (solved) return;
     if (depth + 1 == MOST_HALVINGS) {
@@ -114,127 +107,60 @@ void RigidSystem::push(const double* multipliers) {
     }
 }
 
-/// Violations where the momenta lead in τ; the largest, in sizes of its joint; infinite when a body turns too fast.
-double RigidSystem::violations_ahead(double tau) {
-    for (const std::vector<int>* some : {&tied_, &driven_})
-        for (int i : *some) {
-            trial_[i] = live_.bodies[i];
-            if (!move(constants_[i], tau, trial_[i])) return std::numeric_limits<double>::infinity();
-        }
-    violations_at(trial_, violation_.data());
-    double worst = 0.0;
-    std::size_t row = 0;
-    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
-            const double off = std::fabs(violation_[row]) / joints_.gain(k, i).extent;
-            if (!(off <= worst)) worst = off;
-        }
-    return worst;
+/// The impulses a stage will need, from its forces in the steps before: their differences from step to step, as many as
+/// would have told the last one best.
+void RigidSystem::guess_impulses(std::size_t stage, double span) {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    const double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * rows * stage;
+    std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
+    for (int k = 0; k < live_.guess_order[stage]; ++k)
+        for (std::size_t row = 0; row < rows; ++row) multiplier_[row] += span * *difference++;
 }
 
-/// Anderson's mixing (J. ACM 12 (1965) 547): takes out of the step bias_ what the rounds before this one have shown of
-/// the difference between the matrix at the start of the stage and the true derivative. `kept` pairs are remembered.
-void RigidSystem::mix(int iteration, int& kept) {
+/// The k-th difference of a new force is what k differences before it failed to tell.
+void RigidSystem::remember_impulses(std::size_t stage, double span) {
     const std::size_t rows = static_cast<std::size_t>(rows_);
-    if (iteration > 0 && kept < MIXED) {
-        // One more pair: how the plain step changed (made orthonormal) when Λ went on by so much.
-        double* turned = mixing_.data() + 2 * rows * static_cast<std::size_t>(kept);
-        double* moved = turned + rows;
-        for (std::size_t row = 0; row < rows; ++row) {
-            turned[row] = bias_[row] - last_plain_[row];
-            moved[row] = last_step_[row] + turned[row];
+    double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * rows * stage;
+    // A loop can come to a singular position, where long extrapolation leads into another of its branches.
+    const bool loops = joints_.count() > static_cast<int>(tied_.size());
+    const auto known =
+        static_cast<int>(std::min<std::int64_t>(live_.stage_steps, loops ? 3 : DIFFERENCES - 1));
+    for (std::size_t row = 0; row < rows; ++row) bias_[row] = multiplier_[row] / span;
+    double least = std::numeric_limits<double>::infinity();
+    bool falling = true;  // beyond the first that grows they tell of noise, or of a sudden change
+    live_.guess_order[stage] = 1;
+    for (int k = 0;; ++k) {
+        double size = 0.0;
+        for (std::size_t row = 0; row < rows; ++row, ++difference) {
+            size += std::fabs(bias_[row]);
+            const double before = *difference;
+            *difference = bias_[row];
+            bias_[row] -= before;
         }
-        double all = 0.0, left = 0.0;
-        for (std::size_t row = 0; row < rows; ++row) all += turned[row] * turned[row];
-        for (int k = 0; k < kept; ++k) {
-            const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
-            double share = 0.0;
-            for (std::size_t row = 0; row < rows; ++row) share += q[row] * turned[row];
-            for (std::size_t row = 0; row < 2 * rows; ++row) turned[row] -= share * q[row];
-        }
-        for (std::size_t row = 0; row < rows; ++row) left += turned[row] * turned[row];
-        if (left > 1e-8 * all) {
-            const double scale = 1.0 / std::sqrt(left);
-            for (std::size_t row = 0; row < 2 * rows; ++row) turned[row] *= scale;
-            ++kept;
-        }
-    }
-    std::copy(bias_.begin(), bias_.end(), last_plain_.begin());
-    for (int k = 0; k < kept; ++k) {
-        const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
-        double share = 0.0;
-        for (std::size_t row = 0; row < rows; ++row) share += q[row] * last_plain_[row];
-        for (std::size_t row = 0; row < rows; ++row) bias_[row] -= share * q[rows + row];
+        if (k > 0 && falling && size < least) least = size, live_.guess_order[stage] = k;
+        else falling = k == 0;
+        if (k == known) return;
     }
 }
 
-/// Iterates Λ until the rows hold where the momenta lead in τ, each round with the matrix at the start of the stage.
-/// change_: what Λ has gained. False if it does not come near.
-bool RigidSystem::hold_rows(double tau, double floor) {
-    const std::size_t rows = static_cast<std::size_t>(rows_);
-    change_.assign(rows, 0.0);
-    if (!matrix_.factor(floor)) return false;
-    double before = std::numeric_limits<double>::infinity();
-    int kept = 0;
-    bool plain = false;
-    for (int iteration = 0;; ++iteration) {
-        const double off = violations_ahead(tau), ratio = off / before;
-        ++live_.newton_iterations;
-        if (off <= SETTLED) return true;
-        if (off < 1e-12 &&
-            ratio > 0.5) {  // down in the rounding, which mixing of redundant rows makes larger
-            if (plain) return true;
-            plain = true;
-        }
-        if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
-        std::fill(solution_.begin(), solution_.end(), 0.0);
-        for (std::size_t row = 0; row < rows; ++row) solution_[row] = -violation_[row] / tau;
-        matrix_.solve(solution_.data());
-        for (std::size_t row = 0; row < rows; ++row) bias_[row] = -solution_[row];
-        if (!plain) mix(iteration, kept);
-        std::copy(bias_.begin(), bias_.end(), last_step_.begin());
-        for (std::size_t row = 0; row < rows; ++row) {
-            multiplier_[row] += bias_[row];
-            change_[row] += bias_[row];
-        }
-        push(bias_.data());
-        before = off;
-    }
-}
-
-/// `history` holds this stage's forces one, two and three steps ago. False if no solution was found.
-bool RigidSystem::composed_stage(double tau, double* history) {
-    const std::size_t rows = static_cast<std::size_t>(rows_);
+/// False if no solution was found.
+bool RigidSystem::composed_stage(double tau, std::size_t stage) {
     const double span = live_.pending + 0.5 * tau;
     kick_all(span);
     if (clock_) clock_->mark(Stage::apply_gravity);
     if (solver_ == RigidSolver::block) {
         assemble_blocks();
-        fill_inertias();
-        double *one = history, *two = history + rows, *three = history + 2 * rows;
-        const std::int64_t seen = live_.stage_steps;
-        const double a1 = seen >= 3 ? 3.0 : seen == 2 ? 2.0 : 1.0;
-        const double a2 = seen >= 3 ? -3.0 : seen == 2 ? -1.0 : 0.0, a3 = seen >= 3 ? 1.0 : 0.0;
-        for (std::size_t row = 0; row < rows; ++row)
-            multiplier_[row] = span * (a1 * one[row] + a2 * two[row] + a3 * three[row]);
+        guess_impulses(stage, span);
         push(multiplier_.data());
         if (clock_) clock_->mark(Stage::assemble_rows);
-        if (!hold_rows(tau, method_.floor)) {
-            // Near a singular position the chord along the rows that become redundant points the wrong way:
-            // again from the same momenta, with little trust in those rows.
-            for (std::size_t row = 0; row < rows; ++row) bias_[row] = -change_[row];
-            push(bias_.data());
-            for (std::size_t row = 0; row < rows; ++row) multiplier_[row] += bias_[row];
-            if (!hold_rows(tau, SINGULAR)) return false;
-        }
-        for (std::size_t row = 0; row < rows; ++row) {
-            three[row] = two[row];
-            two[row] = one[row];
-            one[row] = multiplier_[row] / span;
-        }
+        if (!hold_rows(tau)) return false;
+        remember_impulses(stage, span);
         for (int i : tied_) {
-            live_.bodies[i] = trial_[i];
-            if (!constants_[i].particle) refresh(constants_[i], live_.bodies[i]);
+            BodyState& s = live_.bodies[i];
+            s.displacement = trial_[i].displacement;
+            if (constants_[i].particle) continue;
+            s.turn = trial_[i].turn;
+            refresh(constants_[i], s);
         }
         if (clock_) clock_->mark(Stage::solve_block);
     } else {

@@ -5,11 +5,6 @@
 namespace spook {
 namespace {
 
-Vec3 transposed_times(const Mat3& a, Vec3 v) noexcept {
-    return {a.m[0] * v.x + a.m[3] * v.y + a.m[6] * v.z, a.m[1] * v.x + a.m[4] * v.y + a.m[7] * v.z,
-            a.m[2] * v.x + a.m[5] * v.y + a.m[8] * v.z};
-}
-
 /// The turn of a constant angular velocity over h.
 Quat turn_of(double h, Vec3 angular_velocity) noexcept {
     const double angle = 0.5 * h * norm(angular_velocity);
@@ -98,6 +93,18 @@ bool move(const BodyConstants& body, double h, BodyState& state) noexcept {
     if (body.motion == Motion::fixed) return true;
     if (!advance_pose(body, h, state)) return false;
     if (!body.particle) state.turn_less_one = rotation_less_one(state.turn);
+    return true;
+}
+
+bool lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from, Vec3& rate,
+          BodyState& to) noexcept {
+    to.displacement = from.displacement + h * from.velocity;
+    if (body.particle) return true;
+    const Vec3 p = transposed_times(axes, from.angular_momentum);
+    if (!rotation_rate(body.inertia, h, p, rate, !is_zero(rate))) return false;
+    const Vec3 e = 0.5 * h * (axes * rate);
+    to.turn = unit(Quat{std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z} * from.turn);
+    to.turn_less_one = rotation_less_one(to.turn);
     return true;
 }
 

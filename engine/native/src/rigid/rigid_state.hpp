@@ -51,6 +51,11 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept;
 /// Where integrate() takes a body, without the rest of what is derived from it: displacement, turn, turn_less_one.
 bool move(const BodyConstants& body, double h, BodyState& state) noexcept;
 
+/// The same for a dynamic body whose axes() are at hand. `rate`, in body axes: in, where to look for the turn (zero: no
+/// idea); out, the turn found.
+bool lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from, Vec3& rate,
+          BodyState& to) noexcept;
+
 /// Moves a body on by h with its velocities (kinematic) or its momenta (dynamic, after a solve). False when it
 /// turns too fast for the time step.
 bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept;

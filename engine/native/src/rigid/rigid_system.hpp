@@ -11,6 +11,7 @@
 #include "contacts/contact_stage.hpp"
 #include "contacts/pivot_solver.hpp"
 #include "linear/block_ldlt.hpp"
+#include "linear/dense_rows.hpp"
 #include "linear/redundant_rows.hpp"
 #include "rigid/joint_set.hpp"
 #include "run/run_loop.hpp"
@@ -114,7 +115,8 @@ private:
         int locked = -1;       // a body of redundant rows that contradict each other by now
         int lost = -1;         // a body of rows that no motion satisfies
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
-        std::vector<double> history;  // stages × three steps × rows: the rows' forces, N
+        std::vector<double> history;  // stages × differences × rows: of the rows' forces from step to step, N
+        std::vector<int> guess_order;  // per stage: how many of them tell the next force
     };
 
     const char* cause() const noexcept;
@@ -140,11 +142,16 @@ private:
     void start_composition();
     void compose(std::int64_t steps);
     void composed_step(double h, int depth);
-    bool composed_stage(double tau, double* history);
+    bool composed_stage(double tau, std::size_t stage);
+    void guess_impulses(std::size_t stage, double span);
+    void remember_impulses(std::size_t stage, double span);
     void kick_all(double span);
     void push(const double* multipliers);
     double violations_ahead(double tau);
-    bool hold_rows(double tau, double floor);
+    void prepare_hold();
+    bool factor_dense();
+    bool iterate(double tau, bool dense);
+    bool hold_rows(double tau);
     void mix(int iteration, int& kept);
     void read_composition();
 
@@ -242,7 +249,16 @@ private:
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body
     std::vector<double> first_right_, violation_, bias_, multiplier_;
-    std::vector<double> change_, last_plain_, last_step_, mixing_;
+    std::vector<double> change_, last_plain_, last_step_, mixing_, extent_;
+    std::vector<Vec3> rate_;  // per tied body: turn over the stage, body axes
+    std::vector<Mat3> axes_;  // per tied body, where the stage starts
+    bool dense_ = false;
+    DenseRows dense_rows_;
+    struct Meeting {                    // of two blocks on one moving body
+        int block, other, row, column;  // row and column: the first of each
+        bool second, other_second;
+    };
+    std::vector<Meeting> meetings_;
     std::vector<Mat3> stiffness_;            // per tied body: h²/4 of its joints' geometric stiffness, kg m²
     std::vector<std::vector<int>> islands_;  // of tied bodies that nothing holds to the world
     static constexpr int MOST_HALVINGS = 12;

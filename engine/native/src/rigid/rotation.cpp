@@ -17,10 +17,10 @@ bool sphere_rate(double inertia, double h, Vec3 p, Vec3& w) noexcept {
 
 }  // namespace
 
-bool rotation_rate(Vec3 inertia, double h, Vec3 p, Vec3& w) noexcept {
+bool rotation_rate(Vec3 inertia, double h, Vec3 p, Vec3& w, bool near) noexcept {
     if (inertia.x == inertia.y && inertia.y == inertia.z) return sphere_rate(inertia.x, h, p, w);
     const Vec3 over{1.0 / inertia.x, 1.0 / inertia.y, 1.0 / inertia.z};
-    w = times(over, p);
+    if (!near) w = times(over, p);
     const double target = 4e-16 * 4e-16 * dot(p, p), half = 0.5 * h;
     double last = -1.0;
     for (int round = 0; round < 40; ++round) {

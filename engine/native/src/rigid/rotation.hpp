@@ -9,8 +9,8 @@ namespace spook {
 /// Finds the body-frame rate w of c I w + (h/2) w × I w = p with c = √(1 − h²|w|²/4), by Newton from I⁻¹ p;
 /// h w/2 and c are the vector and scalar part of the unit quaternion of the step. `inertia` holds the principal
 /// moments, p is the angular momentum in body axes. False when there is no such w with h|w| < 2: the body turns
-/// too fast for the time step.
-bool rotation_rate(Vec3 inertia, double time_step, Vec3 p, Vec3& w) noexcept;
+/// too fast for the time step. With `near`, w holds a guess to start from.
+bool rotation_rate(Vec3 inertia, double time_step, Vec3 p, Vec3& w, bool near = false) noexcept;
 
 /// R − 1 of a unit quaternion (w, e): 2 w [e] + 2 [e]², with the relative accuracy of e however small it is.
 inline Mat3 rotation_less_one(Quat q) noexcept {

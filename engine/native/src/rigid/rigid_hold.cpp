@@ -1,0 +1,192 @@
+// The impulses Λ of one stage for which it ends on the rows: see rigid_composition.cpp.
+//
+// Each round solves with the matrix at the start of the stage, which contracts by about the angle turned in it;
+// Anderson's mixing learns the rest. Few rows make one dense matrix G M⁻¹ Gᵀ, many the block factorisation.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double SETTLED = 2e-15;  // of the joint's size: rounding level
+constexpr int MOST_ITERATIONS = 30;
+constexpr int MIXED = 6;             // rounds that are remembered
+constexpr double SINGULAR = 1e-4;    // of its scale: pivots below it belong to rows that become redundant
+constexpr double FARTHEST = 0.3;     // of the joint's size, at the prediction: beyond it lie other solutions
+constexpr std::uint64_t DENSE = 24;  // rows up to which one dense matrix is cheaper than blocks
+
+}  // namespace
+
+void RigidSystem::prepare_hold() {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    const auto blocks = joints_.blocks();
+    change_.assign(rows, 0.0);
+    last_plain_ = last_step_ = change_;
+    mixing_.assign(2 * rows * MIXED, 0.0);
+    rate_.assign(tied_.size(), {});
+    axes_.assign(tied_.size(), {});
+    extent_.clear();
+    for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
+        for (int i = 0; i < blocks[k].size; ++i) extent_.push_back(joints_.gain(k, i).extent);
+    dense_ = solver_ == RigidSolver::block && rows_ <= DENSE;
+    if (!dense_) return;
+    dense_rows_.prepare(static_cast<int>(rows_));
+    meetings_.clear();
+    std::vector<int> first_row{0};
+    for (const JointBlock& block : blocks) first_row.push_back(first_row.back() + block.size);
+    const auto moving = [&](std::size_t k, bool second) {
+        const int body = second ? blocks[k].second : blocks[k].first;
+        return body >= 0 && constants_[body].moves() ? body : -1;
+    };
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+        for (const bool second : {false, true})
+            for (std::size_t l = 0; l <= k && moving(k, second) >= 0; ++l)
+                for (const bool other : {false, true})
+                    if (moving(l, other) == moving(k, second))
+                        meetings_.push_back({static_cast<int>(k), static_cast<int>(l), first_row[k],
+                                             first_row[l], second, other});
+}
+
+/// G M⁻¹ Gᵀ from the Jacobians as assembled.
+bool RigidSystem::factor_dense() {
+    const auto blocks = joints_.blocks();
+    const int rows = static_cast<int>(rows_);
+    for (int i = 0; i < rows; ++i) std::fill_n(dense_rows_.row(i), i + 1, 0.0);
+    for (const Meeting& m : meetings_) {
+        const int body = m.second ? blocks[m.block].second : blocks[m.block].first;
+        const double *mine = jacobian(m.block, m.second), *its = jacobian(m.other, m.other_second);
+        const double over = 1.0 / constants_[body].mass;
+        const BodyConstants& c = constants_[body];
+        const Mat3& r = axes_[slot_[body]];
+        for (int i = 0; i < blocks[m.block].size; ++i, mine += 6) {
+            const Vec3 push = over * Vec3{mine[0], mine[1], mine[2]};
+            Vec3 twist;
+            if (!c.particle) {
+                const Vec3 t = transposed_times(r, {mine[3], mine[4], mine[5]});
+                twist = r * Vec3{t.x / c.inertia.x, t.y / c.inertia.y, t.z / c.inertia.z};
+            }
+            double* entry = dense_rows_.row(m.row + i) + m.column;
+            const int count = m.block == m.other ? i + 1 : blocks[m.other].size;
+            const double* j = its;
+            for (int l = 0; l < count; ++l, j += 6)
+                entry[l] += j[0] * push.x + j[1] * push.y + j[2] * push.z + j[3] * twist.x + j[4] * twist.y +
+                            j[5] * twist.z;
+        }
+    }
+    return dense_rows_.factor(method_.floor);
+}
+
+/// Violations where the momenta lead in τ; the largest, in sizes of its joint; infinite when a body turns too fast.
+double RigidSystem::violations_ahead(double tau) {
+    for (std::size_t k = 0; k < tied_.size(); ++k)
+        if (!lead(constants_[tied_[k]], axes_[k], tau, live_.bodies[tied_[k]], rate_[k], trial_[tied_[k]]))
+            return std::numeric_limits<double>::infinity();
+    violations_at(trial_, violation_.data());
+    double worst = 0.0;
+    for (std::size_t row = 0; row < extent_.size(); ++row) {
+        const double off = std::fabs(violation_[row]) / extent_[row];
+        if (!(off <= worst)) worst = off;
+    }
+    return worst;
+}
+
+/// Anderson's mixing (J. ACM 12 (1965) 547): takes out of the step bias_ what the rounds before this one have shown of
+/// the difference between the matrix at the start of the stage and the true derivative. `kept` pairs are remembered.
+void RigidSystem::mix(int iteration, int& kept) {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    if (iteration > 0 && kept < MIXED) {
+        // One more pair: how the plain step changed (made orthonormal) when Λ went on by so much.
+        double* turned = mixing_.data() + 2 * rows * static_cast<std::size_t>(kept);
+        double* moved = turned + rows;
+        for (std::size_t row = 0; row < rows; ++row) {
+            turned[row] = bias_[row] - last_plain_[row];
+            moved[row] = last_step_[row] + turned[row];
+        }
+        double all = 0.0, left = 0.0;
+        for (std::size_t row = 0; row < rows; ++row) all += turned[row] * turned[row];
+        for (int k = 0; k < kept; ++k) {
+            const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
+            double share = 0.0;
+            for (std::size_t row = 0; row < rows; ++row) share += q[row] * turned[row];
+            for (std::size_t row = 0; row < 2 * rows; ++row) turned[row] -= share * q[row];
+        }
+        for (std::size_t row = 0; row < rows; ++row) left += turned[row] * turned[row];
+        if (left > 1e-8 * all) {
+            const double scale = 1.0 / std::sqrt(left);
+            for (std::size_t row = 0; row < 2 * rows; ++row) turned[row] *= scale;
+            ++kept;
+        }
+    }
+    std::copy(bias_.begin(), bias_.end(), last_plain_.begin());
+    for (int k = 0; k < kept; ++k) {
+        const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
+        double share = 0.0;
+        for (std::size_t row = 0; row < rows; ++row) share += q[row] * last_plain_[row];
+        for (std::size_t row = 0; row < rows; ++row) bias_[row] -= share * q[rows + row];
+    }
+}
+
+/// change_: what Λ has gained. False if it does not come near.
+bool RigidSystem::iterate(double tau, bool dense) {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    std::fill(change_.begin(), change_.end(), 0.0);
+    std::fill(rate_.begin(), rate_.end(), Vec3{});
+    double before = std::numeric_limits<double>::infinity();
+    int kept = 0;
+    bool plain = false;
+    for (int iteration = 0;; ++iteration) {
+        const double off = violations_ahead(tau), ratio = off / before;
+        ++live_.newton_iterations;
+        if (off <= SETTLED) return true;
+        if (off < 1e-12 &&
+            ratio > 0.5) {  // down in the rounding, which mixing of redundant rows makes larger
+            if (plain) return true;
+            plain = true;
+        }
+        if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
+        const double over = -1.0 / tau;
+        if (dense) {
+            for (std::size_t row = 0; row < rows; ++row) bias_[row] = over * violation_[row];
+            dense_rows_.solve(bias_.data());
+        } else {
+            std::fill(solution_.begin(), solution_.end(), 0.0);
+            for (std::size_t row = 0; row < rows; ++row) solution_[row] = over * violation_[row];
+            matrix_.solve(solution_.data());
+            for (std::size_t row = 0; row < rows; ++row) bias_[row] = -solution_[row];
+        }
+        if (!plain) mix(iteration, kept);
+        for (std::size_t row = 0; row < rows; ++row) {
+            last_step_[row] = bias_[row];
+            multiplier_[row] += bias_[row];
+            change_[row] += bias_[row];
+        }
+        push(bias_.data());
+        before = off;
+    }
+}
+
+/// Λ for which the rows, assembled at the start of the stage, hold at its end. False if there is none near.
+bool RigidSystem::hold_rows(double tau) {
+    for (std::size_t k = 0; k < tied_.size(); ++k)
+        if (!constants_[tied_[k]].particle) axes_[k] = axes(constants_[tied_[k]], live_.bodies[tied_[k]]);
+    for (int i : driven_) {
+        trial_[i] = live_.bodies[i];
+        move(constants_[i], tau, trial_[i]);
+    }
+    if (!dense_) fill_inertias();
+    if ((dense_ ? factor_dense() : matrix_.factor(method_.floor)) && iterate(tau, dense_)) return true;
+    // Near a singular position the chord along the rows that become redundant points the wrong way: again from the
+    // same momenta, with little trust in those rows.
+    const std::size_t rows = static_cast<std::size_t>(rows_);
+    for (std::size_t row = 0; row < rows; ++row) bias_[row] = -change_[row];
+    push(bias_.data());
+    for (std::size_t row = 0; row < rows; ++row) multiplier_[row] += bias_[row];
+    if (dense_) fill_inertias();
+    return matrix_.factor(SINGULAR) && iterate(tau, false);
+}
+
+}  // namespace spook

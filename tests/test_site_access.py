@@ -1,0 +1,115 @@
+"""Every kind of page, at four widths, light and dark: axe finds nothing, nothing is cut and nothing overlaps."""
+
+import os
+from importlib.resources import files
+
+import pytest
+
+from spook_tracker.tracker.website.publish import publish
+from tests.browser import MISSING, arrive, browser, look, programs
+from tests.test_site_causes import nights
+from tests.test_site_causes import recorded as recorded  # a fixture
+
+PAGES = (
+    "index.html", "tests/friction.html", "error-time.html", "stability.html", "live.html", "compare.html",
+    "regressions.html", "versions.html", "data.html", "document.html",
+)  # fmt: skip
+WIDTHS = (360, 768, 1400, 2200)
+AXE = """
+const done = arguments[arguments.length - 1];
+axe.run(document, { resultTypes: ['violations'], iframes: false }).then(
+  (found) => done(found.violations.flatMap((v) => v.nodes.map((n) => `${v.id} (${v.impact}): ${n.target.join(' ')}`))));
+"""
+LAID_OUT = """
+const inside = (e) => e.closest('.scroll, .bar nav, svg, .plot, .visually-hidden, .skip, template, script, canvas, math, .js-plotly-plot');
+const told = [];
+const wide = innerWidth;
+if (document.documentElement.scrollWidth > wide) { told.push('the page scrolls sideways'); }
+const texts = [];
+const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (walker.nextNode()) {
+  const node = walker.currentNode, element = node.parentElement;
+  if (!node.textContent.trim() || !element.checkVisibility({ visibilityProperty: true }) || inside(element) || element.closest('header.bar, option')) continue;
+  const range = document.createRange();
+  range.selectNodeContents(node);
+  for (const box of range.getClientRects()) {
+    if (box.width < 2 || box.height < 2) continue;
+    if (box.right > wide + 1 || box.left < -1) { told.push(`cut: ${node.textContent.trim().slice(0, 40)}`); }
+    texts.push({ top: box.top + 0.2 * box.height, bottom: box.bottom - 0.2 * box.height, left: box.left + 1, right: box.right - 1, text: node.textContent.trim().slice(0, 40), element });
+  }
+}
+texts.sort((a, b) => a.top - b.top);
+for (let i = 0; i < texts.length; i += 1) {
+  for (let j = i + 1; j < texts.length && texts[j].top < texts[i].bottom; j += 1) {
+    const a = texts[i], b = texts[j];
+    if (a.left < b.right && b.left < a.right && a.element !== b.element) { told.push(`overlap: ${a.text} / ${b.text}`); }
+  }
+}
+for (const box of document.querySelectorAll('main *')) {
+  const style = getComputedStyle(box);
+  if (inside(box) && !box.matches('.scroll')) continue;
+  if (style.overflowX === 'hidden' && box.scrollWidth > box.clientWidth + 1 && box.checkVisibility()) { told.push(`hidden: ${box.className}`); }
+}
+return [...new Set(told)].slice(0, 20);
+"""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory, recorded):
+    out = tmp_path_factory.mktemp("seen") / "public"
+    publish(nights(motions=recorded), out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def driver():
+    found = programs()
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail(MISSING)
+        pytest.skip(MISSING)
+    with browser(*found) as opened:
+        opened.set_script_timeout(90)
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def axe():
+    pytest.importorskip("selenium_axe_python")
+    return (files("selenium_axe_python") / "axe-core" / "axe.min.js").read_text(encoding="utf-8")
+
+
+# Every page at every width, light and dark, takes minutes: two of the eight looks stand for them by default.
+EVERY = [(width, dark) for dark in (False, True) for width in WIDTHS]
+LOOKS = EVERY if os.environ.get("SPOOK_TEST_EVERY_LOOK") else [(360, False), (1400, True)]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_is_open_to_everybody_at_every_width(driver, site, axe, page):
+    found = []
+    for width, dark in LOOKS:
+        look(driver, width=width, height=900, dark=dark)
+        arrive(driver, (site / page).as_uri())
+        driver.execute_script(axe)
+        where = f"{page} {width} px {'dark' if dark else 'light'}"
+        found += [f"{where}: {told}" for told in driver.execute_script(LAID_OUT)]
+        found += [f"{where}: {told}" for told in driver.execute_async_script(AXE)]
+
+    assert found == []
+
+
+def test_axe_and_the_measure_of_texts_find_what_is_wrong(driver, site, axe):
+    """Both can fail: a picture without a name, text over text, text beyond the edge."""
+    look(driver, width=360)
+    arrive(driver, (site / "data.html").as_uri())
+    driver.execute_script(axe)
+    driver.execute_script(
+        "document.querySelector('main').insertAdjacentHTML('beforeend', '<img src=\"badge.svg\">"
+        '<p style="position:relative"><span style="position:absolute">one text</span><b>another</b></p>'
+        '<p style="white-space:nowrap">a line that does not end before the edge of a telephone is reached</p>\')'
+    )
+    told = driver.execute_script(LAID_OUT)
+
+    assert any(line.startswith("overlap") for line in told)
+    assert any(line.startswith("cut") for line in told)
+    assert any(line.startswith("image-alt") for line in driver.execute_async_script(AXE))

@@ -1,0 +1,181 @@
+"""What the page of comparisons needs to judge any two nights itself: site/static/judge.js has the rules.
+
+Nights stand in blocks, a file each, so that a reader loads at most two. A series that stands still costs a
+block one row. A night that is over never changes, so its block is made once.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from functools import partial
+from typing import Any
+
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, to_number
+from spook_tracker.tracker.document.wording import clean, conditions, named, page_of
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.lane import asked_for, asked_whole
+from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off
+from spook_tracker.tracker.judge.work import Samples, with_work
+from spook_tracker.tracker.website.folder import digest
+from spook_tracker.tracker.website.nights import Book, Night, Records
+
+BLOCK = 32  # nights in a file
+OUTCOMES = (
+    "value", "out_of_limit", "not_finite", "diverged", "crashed", "timed_out", "missing", "not_supported",
+)  # fmt: skip
+Row = list[Any]  # definition, value, outcome, passed + 2 held, state hash, failure, usual, suspected, blame
+
+
+def definition_fields(definition: SeriesDefinition) -> dict[str, Any]:
+    """What the judge asks of a definition."""
+    said = {what: str(getattr(definition, what)) for what in ("unit", "better", "reference", "limit")}
+    return {
+        "test": definition.test, "role": definition.role, "kind": definition.kind, "unit": definition.unit,
+        "better": definition.better, "limit": definition.limit, "set_point": definition.set_point,
+        "reference": definition.reference, "tolerance": definition.tolerance,
+        "relative_tolerance": definition.relative_tolerance, "version": definition.test_version,
+        "read_off": is_read_off(definition), "said": said,
+    }  # fmt: skip
+
+
+class Texts:
+    """Texts and definitions, once each, named by their place."""
+
+    def __init__(self) -> None:
+        self.texts: dict[str, int] = {"": 0}
+        self.definitions: dict[str, int] = {}
+
+    def place(self, text: str) -> int:
+        return self.texts.setdefault(text, len(self.texts))
+
+    def definition(self, definition: SeriesDefinition) -> int:
+        told = json.dumps(definition_fields(definition), allow_nan=False)
+        return self.definitions.setdefault(told, len(self.definitions))
+
+    def row(
+        self,
+        definition: SeriesDefinition,
+        sample: Sample,
+        usual: tuple[float, float] | None = None,
+        suspected: bool = False,
+        blame: str = "",
+    ) -> Row:
+        """One sample, without what is empty at its end."""
+        row = [
+            self.definition(definition),
+            to_number(float(sample.value)),
+            OUTCOMES.index(sample.outcome),
+            int(sample.passed) + 2 * int(sample.set_point_held),
+            self.place(sample.state_hash),
+            self.place(sample.failure),
+            0 if usual is None else [to_number(end) for end in usual],
+            int(suspected),
+            self.place(blame),
+        ]
+        while row[-1] == 0:
+            row.pop()
+        return row
+
+
+def side_fields(night: Any, samples: Samples) -> dict[str, Any]:
+    """What the judge asks of a run."""
+    asked = asked_for(night, samples)
+    return {
+        "engine": night.engine.name, "commit": night.engine.git_hash, "dirty": night.engine.dirty,
+        "machine": night.machine.fingerprint, "floats": night.machine.float_environment,
+        "day": datetime.fromisoformat(night.started).astimezone(UTC).date().isoformat(),
+        "whole": asked_whole(night), "asked": {family: sorted(tests) for family, tests in sorted(asked.items())},
+    }  # fmt: skip
+
+
+def accepted_fields(accepted: Sequence[Accepted], keys: Sequence[str]) -> list[dict[str, Any]]:
+    """The accepted levels with the series they are about."""
+    return [
+        {
+            "keys": [key for key in keys if level.names(key)],
+            "low": to_number(level.low), "high": to_number(level.high),
+            "until": level.until.isoformat() if level.until else "", "said": clean(str(level)),
+        }
+        for level in accepted
+        if not level.removed
+    ]  # fmt: skip
+
+
+Marks = dict[str, tuple[tuple[float, float] | None, bool, str]]  # by key: usual, suspected, blame
+
+
+def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
+    """What the history knows of every run, by its id, as tracker/judge/compare.py:known tells it of two."""
+    found: dict[str, Marks] = {}
+    for key, series in told.items():
+        timed = series.definition.kind == "time"
+        for judged in series.nights:
+            usual = None
+            if timed and judged.usual is not None:
+                level, threshold = judged.usual
+                usual = (judged.night.value if judged.red else level, threshold)
+            blamed = judged.red and judged.worse_at is not None
+            suspected = timed and judged.state == "suspected"
+            if usual is None and not blamed and not suspected:
+                continue
+            blame = f"first bad commit {commit_of(judged.worse_at.run)}" if blamed and judged.worse_at else ""
+            found.setdefault(judged.night.run.id, {})[key] = (usual, suspected, blame)
+    return found
+
+
+def files(history: Records, book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
+    """The files of the page: path, what each is made from, and how."""
+    told = {t.definition.key: t.told for test in book.tests for t in test.trends}
+    marks = all_marks(told)
+    for number in range(0, len(book.nights), BLOCK):
+        nights = book.nights[number : number + BLOCK]
+        facts = [
+            (night.id, night.started, night.trigger, repr(night.asked), marks.get(night.id))
+            for night in nights
+        ]
+        yield (
+            f"compare/nights-{number // BLOCK}.js",
+            digest(repr(facts).encode("utf-8", "replace")).encode(),
+            partial(_block, history, number // BLOCK, nights, marks),
+        )
+
+
+def _block(history: Records, number: int, nights: Sequence[Night], marks: Mapping[str, Marks]) -> bytes:
+    texts = Texts()
+    rows: dict[str, list[Row]] = {}
+    last: dict[str, Row] = {}
+    sides = []
+    for place, night in enumerate(nights):
+        samples = with_work(history.samples(night.id), night.engine)
+        sides.append(side_fields(night, samples))
+        here = marks.get(night.id, {})
+        for key in last.keys() - samples.keys():
+            rows[key].append([place])
+            del last[key]
+        for key, (definition, sample) in samples.items():
+            row = texts.row(definition, sample, *here.get(key, (None, False, "")))
+            if last.get(key) != row:
+                rows.setdefault(key, []).append([place, *row])
+                last[key] = row
+    definitions = [json.loads(text) for text in texts.definitions]
+    whole = {"texts": list(texts.texts), "definitions": definitions, "nights": sides, "rows": rows}
+    return f"comparedNights({number},{_json(whole)});\n".encode()
+
+
+def described(book: Book) -> dict[str, list[str]]:
+    """Title, words and page of every series."""
+    return {
+        t.definition.key: [
+            clean(test.card.title),
+            clean(f"{named(t.definition)[0]} ({conditions(t.definition)})"),
+            page_of(test.name),
+        ]
+        for test in book.tests
+        for t in test.trends
+    }
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
