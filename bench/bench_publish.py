@@ -1,32 +1,79 @@
-"""How long a website takes: ten years of nights at once, and one more night on top.
+"""How long a website takes and what its pages weigh: many nights at once, and one more night on top.
 
-Synthetic runs (`tests/synthetic_history.py`) stand for the nights; the ratio of the two is the claim.
+    make bench-publish
+
+Synthetic runs (`tests/synthetic_history.py`) stand for the nights; 51 series with every chart. The ratio of the two
+publications is the claim about time; bytes are the same on every machine.
 """
 
 from __future__ import annotations
 
+import argparse
+import re
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import msgspec
+
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from spook_tracker.tracker.website.publish import publish
-from tests.synthetic_history import decade
+from tests.synthetic_history import DocumentHistory, decade
+
+BUDGETS = {"index.html": 100_000, "tests/": 400_000, "compare.html": 400_000, "regressions.html": 400_000}
+
+
+def history(nights: int, series: int) -> DocumentHistory:
+    """That many nights of that many series."""
+    cut = []
+    for document in decade(nights).documents.values():
+        kept = document.series[:series]
+        keys = {definition.key for definition in kept}
+        samples = tuple(sample for sample in document.samples if sample.series in keys)
+        cut.append(msgspec.structs.replace(document, series=kept, samples=samples))
+    return DocumentHistory(cut)
+
+
+def before_charts(page: Path) -> int:
+    """Bytes of a page without its charts."""
+    text = page.read_text(encoding="utf-8")
+    return len(re.sub(r'<figure class="chart.*?</figure>', "", text, flags=re.DOTALL).encode())
 
 
 def main() -> None:
+    reader = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    reader.add_argument("--nights", type=int, default=1000)
+    reader.add_argument("--series", type=int, default=51)
+    asked = reader.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "public"
         seconds = []
-        for nights in (3650, 3651):
-            history = decade(nights)
-            start = time.perf_counter()
-            report = publish(history, out)
-            seconds.append(time.perf_counter() - start)
-            print(f"{nights} nights: {seconds[-1]:.1f} s, {report}")
+        for nights in (asked.nights, asked.nights + 1):
+            found = history(nights, asked.series)
+            start = time.process_time()
+            report = publish(found, out)
+            seconds.append(time.process_time() - start)
+            told = f"{report.written} files written, {report.skipped} kept"
+            print(f"{nights} nights, {asked.series} series: {seconds[-1]:.1f} s of processor time, {told}")
         print(f"one more night / all nights: {seconds[1] / seconds[0]:.2f}")
+        print(f"{'page':<32}{'bytes':>10}{'before charts':>15}")
+        over = []
+        for page in sorted(out.rglob("*.html")):
+            name = str(page.relative_to(out))
+            bare = before_charts(page)
+            print(f"{name:<32}{page.stat().st_size:>10}{bare:>15}")
+            over += [name for start, most in BUDGETS.items() if name.startswith(start) and bare > most]
+        blocks = sorted((out / "compare").glob("nights-*.js"), key=lambda path: path.stat().st_size)
+        if blocks:
+            print(
+                f"{len(blocks)} blocks of nights for comparisons, the largest {blocks[-1].stat().st_size} bytes"
+            )
+        total = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
+        print(f"the whole site: {total / 1e6:.1f} MB")
+        if over:
+            sys.exit(f"over budget: {', '.join(over)}")
 
 
 if __name__ == "__main__":

@@ -292,7 +292,10 @@ TEST = ScalarTest(
                 Configuration(name="plain", method=PLAIN, expected_order=2.0),
                 *(
                     Configuration(
-                        name=order, method=Method(composition=order), expected_order=float(order[-1])
+                        name=order,
+                        method=Method(composition=order),
+                        expected_order=float(order[-1]),
+                        order_range=(1 / 12, 1 / 4),
                     )
                     for order in ORDERS
                 ),

@@ -3,7 +3,8 @@
 The pictures in the README and in docs/ come from here, after `make nightly` and `bench/red_night.py`:
 
     python -m tests.browser public/index.html docs/dashboard.png
-    python -m tests.browser public-red/index.html docs/red-night.png --width 1400 --most 900
+    python -m tests.browser public-red/index.html docs/red-night.png --most 900
+    python -m tests.browser public-red/tests/pendulum.html docs/error-run-time.png --most 620 --at "#error-time"
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 MISSING = "no Chromium with its driver here; .ci/install-system installs both"
 PATIENCE = 60.0  # s, on a machine whose cores are busy; a page that never gets there fails then
 SEEN = """[...document.querySelectorAll('figure.chart')].every((box) => 'drawn' in box.dataset ||
-  !box.checkVisibility() || box.getBoundingClientRect().top > innerHeight)"""
+  !box.checkVisibility() || box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
 STILL = """[...document.querySelectorAll('figure.replay, .live')].every((box) => box.player || box.page ||
   box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
 CHROMES = ("chromium", "chromium-browser", "google-chrome")
@@ -94,10 +95,12 @@ def photograph(
         arrive(driver, Path(path).resolve().as_uri() + mark + view)
         tall = driver.execute_script("return document.documentElement.scrollHeight")
         look(driver, width=width, height=min(most, tall), dark=dark)
-        if at:
-            driver.execute_script("document.querySelector(arguments[0]).scrollIntoView()", at)
-        wait_for(driver, SEEN)  # charts are drawn as they come into view
-        wait_for(driver, STILL)
+        for _ in range(3 if at else 1):  # what comes into view may push the rest down
+            if at:
+                show = "document.querySelector(arguments[0]).scrollIntoView({ behavior: 'instant' })"
+                driver.execute_script(show, at)
+            wait_for(driver, SEEN)  # charts are drawn as they come into view
+            wait_for(driver, STILL)
         picture.parent.mkdir(parents=True, exist_ok=True)
         driver.save_screenshot(str(picture))
 

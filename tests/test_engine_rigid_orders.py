@@ -28,6 +28,7 @@ from spook_tracker.engine import (
     Motor,
     Orientation,
     Position,
+    Result,
     RigidBody,
     Scene,
     Spring,
@@ -120,7 +121,7 @@ def rods_error(h: float, method: Method) -> float:
 
 SCENES: dict[str, tuple[Callable[[float, Method], float], float]] = {  # error, coarsest time step
     "box": (box_error, 0.1),
-    "rods": (rods_error, 1 / 20),
+    "rods": (rods_error, 1 / 32),
     "door": (lambda h, method: swinging_door.ladder_error(simulate, h, method), 1 / 20),
     "top": (lambda h, method: spinning_top.ladder_error(simulate, h, method), 1 / 20),
 }
@@ -129,7 +130,8 @@ SCENES: dict[str, tuple[Callable[[float, Method], float], float]] = {  # error, 
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("place", SCENES)
 def test_the_order_is_the_one_claimed(place: str, name: str) -> None:
-    """Slope of log error over log h from the steps whose error is above rounding, the coarsest left out."""
+    """Slope of log error over log h from the steps whose error is above rounding, the coarsest left out: there h times
+    the fastest turn is below 1/2, where theory has the order within 0.25 (tests/test_scalar_tests_orders.py)."""
     error, coarsest = SCENES[place]
     method, order = METHODS[name]
     finest = 4 if order < 8 else 3
@@ -141,7 +143,7 @@ def test_the_order_is_the_one_claimed(place: str, name: str) -> None:
         assert errors[-1] < 1e-10
         kept = list(zip(steps[:2], errors[:2], strict=True))
     slope = np.polyfit(np.log([h for h, _ in kept]), np.log([e for _, e in kept]), 1)[0]
-    assert order - 0.3 < slope < order + 1.5, errors
+    assert order - 0.3 < slope < order + 0.3, errors
 
 
 def held(kind: str, bodies: int) -> Scene:
@@ -268,15 +270,19 @@ def test_each_correction_is_an_order_of_the_violation(corrections: int) -> None:
 
 
 def test_a_joint_started_against_its_stop_is_lost_not_wrong() -> None:
-    """Nothing moves as fast as asked on this arm within a step or its smallest part: named, not a number."""
+    """A velocity the hinge forbids is taken away, as a blow against it would; one that leads farther than its arm even
+    in the smallest part of a step, 0.1 s/2¹¹, finds no way back: named, not a number."""
     scene = rods()
-    fast = dataclasses.replace(scene.bodies[0], velocity=(1e8, 0.0, 0.0))
-    scene = dataclasses.replace(scene, bodies=(fast, scene.bodies[1]))
-    result = simulate(scene, time_step=0.1, steps=5, method=Method(composition="order4"))
+    order4, place = Method(composition="order4"), {"x": Final(quantity=Position("lower"))}
 
-    assert result.status in ("diverged", "completed")
-    if result.status == "diverged":
-        assert "no motion satisfies" in result.failure
+    def run(speed: float) -> Result:
+        fast = dataclasses.replace(scene.bodies[0], velocity=(speed, 0.0, 0.0))
+        pushed = dataclasses.replace(scene, bodies=(fast, scene.bodies[1]))
+        return simulate(pushed, time_step=0.1, steps=5, method=order4, observe=place)
+
+    assert np.abs(run(100.0)["x"] - run(0.0)["x"]).max() < 0.01  # halved steps beside whole ones
+    assert run(1e8).status == "diverged"
+    assert "no motion satisfies" in run(1e8).failure
 
 
 def box(name: str, x: float) -> RigidBody:

@@ -128,6 +128,34 @@ def test_two_nights_laid_over_each_other_show_the_first_moment_they_part(driver,
     assert complaints(driver) == []
 
 
+def test_two_nights_stand_side_by_side_and_are_seen_from_one_place(driver, site):
+    replay(driver, site)
+    driver.execute_script(
+        "const s = document.querySelector('#replay label select'); s.selectedIndex = 1; s.dispatchEvent(new Event('change'))"
+    )
+    wait_for(driver, "!!document.querySelector('#replay button[data-sample]')")
+    box = "[...document.querySelectorAll('#replay label')].find((l) => l.textContent.includes('side by side')).querySelector('input')"
+    driver.execute_script(f"{box}.click()")
+    wait_for(driver, "document.querySelectorAll('#replay canvas').length === 2")
+    told = driver.execute_script("""
+      const p = document.getElementById('replay').player;
+      p.seek(200);
+      p.view.camera.position.set(9, 8, 7);
+      p.view.controls.update();
+      p.view.controls.dispatchEvent({ type: 'change' });
+      const at = (view) => { view.poses.at(0, 200); return [...view.poses.p]; };
+      return [at(p.view), at(p.second), p.second.camera.position.toArray(), p.second.sample];
+    """)
+
+    assert told[0][2] - told[1][2] == pytest.approx(0.25, abs=1e-4)  # tonight is wrong by that much
+    assert told[2] == pytest.approx([9, 8, 7], abs=1e-6)
+    assert told[3] == 200
+    assert "beside=1" in driver.current_url
+    driver.execute_script(f"{box}.click()")
+    assert driver.execute_script("return document.querySelectorAll('#replay canvas').length") == 1
+    assert complaints(driver) == []
+
+
 def test_without_a_script_the_picture_stands_still(site):
     page = (site / "tests" / "pendulum.html").read_text()
 

@@ -138,7 +138,7 @@ class Player {
     this.element.addEventListener("keydown", (event) => {
       if (event.key === " " && event.target !== this.play && event.target.tagName !== "SELECT" && event.target.type !== "checkbox") { event.preventDefault(); this.toggle(); }
     });
-    document.addEventListener("theme", () => this.view.paint());
+    document.addEventListener("theme", () => { this.view.paint(); if (this.second) { this.second.paint(); } });
     this.tool("speed", make("label", {}, "speed ", this.select([["0.1", "× 0.1"], ["0.25", "× 0.25"], ["1", "× 1"], ["4", "× 4"]], "1", (v) => { this.speed = Number(v); })));
     this.tool("ghost", this.check("ghost", true, (on) => { this.view.shown.ghost = on; this.view.show(this.sample); }));
     this.tool("forces", this.check("contact forces", true, (on) => { this.view.shown.forces = on; this.view.show(this.sample); }));
@@ -187,6 +187,35 @@ class Player {
     this.seek(seconds / movie.step);
   }
 
+  // Another movie in a picture of its own beside the first, on the same slider and seen from the same place.
+  beside(movie, name = "") {
+    if (this.second) {
+      this.second.close();
+      this.second = null;
+      this.stages.replaceWith(this.stage);
+    }
+    if (movie) {
+      const stage = make("div", { class: "stage" }), named = (words, part) => make("div", {}, part, make("p", { class: "stage-name" }, words));
+      this.stages = make("div", { class: "stages-beside" });
+      this.stage.replaceWith(this.stages);
+      this.stages.append(named("tonight", this.stage), named(name, stage));
+      this.second = new SceneView(stage, { ...movie, ghost: null });
+      this.second.canvas.setAttribute("role", "img");
+      this.second.canvas.setAttribute("aria-label", `The scene as it moved: ${name}.`);
+      const follow = (from, to) => from.controls.addEventListener("change", () => {
+        if (to.camera.position.distanceToSquared(from.camera.position) < 1e-18) { return; }
+        to.camera.position.copy(from.camera.position);
+        to.controls.target.copy(from.controls.target);
+        to.controls.update();
+        to.draw();
+      });
+      follow(this.view, this.second);
+      follow(this.second, this.view);
+    }
+    this.view.resize();
+    this.seek(this.sample);
+  }
+
   toWorst() {
     const values = this.movie.error || this.movie.largest;
     let at = 0;
@@ -200,6 +229,7 @@ class Player {
     this.sample = Math.max(0, Math.min(this.movie.count - 1, sample || 0));
     const from = performance.now();
     this.view.show(this.sample);
+    if (this.second) { this.second.show(this.sample); }
     this.cost = performance.now() - from;  // ms of script for this picture
     this.slider.value = String(this.sample);
     const seconds = this.sample * this.movie.step;

@@ -68,10 +68,17 @@ async function startReplay(box) {
     });
     const first = make("button", { type: "button", class: "button", hidden: true }, "First difference");
     first.addEventListener("click", () => { player.pause(); player.seek(Number(first.dataset.sample)); player.remember(); });
+    let night = null, label = "";
+    const beside = player.check("side by side", state.get("beside") === "1", (on) => { state.set("beside", on ? "1" : ""); player.beside(on ? night : null, label); });
+    beside.hidden = true;
     async function against(key) {
       const source = sources.find((s) => s.key === key);
+      beside.hidden = !source;
+      player.beside(null);
       if (!source) { first.hidden = true; player.use(tonight, true); player.view.load(tonight, true); return; }
-      const night = await movieFrom(source);
+      night = await movieFrom(source);
+      label = source.label;
+      beside.querySelector("input").disabled = !sameScene(tonight, night);
       if (!sameScene(tonight, night)) { say(`${source.label} was recorded with other steps or bodies, so it cannot be laid over tonight.`); return; }
       say("");
       const at = firstDifference(tonight, night, TOLD);
@@ -81,8 +88,9 @@ async function startReplay(box) {
       first.dataset.sample = String(at);
       first.dataset.seen = String(firstDifference(tonight, night, SEEN));
       player.use({ ...tonight, ghost: { name: source.label, position: night.position, orientation: night.orientation, energy: night.energy } }, true);
+      if (beside.querySelector("input").checked) { player.beside(night, label); }
     }
-    player.tools.prepend(make("label", {}, "against ", other), first);
+    player.tools.prepend(make("label", {}, "against ", other), first, beside);
     if (state.get("against")) { other.value = state.get("against"); await against(other.value); }
     if (state.get("at") === "first") {  // whoever comes from the list of causes wants to see it go wrong
       state.set("at", "");

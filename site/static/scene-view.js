@@ -341,5 +341,12 @@ class SceneView {
     this.draw();
   }
 
+  close() {
+    this.watch.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.canvas.remove();
+  }
+
   draw() { this.renderer.render(this.scene, this.camera); }
 }

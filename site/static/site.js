@@ -37,13 +37,13 @@ function dressTrace(trace) {
   if (meta.role === "prediction") {
     return { ...dressed, line: { color: colour("--ink"), width: 2.5 }, fillcolor: "rgba(0,0,0,0)" };
   }
-  const paint = meta.style === "limit" || meta.style === "failed" ? colour("--fail-fill") : colour("--c" + meta.colour);
+  const paint = meta.style === "limit" || meta.style === "failed" || meta.style === "broken" ? colour("--fail-fill") : colour("--c" + meta.colour);
   dressed.line = { width: meta.style === "front" ? 1.5 : 2, ...trace.line, color: paint };
   if (meta.style === "front") { dressed.opacity = 0.65; }
   if (trace.marker) {
     const crowded = trace.x.length > 60 && meta.style === "both";
-    dressed.marker = { ...trace.marker, color: paint, size: meta.style === "failed" ? 10 : crowded ? 3 : 7 };
-    if (meta.style === "failed") { dressed.marker.line = { width: 2.5, color: paint }; }
+    dressed.marker = { ...trace.marker, color: paint, size: meta.style === "failed" || meta.style === "broken" ? 10 : crowded ? 3 : 7 };
+    if (meta.style === "failed" || meta.style === "broken") { dressed.marker.line = { width: 2.5, color: paint }; }
   }
   return dressed;
 }
@@ -72,7 +72,7 @@ function dressLayout(layout, title) {
     ...layout, shapes, annotations, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: ink },
     xaxis: axis(layout.xaxis), yaxis: axis(layout.yaxis), margin: { l: 58, r: 14, t: 12, b: 46 },
-    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12 } },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 } },
     hoverlabel: { bgcolor: colour("--raised"), bordercolor: colour("--line"), font: { color: colour("--ink"), size: 12.5 }, align: "left" },
     modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: colour("--ink-3"), activecolor: colour("--accent") },
     hovermode: "closest", dragmode: "zoom", colorway: ["#0072b2"],
@@ -244,6 +244,6 @@ filter();
 switches();
 openDetails();
 late();
-document.querySelectorAll("svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });
+document.querySelectorAll(".scroll > svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });
 // The page says itself when every script has run: whoever drives it need not guess.
 document.addEventListener("DOMContentLoaded", () => { document.documentElement.dataset.ready = ""; });

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-Style = Literal["line", "points", "both", "reference", "limit", "front", "failed", "steps"]
+Style = Literal["line", "points", "both", "reference", "limit", "front", "failed", "broken", "steps"]
 Scale = Literal["linear", "log"]
 
 
@@ -26,6 +26,7 @@ class Line:
     colour: int = 0  # slot of the palette
     notes: tuple[str, ...] = ()  # what a reader sees at each point, if anything
     quiet: bool = False  # left out of the legend
+    upto: tuple[float, ...] = ()  # how far each point reaches along x: the slowest repeat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,10 +110,10 @@ def drawable(chart: Chart) -> Chart:
         top = high + 0.08 * (high - low or abs(high) or 1.0)
     lines: list[Line] = []
     for line in chart.lines:
-        keep_x, keep_y, keep_notes = [], [], []
+        keep_x, keep_y, keep_notes, keep_upto = [], [], [], []
         failed_x, failed_notes = [], []
         notes = line.notes or ("",) * len(line.x)
-        for x, y, note in zip(line.x, line.y, notes, strict=True):
+        for x, y, note, upto in zip(line.x, line.y, notes, line.upto or line.x, strict=True):
             if not math.isfinite(x) or (chart.x_scale == "log" and x <= 0.0):
                 continue
             if not fits(y):
@@ -120,10 +121,12 @@ def drawable(chart: Chart) -> Chart:
                 failed_notes.append(note or "failed: no finite value")
                 continue
             keep_x.append(x)
+            keep_upto.append(upto)
             keep_y.append((abs(y) or floor) if log_y else y)
             keep_notes.append(note or ("exactly 0, drawn at the lower edge" if log_y and y == 0.0 else ""))
         told = tuple(keep_notes) if any(keep_notes) else ()
-        lines.append(replace(line, x=tuple(keep_x), y=tuple(keep_y), notes=told))
+        reach = tuple(keep_upto) if line.upto else ()
+        lines.append(replace(line, x=tuple(keep_x), y=tuple(keep_y), notes=told, upto=reach))
         if failed_x:
             lines.append(
                 Line(

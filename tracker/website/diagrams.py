@@ -50,6 +50,7 @@ class View:
     columns: tuple[str, ...]
     rows: list[tuple[str, ...]]
     left_out: int = 0
+    tall: bool = False  # many names in the legend
 
 
 def view(chart: Chart, *, table: bool = True) -> View:
@@ -68,8 +69,9 @@ def view(chart: Chart, *, table: bool = True) -> View:
             at = labels.get(line.x[i]) or number(line.x[i], 6)
             rows.append((clean(line.name), at, number(line.y[i], 6)))
     return View(
-        chart.name, chart.title, chart.thesis, shown.note, picture(chart), figure(chart), columns, rows, every
-    )
+        chart.name, chart.title, chart.thesis, shown.note, picture(chart), figure(chart), columns, rows, every,
+        sum(not line.quiet for line in chart.lines) > 5,
+    )  # fmt: skip
 
 
 def grid_view(grid: Grid) -> View:
@@ -101,7 +103,7 @@ def trend_chart(
     if broken:
         lines.append(
             Line(
-                name="out of limit", style="failed", colour=1, x=tuple(float(at[i]) for i in broken),
+                name="outside the limit", style="broken", colour=1, x=tuple(float(at[i]) for i in broken),
                 y=tuple(values[i] for i in broken),
                 notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
             )
@@ -130,7 +132,7 @@ def trend_chart(
                 (0.0, max(abs(low), abs(high))) if low <= 0.0 <= high else sorted((abs(low), abs(high)))
             )
         bands = (Band(low=low, high=high, name="set point"),)
-    kept = [at[i] for i in thinned(len(at), 6)]
+    kept = [at[i] for i in thinned(len(at), 4)]
     magnitude = "magnitude of " if scale == "log" and any(v < 0.0 for v in values) else ""
     return Chart(
         name=f"v-{slug(definition.key)}",
@@ -194,8 +196,11 @@ def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
         return "linear", list(limit), ""
     one_sign = trend.definition.better == "smaller_magnitude" or min(trend.values) > 0.0
     decades = math.log10(max(sizes) / min(sizes))
+    theory = trend.definition.set_point or (0.0, 0.0)
     if one_sign and (
-        decades > 1.5 or (limit is not None and limit > 0.0 and not 0.2 < limit / max(sizes) < 5.0)
+        decades > 1.5
+        or 0.0 < 100.0 * theory[0] < theory[1]
+        or (limit is not None and limit > 0.0 and not 0.2 < limit / max(sizes) < 5.0)
     ):
         return "log", [limit] if limit is not None and limit > 0.0 else [], ""
     if limit is None:
@@ -323,7 +328,7 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
             lines: list[Line] = []
             for colour, (configuration, found) in enumerate(points.items()):
                 order = orders.get((name, configuration))
-                told = f", order {order:.2f}" if order is not None and math.isfinite(order) else ""
+                told = f" ({order:.2f})" if order is not None and math.isfinite(order) else ""
                 lines.append(_ladder_line(f"{configuration}{told}", found, of, colour, definition.unit))
                 before = earlier.get(configuration, [])
                 if axis == "seconds" and any(math.isfinite(r.seconds) for r in before):
@@ -390,6 +395,7 @@ def _ladder_line(
     return Line(
         name=name, x=tuple(of(r) for r in shown), y=tuple(abs(r.error) for r in shown), colour=colour,
         notes=tuple(notes), style="both",
+        upto=tuple(r.seconds * r.spread if math.isfinite(r.spread) and of(r) == r.seconds else of(r) for r in shown),
     )  # fmt: skip
 
 

@@ -58,6 +58,7 @@ def figure(chart: Chart) -> dict[str, Any]:
         layout["xaxis"] |= {
             "tickvals": [value for value, _ in chart.x_ticks],
             "ticktext": [plain(label) for _, label in chart.x_ticks],
+            "tickangle": 0,
         }
     if chart.polar:
         _polar(layout, chart)
@@ -178,7 +179,9 @@ def _polar(layout: dict[str, Any], chart: Chart) -> None:
 
 
 def _trace(line: Line) -> dict[str, Any]:
-    drawn = {"points": "markers", "failed": "markers", "both": "lines+markers"}.get(line.style, "lines")
+    drawn = {"points": "markers", "failed": "markers", "broken": "markers", "both": "lines+markers"}.get(
+        line.style, "lines"
+    )
     trace: dict[str, Any] = {
         "type": "scatter",
         "mode": drawn,
@@ -193,7 +196,12 @@ def _trace(line: Line) -> dict[str, Any]:
     if line.style == "steps":
         trace["line"] = {"shape": "hv"}
     if "markers" in drawn:
-        trace["marker"] = {"symbol": "x-thin" if line.style == "failed" else SYMBOLS[line.colour % 8]}
+        own = {"failed": "x-thin", "broken": "circle-open"}.get(line.style)
+        trace["marker"] = {"symbol": own or SYMBOLS[line.colour % 8]}
+    if line.upto:
+        far = [end - x for x, end in zip(line.x, line.upto, strict=True)]
+        trace["error_x"] = {"type": "data", "symmetric": False, "array": far, "arrayminus": [0.0] * len(far),
+                            "thickness": 1, "width": 0}  # fmt: skip
     if line.notes:
         trace |= {"text": [plain(note).replace("\n", "<br>") for note in line.notes], "hoverinfo": "text"}
     return trace

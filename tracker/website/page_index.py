@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
@@ -158,6 +159,11 @@ def _step_words(step: float | None) -> str:
     return f"1/{round(inverse)} s" if abs(inverse - round(inverse)) < 1e-6 * inverse else quantity(step, "s")
 
 
+def said(state: Class) -> str:
+    """The word of a class of nights."""
+    return CLASSES[state][1]
+
+
 def heat(book: Book) -> dict[str, Any]:
     """Tests against nights: cells of equal verdict beside each other are one bar."""
     shown = book.nights[-HEAT_NIGHTS:]
@@ -167,13 +173,17 @@ def heat(book: Book) -> dict[str, Any]:
     for i, test in enumerate(book.tests):
         states = [night_state(test, night.index) for night in shown]
         runs: list[dict[str, Any]] = []
-        for j, state in enumerate(states):
-            x = left + j * step
-            told = f"{day(shown[j].started)} {short_hash(shown[j].engine)}: {state}"
+        for state, group in groupby(range(len(states)), key=states.__getitem__):
+            places = list(group)
+            x, width = left + places[0] * step, step * len(places) - 2.0
+            days = [day(shown[places[0]].started), day(shown[places[-1]].started)]
+            told = f"{' to '.join(dict.fromkeys(days))}: {said(state)}"
+            if len(places) == 1:
+                told = f"{told} {short_hash(shown[places[0]].engine)}".rstrip()
+            marks = [round(left + place * step + (step - 2.0) / 2.0, 1) for place in places]
             runs.append(
-                {"state": state, "x": round(x, 2), "width": round(step - 2.0, 2), "told": told,
-                 "places": [round(x + (step - 2.0) / 2.0, 2)]}
-            )  # fmt: skip
+                {"state": state, "x": round(x, 1), "width": round(width, 1), "told": told, "places": marks}
+            )
         title = clean(test.card.title)
         rows.append(
             {"title": title if len(title) < 25 else title[:23] + "…", "address": address(test), "y": 22 + 22 * i,
@@ -189,11 +199,12 @@ def heat(book: Book) -> dict[str, Any]:
         "columns": shown,
         "rows": rows,
         "ticks": ticks,
-        "width": round(left + max(700.0, step * len(shown)) + 20.0),
+        "width": round(left + max(step * len(shown), 46.0) + 4.0),
         "height": 26 + 22 * len(rows),
+        "left": round(left),
         "first": first,
         "description": f"{len(rows)} tests over {len(shown)} nights; "
-        f"{sum(r['state'] == 'fail' for x in rows for r in x['runs'])} red.",
+        f"{sum(len(r['places']) for x in rows for r in x['runs'] if r['state'] == 'fail')} red.",
     }
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from spook_tracker.tracker.document.wording import clean, day, slug
+from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
     grid_view,
@@ -57,7 +59,22 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "orders": [every[id(t)] for t in [*test.of_kind("order"), *test.of_kind("time")]],
         "maps": [grid_view(map_grid(m)) for m in test.maps],
         "break_points": [every[id(t)] for t in break_points],
+        "conclusions": concluded(test.card.conclusion, [gate.state for gate in gates]),
         "events": [event_row(e, book) for e in of_test(events, test)[:20]],
         "scalars": [every[id(t)] for t in scalars],
     }
     return Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
+
+
+CONCLUSION = re.compile(r"Green: (.*?)\s+Red: (.*)", re.DOTALL)
+
+
+def concluded(text: str, gates: Sequence[Class]) -> list[tuple[str, str]]:
+    """What tonight's gates say of the test, first; a conclusion that has no two sides stands as it is."""
+    sides = CONCLUSION.fullmatch(text)
+    if sides is None or not gates:
+        return [("", text)]
+    green, red = sides.groups()
+    if "fail" in gates:
+        return [("Red tonight", red), ("When it is green", green)]
+    return [("Green tonight", green), ("When it is red", red)]

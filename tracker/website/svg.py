@@ -241,15 +241,23 @@ def _mark(line: Line, x_of: Callable[[float], float], y_of: Callable[[float], fl
             pen = "M"
             continue
         x, y = x_of(line.x[i]), y_of(line.y[i])
-        if line.style not in ("points", "failed"):
+        if line.style not in ("points", "failed", "broken"):
             if line.style == "steps" and pen == "L":
                 pieces.append(f"L{_n(x)} {_n(before)}")
             pieces.append(f"{pen}{_n(x)} {_n(y)}")
             pen, before = "L", y
-        if line.style in ("points", "both", "failed") and (len(places) <= 80 or line.style != "both"):
+        if line.style in ("points", "both", "failed", "broken") and (
+            len(places) <= 80 or line.style != "both"
+        ):
             mark.markers.append(
-                ("cross" if line.style == "failed" else f"m{line.colour % 4}", f"{_n(x)} {_n(y)}")
+                (
+                    {"failed": "cross", "broken": "ring"}.get(line.style, f"m{line.colour % 4}"),
+                    f"{_n(x)} {_n(y)}",
+                )
             )
+    for i in places if line.upto else ():
+        if math.isfinite(line.y[i]) and line.upto[i] > line.x[i]:
+            pieces.append(f"M{_n(x_of(line.x[i]))} {_n(y_of(line.y[i]))}H{_n(x_of(line.upto[i]))}")
     mark.path = "".join(pieces)
     return mark
 

@@ -10,9 +10,10 @@ namespace spook {
 class DenseRows {
 public:
     void prepare(int rows) {
+        const std::size_t count = static_cast<std::size_t>(rows);
         rows_ = rows;
-        values_.assign(static_cast<std::size_t>(rows * rows), 0.0);
-        inverse_.assign(static_cast<std::size_t>(rows), 0.0);
+        values_.assign(count * count, 0.0);
+        inverse_.assign(count, 0.0);
     }
     int rows() const noexcept { return rows_; }
     /// The lower triangle, row-major; to be filled before factor().
