@@ -16,7 +16,7 @@ from spook_tracker.engine import recorded_joints
 from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import CentralGravity, Spring
-from spook_tracker.engine.joints import Distance
+from spook_tracker.engine.joints import AxialJoint, Distance
 from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
@@ -220,6 +220,10 @@ def _potential(scene: Scene, recording: Recording) -> Array:
             )
             stretch = np.linalg.norm(second - first, axis=1) - force.rest_length
             energy = energy + 0.5 * force.stiffness * stretch**2
+    for joint in scene.constraints:
+        if isinstance(joint, AxialJoint) and joint.spring is not None:
+            place = recorded_joints.coordinate(scene, joint, where, recording.orientations)
+            energy = energy + 0.5 * joint.spring.stiffness * (place - joint.spring.rest) ** 2
     return np.asarray(energy)
 
 
