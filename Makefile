@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy wasm three-scene nightly test check bench bench-publish bench-heaps mutants mutation package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy wasm three-scene nightly test check bench bench-publish bench-heaps heaps mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -14,8 +14,10 @@ help:
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
+	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
+	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
 	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
@@ -55,11 +57,17 @@ release:
 	$(MAKE) check test package
 	@sh .ci/release "$(VERSION)"
 
+heaps: develop
+	$(BIN)/python bench/piles.py
+
 mutants: develop
 	$(BIN)/python bench/mutants.py
 
 mutation: develop
 	$(BIN)/python bench/mutation.py
+
+detectors: develop
+	$(BIN)/python bench/detectors.py --page docs/detectors.md
 
 bench: develop
 	$(BIN)/python bench/run.py

@@ -25,7 +25,8 @@ class Method:
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
                        compliance, damping and corrections play no part; forces are those at the sample's time
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
-    iterations, residual_tolerance   when an iterative solve stops
+    iterations, residual_tolerance   when an iterative solve stops; sweeps over contacts go on, up to four times as
+                       many, where rows are still off by more than unsettled_residual
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: touching bodies take part in a blow; successive: it passes through them one
                        after the other, so that the last ball of a touching row leaves

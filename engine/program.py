@@ -159,6 +159,7 @@ class Program:
             state_hash=report["state_hash"],
             stages=self.stages,
             stage_seconds=report["stage_seconds"],
+            cpu_seconds=report["cpu_seconds"],
             residual=report["residual"],
         )
 

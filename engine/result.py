@@ -44,6 +44,7 @@ class Result:
     state_hash: str
     stages: tuple[str, ...]
     stage_seconds: Mapping[str, float] = field(default_factory=dict)
+    cpu_seconds: float = 0.0  # processor time of the native loop; 0 where it cannot be told
     residual: float = 0.0  # largest row residual [m/s] a solve stopped at
 
     def __getitem__(self, name: str) -> Any:

@@ -31,6 +31,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "lock_ring": "lock_ring",
     "resting_stack": "resting_stack",
     "rolling_sphere": "rolling_sphere",
+    "pile": "pile",
     "hanging_chain": "hanging_chain.question",
     "loaded_rods": "loaded_rods",
     "spinning_top": "spinning_top",

@@ -85,9 +85,14 @@ class Sleeper:
     """An engine that leaves the processor to others for most of its time."""
 
     def __call__(self, scene: Any, **options: Any) -> Any:
-        started = time.perf_counter()
+        started, own = time.perf_counter(), time.thread_time()
         time.sleep(0.02)
-        return SimpleNamespace(seconds=time.perf_counter() - started, completed=True, stage_seconds={})
+        return SimpleNamespace(
+            seconds=time.perf_counter() - started,
+            cpu_seconds=time.thread_time() - own,
+            completed=True,
+            stage_seconds={},
+        )
 
 
 def test_processor_time_and_kernel_stand_beside_every_repeat() -> None:
@@ -104,3 +109,22 @@ def test_the_kernel_does_the_same_work_every_time() -> None:
     first, second = (min(calibrate() for _ in range(30)) for _ in range(2))
 
     assert 0.5 < first / second < 2.0
+
+
+def test_the_engine_tells_its_processor_time_from_the_time_that_passes() -> None:
+    from spook_tracker.engine import Particle, Scene, simulate
+
+    scene = Scene(bodies=(Particle(name="a", position=(0.0, 0.0, 0.0), mass=1.0),))
+    result = simulate(scene, time_step=1e-3, steps=200_000)
+
+    assert 0.0 < result.cpu_seconds <= 1.05 * result.seconds + 1e-3
+
+
+def test_an_engine_that_cannot_tell_has_no_processor_time() -> None:
+    def engine(scene: Any, **options: Any) -> Any:
+        return SimpleNamespace(seconds=0.01, completed=True, stage_seconds={})
+
+    (timing,) = interleaved([lambda simulate: simulate(None)], engine, 2)
+
+    assert timing.cpu_seconds == ()
+    assert len(timing.calibration) == 2

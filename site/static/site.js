@@ -231,13 +231,16 @@ function late() {
 // A table that fits needs no stop of the keyboard's.
 function scrollers() {
   document.querySelectorAll(".scroll").forEach((box) => {
-    if (box.scrollWidth > box.clientWidth + 1) { box.tabIndex = 0; } else { box.removeAttribute("tabindex"); }
+    if (box.scrollWidth > box.clientWidth) { box.tabIndex = 0; } else { box.removeAttribute("tabindex"); }
   });
 }
 
 charts();
 scrollers();
 addEventListener("resize", scrollers);
+addEventListener("load", scrollers);
+const grown = new ResizeObserver(scrollers);  // pages as long as the report are laid out part by part
+document.querySelectorAll(".scroll > *").forEach((content) => grown.observe(content));
 document.addEventListener("toggle", scrollers, true);
 document.querySelectorAll("table.sortable").forEach(sortable);
 filter();

@@ -38,19 +38,19 @@ class Stopwatch:
     simulate: Simulate
     options: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
-    elsewhere: float = 0.0  # s that passed while the processor was not ours
+    cpu: float | None = 0.0  # s of the processor; None once a run could not tell
     results: list[Result] = field(default_factory=list)
     counter: InstructionCounter | None = None
 
     def __call__(self, scene: Any, **options: Any) -> Result:
-        wall, own = time.perf_counter(), time.thread_time()
         if self.counter is None:
             result = self.simulate(scene, **{**options, **self.options})
         else:
             with self.counter.counting():
                 result = self.simulate(scene, **{**options, **self.options})
-        self.elsewhere += max(0.0, (time.perf_counter() - wall) - (time.thread_time() - own))
         self.seconds += result.seconds
+        own = getattr(result, "cpu_seconds", 0.0)
+        self.cpu = self.cpu + own if self.cpu is not None and own > 0.0 else None
         self.results[:] = [result]
         return result
 
@@ -73,15 +73,18 @@ def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> flo
     return None if taken is None else taken[0]
 
 
-def _both(run: Timed, simulate: Simulate, time_limit: float | None = None) -> tuple[float, float] | None:
-    """Seconds of one run, and of the processor for it."""
+def _both(
+    run: Timed, simulate: Simulate, time_limit: float | None = None
+) -> tuple[float, float | None] | None:
+    """Seconds of one run, and of the processor for it where the engine can tell."""
     watch = Stopwatch(simulate, {} if time_limit is None else {"time_limit": time_limit})
     before = time.perf_counter()
     answer = ask(partial(run, watch))
     if answer.outcome != "value" or any(not result.completed for result in watch.results):
         return None
-    seconds = watch.seconds if watch.results else time.perf_counter() - before
-    return seconds, max(0.0, seconds - watch.elsewhere)
+    if not watch.results:
+        return time.perf_counter() - before, None
+    return watch.seconds, watch.cpu
 
 
 def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list[Timing | None]:
@@ -111,7 +114,8 @@ def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list
             if whole:
                 lane.kernel.append(kernel)
                 lane.seconds.append(_undisturbed([seconds for seconds, _ in whole]))
-                lane.cpu.append(_undisturbed([cpu for _, cpu in whole]))
+                own = [cpu for _, cpu in whole if cpu is not None]
+                lane.cpu += [_undisturbed(own)] if len(own) == len(whole) else []
     return [_timing(lane, simulate) if lane and lane.seconds else None for lane in lanes]
 
 
@@ -128,7 +132,7 @@ def _timing(lane: _Lane, simulate: Simulate) -> Timing:
         runs_per_repeat=lane.runs,
         instructions=_instructions(lane.run, simulate) if short and can_count() else None,
         stage_seconds=stage_seconds(lane.run, simulate) if short else {},
-        cpu_seconds=tuple(lane.cpu),
+        cpu_seconds=tuple(lane.cpu) if len(lane.cpu) == len(lane.seconds) else (),
         calibration=tuple(lane.kernel),
     )
 

@@ -44,6 +44,7 @@ nb::dict to_dict(const RunReport& report) {
     out["failed_body"] = report.failed_body;
     out["reason"] = report.reason;
     out["seconds"] = report.seconds;
+    out["cpu_seconds"] = report.cpu_seconds;
     out["residual"] = report.residual;
     out["counters"] = counters;
     out["stage_seconds"] = stage_seconds;

@@ -112,6 +112,8 @@ void ContactStage::find_open() {
         OpenPair open{
             pair, first.body, second.body,
             separation(first.shape, detection_.pose(pair.first), second.shape, detection_.pose(pair.second))};
+        open.first_arm = first.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.first);
+        open.second_arm = second.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.second);
         const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach) open_.push_back(open);  // clearly apart: no need for its points
@@ -164,20 +166,19 @@ double ContactStage::slop(const OpenPair& open) const noexcept {
 /// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first
 /// round of first_touch(), without what that needs before.
 bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocity) const {
-    const auto [i, j] = open.pair;
     const int a = open.first, b = open.second;
     if (event_time_[a] >= 0.0 || event_time_[b] >= 0.0) return false;
-    double turning = 0.0;
-    for (const int k : {i, j}) {
-        const Vec3 spin = angular(velocity[k == i ? a : b]);
-        if (is_zero(spin)) continue;
-        if (detection_.collider(k).shape.kind == ShapeKind::plane) return false;
-        turning += norm(spin) * detection_.arm(k);
-    }
-    const double slop = this->slop(open);
     const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
-    return open.apart.gap > -0.5 * slop &&
-           !((std::max(0.0, closing) + turning) * options_.time_step > open.apart.gap + slop);
+    double turning = 0.0;
+    if (open.first_arm != 0.0 || open.second_arm != 0.0) {
+        const double first = norm(angular(velocity[a])), second = norm(angular(velocity[b]));
+        if ((open.first_arm < 0.0 && first > 0.0) || (open.second_arm < 0.0 && second > 0.0)) return false;
+        turning = first * open.first_arm + second * open.second_arm;
+    }
+    const double speed = std::max(0.0, closing) + turning;
+    if (!(speed * options_.time_step > open.apart.gap)) return open.apart.gap > 0.0;
+    const double slop = this->slop(open);
+    return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
 }
 
 /// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late

@@ -172,6 +172,7 @@ private:
         IndexPair pair;
         int first, second;  // bodies
         Separation apart;
+        double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
     };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void find_open();
@@ -203,6 +204,7 @@ private:
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
     bool find_more();
+    bool is_settled(MixedSystem& system);
     void hand_over();
     void part_by_sweeps(const MixedSystem& system);
     bool some_overlap() const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "contacts/contact_geometry.hpp"
 #include "run/watch.hpp"
@@ -26,24 +27,47 @@ Mat3 symmetric_inverse(const Mat6& mass) noexcept {
 }  // namespace
 
 void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
-    model_ = model;
-    joints_.prepare(system, {}, model);
     bodies_ = static_cast<int>(system.mass.size());
-    joint_count_ = static_cast<int>(system.rows.size());
     inertia_.resize(bodies_ + 1);
     for (int b = 0; b < bodies_; ++b)
         inertia_[b] = {1.0 / system.mass[b][0], symmetric_inverse(system.mass[b])};
     inertia_[bodies_] = {};
+    begin(system, model);
+}
+
+void ContactSweeps::start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model) {
+    bodies_ = other.bodies_;
+    inertia_ = other.inertia_;
+    begin(system, model);
+}
+
+void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
+    model_ = model;
+    joint_count_ = static_cast<int>(system.rows.size());
+    if (joint_count_ > 0) {
+        joints_.prepare(system, {}, model);
+    } else {
+        std::vector<Vec6>& velocity = joints_.velocity();
+        velocity.resize(bodies_ + 1);
+        for (int b = 0; b < bodies_; ++b) {
+            const Vec6& p = system.momentum[b];
+            const Vec3 v = inertia_[b].inverse_mass * linear(p), w = inertia_[b].inverse * angular(p);
+            velocity[b] = {v.x, v.y, v.z, w.x, w.y, w.z};
+        }
+        velocity[bodies_] = Vec6{};
+    }
     contacts_.clear();
     parent_.resize(bodies_ + 1);
-    for (int b = 0; b <= bodies_; ++b) parent_[b] = b;
+    std::iota(parent_.begin(), parent_.end(), 0);
     head_.assign(bodies_ + 1, -1);
     tail_.assign(bodies_ + 1, -1);
     active_.assign(bodies_ + 1, 0);
+    left_.assign(bodies_ + 1, 0.0);
     next_.clear();
     body_of_.clear();
     roots_.clear();
     chained_ = false;
+    stamp_ = 0;
     for (int k = 0; k < joint_count_; ++k) link(k, system.rows[k].first, system.rows[k].second);
 }
 
@@ -87,6 +111,9 @@ int ContactSweeps::add(const SweepContact& given) {
     if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
         push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * c.across);
+    if (stamp_ > 0)
+        for (const int body : {given.first, given.second})
+            if (body >= 0) hot_[body] = stamp_;
     const int index = static_cast<int>(contacts_.size()) - 1;
     link(joint_count_ + index, given.first, given.second);
     return index;
@@ -198,23 +225,48 @@ double ContactSweeps::sweep_island(int island) noexcept {
     return change;
 }
 
-FrictionReport ContactSweeps::run(int iterations, double tolerance, const std::function<bool()>& more) {
+/// As sweep_island(), but leaves out contacts between bodies that have come to an answer.
+double ContactSweeps::sweep_hot(int island, int stamp, double focus) noexcept {
+    double change = 0.0;
+    for (int item = head_[island]; item >= 0; item = next_[item]) {
+        if (item < joint_count_) {
+            const double own = joints_.update_joint(static_cast<std::size_t>(item));
+            if (!(own <= change)) change = own;
+            continue;
+        }
+        Contact& c = contacts_[item - joint_count_];
+        if (stamp > 1 && hot_[c.first] < stamp - 1 && hot_[c.second] < stamp - 1) continue;
+        const double own = update(c);
+        if (!(own <= change)) change = own;
+        if (own <= focus) continue;
+        if (c.first < bodies_) hot_[c.first] = stamp;
+        if (c.second < bodies_) hot_[c.second] = stamp;
+    }
+    return change;
+}
+
+FrictionReport ContactSweeps::run(int iterations, double tolerance, const std::function<bool()>& more,
+                                  double focus) {
     FrictionReport report;
     if (!chained_) {
         for (int item = 0; item < static_cast<int>(next_.size()); ++item) chain(item);
         chained_ = true;
     }
-    std::vector<double> left(parent_.size(), 0.0);
+    if (focus > 0.0) {
+        hot_.assign(bodies_ + 1, -1);
+        for (const int island : roots_) active_[island] = 1;
+    }
     int look = 2, late = 0;
     for (int sweep = 1, until = iterations;; ++sweep) {
         Watch::look();
+        if (focus > 0.0) stamp_ = sweep;
         bool any = false;
         for (std::size_t k = 0; k < roots_.size(); ++k) {
             const int island = roots_[k];
             if (!active_[island]) continue;
-            left[island] = sweep_island(island);
+            left_[island] = focus > 0.0 ? sweep_hot(island, sweep, focus) : sweep_island(island);
             ++report.sweeps;
-            active_[island] = !(left[island] <= tolerance);
+            active_[island] = !(left_[island] <= (focus > 0.0 ? focus : tolerance));
             any = any || active_[island];
         }
         const bool over = !any || sweep >= until;
@@ -228,11 +280,17 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, const std::f
         look = sweep + 2;
     }
     for (const int island : roots_) {
-        if (!(left[island] <= report.residual)) report.residual = left[island];
+        if (!(left_[island] <= report.residual)) report.residual = left_[island];
         report.converged = report.converged && !active_[island];
     }
     report.finite = !std::isnan(report.residual);
+    if (focus > 0.0) report.converged = false;
     return report;
+}
+
+void ContactSweeps::write(MixedSystem& system) const {
+    if (joint_count_ > 0) joints_.write(system);
+    else system.velocity.assign(joints_.velocity().begin(), joints_.velocity().end() - 1);
 }
 
 RowsResidual ContactSweeps::worst() const {

@@ -33,18 +33,23 @@ class ContactSweeps {
 public:
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
+    /// The same, with the masses that `other` was started with.
+    void start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model);
     /// Adds a contact; its index counts from 0.
     int add(const SweepContact& contact);
 
     /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
     /// times. `more` is called after the 2nd, 4th, 8th … sweep and when all is done: it may add contacts and says
-    /// whether it did; those that come after the last sweep get `iterations` more, `late_rounds` times at most.
-    FrictionReport run(int iterations, double tolerance, const std::function<bool()>& more);
+    /// whether it did; those that come after the last sweep get `iterations` more, three times at most. May be called
+    /// again, to go on. With a `focus` [m/s] only contacts are swept, after a first sweep over all, that have a body
+    /// whose rows still change by more than that; the answer then counts as unconverged.
+    FrictionReport run(int iterations, double tolerance, const std::function<bool()>& more,
+                       double focus = 0.0);
 
     const Vec6& velocity(int body) const noexcept { return joints_.velocity()[body]; }
     const double* impulse(int contact) const noexcept { return contacts_[contact].impulse; }
     /// Multipliers of joints, and all velocities.
-    void write(MixedSystem& system) const { joints_.write(system); }
+    void write(MixedSystem& system) const;
     /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index.
     RowsResidual worst() const;
 
@@ -62,12 +67,14 @@ private:
         double inverse_mass = 0.0;
         Mat3 inverse;  // of the inertia, world axes, 1/(kg m²)
     };
+    void begin(MixedSystem& system, FrictionModel model);
     double update(Contact& contact) noexcept;
     void push(const Contact& contact, Vec3 impulse) noexcept;
     int root(int body) noexcept;
     void link(int item, int first, int second);
     void chain(int item);
     double sweep_island(int root) noexcept;
+    double sweep_hot(int root, int stamp, double focus) noexcept;
 
     FrictionModel model_ = FrictionModel::cone;
     Sweeper joints_;
@@ -78,6 +85,9 @@ private:
     std::vector<int> parent_, head_, tail_, next_, body_of_;
     std::vector<int> roots_;
     std::vector<char> active_;
+    std::vector<double> left_;  // the last sweep's change, by root
+    std::vector<int> hot_;      // the last focused sweep that changed a body's rows much
+    int stamp_ = 0;             // of the focused sweep that runs, 0 if none
     bool chained_ = false;
 };
 

@@ -30,6 +30,7 @@ struct RunReport {
     int failed_body = -1;           // index in the scene
     std::string reason;             // what is wrong with that body, when the status does not say it
     double seconds = 0.0;           // wall time of the native loop
+    double cpu_seconds = 0.0;       // processor time of it; 0 where it cannot be told
     double residual = 0.0;          // largest row residual an iterative solve stopped at, m/s
     std::map<std::string, std::int64_t> counters;
     std::map<std::string, double> stage_seconds;

@@ -90,6 +90,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
     }
     report.steps = done;
     report.seconds = watch.elapsed();
+    report.cpu_seconds = watch.processor();
     report.recordings = recorder.recordings();
     report.counters["samples"] = recorder.samples_read();
 }

@@ -2,8 +2,19 @@
 #pragma once
 
 #include <chrono>
+#include <ctime>
 
 namespace spook {
+
+/// Seconds of processor time this thread has had; 0 where the system has no such clock.
+inline double processor_seconds() noexcept {
+#if defined(CLOCK_THREAD_CPUTIME_ID) && !defined(__wasi__)
+    timespec now{};
+    if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) == 0)
+        return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+#endif
+    return 0.0;
+}
 
 /// Asked at most ten times a second; true ends the run. Python's Ctrl-C comes in here.
 inline bool (*interrupted)() = nullptr;
@@ -22,6 +33,9 @@ public:
 
     double elapsed() const noexcept { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
 
+    /// Processor time since the run began; what the machine spent elsewhere is not in it.
+    double processor() const noexcept { return processor_seconds() - processor_begin_; }
+
     /// Whether the run is to end.
     bool over() {
         const double now = elapsed();
@@ -38,6 +52,7 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     Clock::time_point begin_ = Clock::now();
+    double processor_begin_ = processor_seconds();
     double limit_, asked_ = 0.0;
     static inline thread_local Watch* current_ = nullptr;
 };

@@ -1,0 +1,86 @@
+"""Piles by sweeps: no overlap where the sweeps converge, an answer where they are few, no touch where none is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    Maximum,
+    Method,
+    Penetration,
+    Plane,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import pile
+
+STEP = 1.0 / 60.0
+
+
+def test_a_pile_whose_sweeps_converge_does_not_overlap() -> None:
+    """Every pair that is pushed together has its rows in the same solve: none sinks in, from the drop to rest."""
+    result = simulate(
+        pile.scene(40),
+        time_step=STEP,
+        steps=120,
+        method=Method(solver="iterative", iterations=20_000, residual_tolerance=1e-9),
+        observe={"depth": Maximum(quantity=Penetration())},
+    )
+    assert result.completed
+    assert result["depth"] < 1e-8
+
+
+@pytest.mark.parametrize("sweeps", [1, 5])
+def test_a_pile_with_few_sweeps_has_an_answer_in_every_step(sweeps: int) -> None:
+    """Steps that would be off by more than the method allows are swept on, so that the run need not give up."""
+    found = pile.read(simulate, 160, Method(solver="iterative", iterations=sweeps), steps=120, last=30)
+    assert found.overlap < 0.02 * pile.RADIUS
+    assert abs(found.balance_error) < 1e-10
+    assert found.energy_rise < 1e-2
+
+
+def test_a_ball_that_passes_a_pile_keeps_every_bit_of_its_velocity() -> None:
+    """One thousandth of a radius beside the pile's outermost sphere, without gravity: near is not touching."""
+    smooth = Material(friction=0.5)
+    rest = [
+        RigidBody(
+            name=f"s{k}",
+            mass=1.0,
+            shape=Sphere(0.25),
+            position=(0.5 * (k % 3), 0.5 * (k // 3), 0.25),
+            material=smooth,
+        )
+        for k in range(9)
+    ]
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
+    pusher = RigidBody(
+        name="pusher",
+        mass=1.0,
+        shape=Sphere(0.25),
+        position=(-0.6, 0.0, 0.25),
+        velocity=(2.0, 0.0, 0.0),
+        material=smooth,
+    )
+    passer = RigidBody(
+        name="passer",
+        mass=1.0,
+        shape=Sphere(0.25),
+        position=(1.50025, -2.0, 0.25 + 1e-6),
+        velocity=(0.3, 7.0, 0.1),
+        material=smooth,
+    )
+    result = simulate(
+        Scene(bodies=(floor, *rest, pusher, passer)),
+        time_step=STEP,
+        steps=8,
+        method=Method(solver="iterative"),
+        observe={"v": Trace(quantity=Velocity("passer")), "hit": Trace(quantity=Velocity("s1"))},
+    )
+    assert (result["v"] == np.array([0.3, 7.0, 0.1])).all()
+    assert np.abs(result["hit"]).max() > 0.1  # the pile itself was hit meanwhile
