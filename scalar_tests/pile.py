@@ -43,7 +43,7 @@ GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 240  # 4 s
 LAST = 60  # steps of the last second
-SWEEPS = Method(solver="iterative", iterations=10)
+SWEEPS = Method(solver="iterative", iterations=50)
 
 
 def scene(count: int = COUNT) -> Scene:
@@ -200,7 +200,7 @@ TEST = ScalarTest(
             parameters={"N": COUNT},
             metrics=metrics(),
             measure=measure,
-            note="Ten sweeps, more where the rows are still far off.",
+            note="Fifty sweeps, more where the rows are still far off.",
         ),
     ),
     example=lambda: Example(scene=scene(EXAMPLE), time_step=TIME_STEP, method=SWEEPS, duration=4.0),
