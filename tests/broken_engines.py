@@ -54,6 +54,16 @@ def soft(scene: Scene, **options: Any) -> Any:
     return simulate(replace(scene, constraints=tuple(softened(row) for row in scene.constraints)), **options)
 
 
+def spongy(scene: Scene, **options: Any) -> Any:
+    """Gives every surface a compliance of its own."""
+
+    def softened(body: Any) -> Any:
+        material = getattr(body, "material", None)
+        return replace(body, material=replace(material, compliance=1e-4)) if material else body
+
+    return simulate(replace(scene, bodies=tuple(softened(body) for body in scene.bodies)), **options)
+
+
 def restless(scene: Scene, *, time_step: float, **options: Any) -> Any:
     """Steps 3 % further than it says."""
     return simulate(scene, time_step=1.03 * time_step, **options)
@@ -71,6 +81,7 @@ def lopsided(scene: Scene, **options: Any) -> Any:
 
 BROKEN: dict[str, Simulate] = {
     "soft joints": soft,
+    "spongy surfaces": spongy,
     "deaf to options": deaf,
     **{
         f"{name} 3 % too small": off_by(0.97, name)

@@ -331,7 +331,7 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
             np.testing.assert_allclose(
                 total[k + 1] + weight, gained, rtol=0, atol=1e-8 * (1.0 + np.abs(gained).max())
             )
-    assert sliding > 50
+    assert sliding > 30
     assert sticking > 50
 
 
