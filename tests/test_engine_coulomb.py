@@ -302,8 +302,9 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
             total[j] -= force
             if not force.any():
                 continue
-            # A pair that meets within the step has the normal of that moment, which no sample shows.
-            if (x[i][2] if b == "plane" else np.linalg.norm(x[i] - x[j]) - radius) > radius + 1e-9:
+            # A pair that only now meets has the normal of that moment within the step, which no sample shows.
+            distance = x[i][2] if b == "plane" else np.linalg.norm(x[i] - x[j]) - radius
+            if distance > radius + 1e-9 and not result[f"{a} {b}"][step - 1].any():
                 continue
             # The engine takes a contact at the middle of the gap.
             if b == "plane":
@@ -331,7 +332,7 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
             np.testing.assert_allclose(
                 total[k + 1] + weight, gained, rtol=0, atol=1e-8 * (1.0 + np.abs(gained).max())
             )
-    assert sliding > 30
+    assert sliding > 100
     assert sticking > 50
 
 

@@ -200,6 +200,23 @@ void a_kept_factor_gives_the_same_answer() {
     EXPECT_NEAR(system.rows[1].multiplier[0] + system.rows[0].multiplier[0], 1.0, 1e-9);
 }
 
+/// Three corners can hold what four share: whatever rows the search starts from, it ends at the least norm.
+void the_share_does_not_depend_on_where_the_search_begins() {
+    for (const double offset : {0.0, 0.1, -0.15}) {
+        MixedSystem shared = four_corners(offset);
+        for (RowBlock& block : shared.rows) block.state[0] = RowState::free;
+        PivotSolver().solve(shared);
+        for (int start = 0; start < 16; ++start) {
+            MixedSystem system = four_corners(offset);
+            for (int corner = 0; corner < 4; ++corner)
+                system.rows[corner].state[0] = start >> corner & 1 ? RowState::free : RowState::at_lower;
+            EXPECT(PivotSolver().solve(system).converged);
+            for (int corner = 0; corner < 4; ++corner)
+                EXPECT_NEAR(system.rows[corner].multiplier[0], shared.rows[corner].multiplier[0], 1e-12);
+        }
+    }
+}
+
 /// A body on four rigid corners, free or locked against rising and tilting. The gaps are known to rounding only, so
 /// the corners contradict each other by that much and no answer is exact. Each stall loosens the tolerance tenfold
 /// from 1e-11, so the search ends with the stall that reaches the contradiction, and not by flipping one row a round.
@@ -251,6 +268,7 @@ void nothing_silent_about_nan() {
 int main() {
     random_systems_match_enumeration();
     four_rigid_corners_share_the_load();
+    the_share_does_not_depend_on_where_the_search_begins();
     a_kept_factor_gives_the_same_answer();
     a_contradiction_of_rounding_ends_the_search();
     nothing_silent_about_nan();

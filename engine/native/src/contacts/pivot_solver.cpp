@@ -298,6 +298,22 @@ int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
     return count;
 }
 
+/// Frees rigid rows that rest at zero without need: four corners on three is one answer of many, and rounding would
+/// choose. With them free, the relief finds the one of least norm.
+int PivotSolver::free_ties(MixedSystem& system) {
+    int count = 0;
+    for (const auto& [k, i, own] : bounded_) {
+        RowBlock& block = system.rows[k];
+        if (block.state[i] != RowState::at_lower || block.lower[i] != 0.0 || block.upper[i] != unbounded)
+            continue;
+        if (block.softness[i] > 0.0) continue;
+        if (std::abs(row_residual(block, i, system.velocity)) > tightest * speed_) continue;
+        block.state[i] = RowState::free;
+        ++count;
+    }
+    return count;
+}
+
 PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     PivotReport report;
     report.converged = false;
@@ -323,6 +339,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     const int refined_rounds = 50 + 4 * bounded;
     const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
     int best = 1 << 30, left = patience;
+    bool tied = false;  // whether ties were freed
     for (int round = 0; round < last_round; ++round) {
         Watch::look();
         bool stale = !same_matrix || !factored_;
@@ -343,7 +360,10 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         if (count == 0 && !refined) solve_free(system, true);
         if (count == 0) {
             report.converged = true;
-            break;
+            if (tied || free_ties(system) == 0) break;
+            tied = true;
+            report.converged = false;
+            continue;
         }
         if (count < best && refined) best = count, left = patience;
         else if (left > 0) --left;

@@ -29,7 +29,8 @@ struct PivotReport {
 /// bounded row's own (G M⁻¹ Gᵀ)ᵢᵢ, and the relief is then taken out again against the true equations, by conjugate
 /// gradients with the factor as preconditioner. That gives the solution of least norm among equals, weighted by
 /// (G M⁻¹ Gᵀ)ᵢᵢ, and changes no equation. A factor 1e-6 is small enough for a few rounds and large enough that the
-/// rounding of gaps, divided by it, stays out of the loads.
+/// rounding of gaps, divided by it, stays out of the loads. Rows that rest at zero with nothing to spare are freed
+/// once before the search ends, or which of the equal answers it is would hang on where it began.
 class PivotSolver {
 public:
     double floor = 1e-12;  // of BlockLdlt::factor
@@ -55,6 +56,7 @@ private:
     double residual();
     void guess_by_sweeps(MixedSystem& system, int sweeps);
     int offenders(const MixedSystem& system, bool mark_all);
+    int free_ties(MixedSystem& system);
 
     struct Bounded {  // a row that is not bilateral
         int block, row;
