@@ -73,8 +73,7 @@ def compile_rigid(
     check_wide_rows(scene, method)
     quantities, shapes = requests(scene, observe)
     native = _core.RigidProgram(
-        **pack(scene, time_step, method),
-        loads_change=held and any(isinstance(force, Load) for force in scene.forces),
+        **pack(scene, time_step, method, held),
         quantities=quantities,
         observations=observations(observe),
     )
@@ -98,7 +97,7 @@ def normals(axis: Vector) -> tuple[Vector, Vector]:
     return (x, y, z), (b * z - c * y, c * x - a * z, a * y - b * x)
 
 
-def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
+def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> dict[str, Any]:
     """The arguments of the native program, except what is observed: indices for names, no defaults left."""
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     step = time_step / method.substeps
@@ -138,6 +137,7 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
         "no_contact": table(apart),
         "contacts": scene.contacts,
         "gravity": scene.gravity,
+        "loads_change": held and any(isinstance(force, Load) for force in scene.forces),
         "method": {
             "time_step": time_step,
             "substeps": method.substeps,
