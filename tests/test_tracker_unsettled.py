@@ -15,7 +15,7 @@ import pytest
 from click import unstyle
 
 from spook_tracker.tracker import library
-from spook_tracker.tracker.cli.report_table import failures, pass_table, pairs
+from spook_tracker.tracker.cli.report_table import failures, pairs, pass_table
 from spook_tracker.tracker.document.run_document import RunDocument, from_number
 from spook_tracker.tracker.judge.standing import count
 from spook_tracker.tracker.measure.run import Questions, Request, run

@@ -72,7 +72,9 @@ STACK = replace(
         ),
     ),
     stability=(
-        replace(toy_questions.FALL.stability[0], name="tallest", definition="every solve settles", study=tallest),
+        replace(
+            toy_questions.FALL.stability[0], name="tallest", definition="every solve settles", study=tallest
+        ),
     ),
     example=lambda: toy_questions.Example(scene=scene(3), time_step=1 / 60),
 )
