@@ -108,7 +108,7 @@ def _against(checked: Checked, changelog: Changelog) -> list[str]:
         lines.append(f"  `{changes[0].series}` {values(changes[0])}.")
     lines += ["", f"**Missed: {len(checked.missed)}**", ""]
     lines += [f"- {entry.release}, item {entry.item}: {entry.says}." for entry in checked.missed]
-    lines += ["", f"**Not in the changelog: {len(checked.unsaid)} releases**", ""]
+    lines += ["", f"**Not in the changelog: {_count(len(checked.unsaid), 'release')}**", ""]
     for release, changes in checked.unsaid:
         lines.append(f"- {release}: {_tests(changes)}; `{changes[0].series}` {values(changes[0])}.")
     if checked.unread:
