@@ -14,10 +14,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
-
 from spook_tracker.engine.find import EXTRAS
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.json_form import decode
 from spook_tracker.tracker.document.run_document import RunDocument
 
 OLD_NUMPY = "numpy<2"
@@ -93,7 +92,7 @@ def measure_release(
     done = _python(place, "-m", "spook_tracker", *asked, limit=None)
     if not file.exists():
         raise ReleaseError(f"{place.name} could not be measured: {_last(done.stderr)}")
-    return msgspec.json.decode(file.read_bytes(), type=RunDocument)
+    return decode(file.read_bytes(), RunDocument)
 
 
 def _package(engine: str) -> str:
