@@ -84,6 +84,7 @@ def some_sample(rng, definition, value):
                 "missing",
                 "not_supported",
                 "out_of_limit",
+                "unsettled",
                 "value",
             ]
         )

@@ -110,8 +110,10 @@ def _visible(change: Any) -> bool:
 
 
 def _values(change: Any) -> str:
+    from spook_tracker.tracker.judge.standing import HAVE_VALUES
+
     def word(value: Any, outcome: str) -> str:
-        return f"{float(value):.6g}" if outcome in ("value", "out_of_limit") else outcome.replace("_", " ")
+        return f"{float(value):.6g}" if outcome in HAVE_VALUES else outcome.replace("_", " ")
 
     before = word(change.before, change.before_outcome)
     return f"{before} -> {word(change.after, change.after_outcome)} {change.unit}"

@@ -17,7 +17,15 @@ from spook_tracker.tracker.document.json_form import Number
 SCHEMA_VERSION = 1
 
 OutcomeClass = Literal[
-    "value", "out_of_limit", "not_finite", "diverged", "timed_out", "crashed", "missing", "not_supported"
+    "value",
+    "unsettled",  # a solve was left off by more than its method allows: the value is kept and does not pass
+    "out_of_limit",
+    "not_finite",
+    "diverged",
+    "timed_out",
+    "crashed",
+    "missing",
+    "not_supported",
 ]
 Text = Annotated[str, msgspec.Meta(max_length=65_536)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
@@ -97,7 +105,7 @@ class Sample(Struct, frozen=True, kw_only=True):
     outcome: OutcomeClass
     passed: bool  # against the limit of that night
     set_point_held: bool
-    failure: Text = ""  # one sentence where there is no value
+    failure: Text = ""  # one sentence where there is no value, or one that no settled solve stands behind
     counters: dict[str, int] = {}  # exact work: steps, block operations, sweeps, contacts
     state_hash: Text = ""  # of the final state bits of every simulation behind the value
     timing: Timing | None = None

@@ -27,12 +27,13 @@ from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
 
 RANK: dict[OutcomeClass, int] = {
     "value": 0,
-    "out_of_limit": 1,
-    "not_finite": 2,
-    "diverged": 3,
-    "crashed": 3,
-    "timed_out": 3,
-    "missing": 4,
+    "unsettled": 1,
+    "out_of_limit": 2,
+    "not_finite": 3,
+    "diverged": 4,
+    "crashed": 4,
+    "timed_out": 4,
+    "missing": 5,
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
 SAID_IN_ULPS = 1e-10  # decades, a million doubles: below, a difference of logarithms is rounding

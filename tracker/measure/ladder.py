@@ -59,10 +59,10 @@ def error_points(ladder: Ladder, configuration: Configuration, simulate: Simulat
 
 def _error_point(ladder: Ladder, configuration: Configuration, h: float, simulate: Simulate) -> ErrorPoint:
     witness = Witness(simulate, time_limit=LADDER_TIME_LIMIT)
-    answer = ask(lambda: float(ladder.error(witness, h, configuration.method)))
+    answer = ask(lambda: float(ladder.error(witness, h, configuration.method))).settled(witness)
     error = math.nan if answer.value is None else answer.value
     outcome, failure = answer.outcome, answer.failure
-    if outcome == "value" and not math.isfinite(error):
+    if outcome in ("value", "unsettled") and not math.isfinite(error):
         outcome, failure = "not_finite", f"the error is {error}"
     counters = dict(sorted(witness.counters.items()))
     return ErrorPoint(h, error, outcome, failure, counters, witness.state_hash)

@@ -35,6 +35,10 @@ WORDS = {
     "not_finite": "not finite",
     "timed_out": "timed out",
 }
+BROKEN = {  # values that do not pass, and what their points are called
+    "out_of_limit": "outside the limit",
+    "unsettled": "a solve left unsettled",
+}
 
 
 @dataclass
@@ -93,21 +97,23 @@ def trend_chart(
     values = trend.values[-MOST_NIGHTS * 4 :]
     at = trend.nights[-MOST_NIGHTS * 4 :]
     outcomes = trend.outcomes[-MOST_NIGHTS * 4 :]
-    places = turning(values)
+    turned = {i for i, now in enumerate(outcomes) if i and now != outcomes[i - 1]}
+    places = sorted({*turning(values), *turned})  # a class may change where the value stands still
     places = [places[i] for i in thinned(len(places), MOST_NIGHTS)]
     notes = tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in places)
     x = tuple(float(at[i]) for i in places)
     y = tuple(values[i] for i in places)
-    broken = [i for i in places if outcomes[i] == "out_of_limit" and math.isfinite(values[i])]
     lines = [Line(name="measured", x=x, y=y, style="both", notes=notes)]
-    if broken:
-        lines.append(
-            Line(
-                name="outside the limit", style="broken", colour=1, x=tuple(float(at[i]) for i in broken),
-                y=tuple(values[i] for i in broken),
-                notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
-            )
-        )  # fmt: skip
+    for outcome, name in BROKEN.items():
+        broken = [i for i in places if outcomes[i] == outcome and math.isfinite(values[i])]
+        if broken:
+            lines.append(
+                Line(
+                    name=name, style="broken", colour=1, x=tuple(float(at[i]) for i in broken),
+                    y=tuple(values[i] for i in broken),
+                    notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcome) for i in broken),
+                )
+            )  # fmt: skip
     began = [e for e in events if e.definition.key == trend.definition.key and e.first.index in at]
     if began:
         lines.append(_beginnings(began, trend))

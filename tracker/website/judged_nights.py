@@ -25,6 +25,7 @@ from spook_tracker.tracker.website.nights import Book, Night, Records
 BLOCK = 32  # nights in a file
 OUTCOMES = (
     "value", "out_of_limit", "not_finite", "diverged", "crashed", "timed_out", "missing", "not_supported",
+    "unsettled",
 )  # fmt: skip
 Row = list[Any]  # definition, value, outcome, passed + 2 held, state hash, failure, usual, suspected, blame
 
