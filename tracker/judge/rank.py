@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.tracker.document.order import time_at_error
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 
 ERRORS = (1e-2, 1e-4, 1e-6)
 STEP = 1.0 / 60.0  # s
@@ -92,8 +92,8 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
             if not math.isclose(definition.time_step, STEP, rel_tol=1e-9):
                 continue
             outcomes.append(sample.outcome)
-            if sample.outcome == "value" and abs(from_number(sample.value)) < best:
-                best, chosen = abs(from_number(sample.value)), name
+            if sample.outcome == "value" and abs(sample.value) < best:
+                best, chosen = abs(sample.value), name
     none = "no such step" if configurations else "not asked"
     outcome = "value" if chosen else (outcomes[0] if outcomes else none)
     return Standing(
@@ -113,7 +113,7 @@ def _soonest(configurations: Mapping[str, Rungs], error: float) -> float | None:
     times = []
     for rungs in configurations.values():
         timed = [
-            (min(sample.timing.seconds), abs(from_number(sample.value)))
+            (min(sample.timing.seconds), abs(sample.value))
             for _, sample in rungs
             if sample.outcome == "value" and sample.timing is not None and sample.timing.seconds
         ]

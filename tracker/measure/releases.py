@@ -15,11 +15,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
 from packaging.requirements import Requirement
 
 from spook_tracker.engine.find import EXTRAS
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.json_form import decode
 from spook_tracker.tracker.document.run_document import RunDocument
 
 OLD_NUMPY = "numpy<2"
@@ -117,7 +117,7 @@ def measure_release(
     done = _python(place, "-m", "spook_tracker", *asked, limit=None)
     if not file.exists():
         raise ReleaseError(f"{place.name} could not be measured: {_last(done.stderr)}")
-    return msgspec.json.decode(file.read_bytes(), type=RunDocument)
+    return decode(file.read_bytes(), RunDocument)
 
 
 def _package(engine: str) -> str:
