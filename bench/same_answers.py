@@ -10,53 +10,83 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 SHOWN = 40  # differences named one by one
-Answers = dict[str, str]
+WORK = ["counters", "state_hash"]
+Answer = dict[str, Any]
 
 
-def answers(document: dict[str, Any]) -> Answers:
-    """Everything the engine answered, by name, as text; what a clock said is left out."""
+def answers(document: dict[str, Any]) -> dict[str, Answer]:
+    """Everything the engine answered, by name and part; what a clock said is left out."""
     timed = {s["key"] for s in document["series"] if s["kind"] == "time"}
-    found = {}
+    found: dict[str, Answer] = {}
     for sample in document["samples"]:
         if sample["series"] not in timed:
-            told = {name: value for name, value in sample.items() if name not in ("series", "timing")}
-            found[sample["series"]] = json.dumps(told, sort_keys=True)
+            found[sample["series"]] = {
+                part: told for part, told in sample.items() if part not in ("series", "timing")
+            }
     for kind in ("maps", "figures"):
         for drawn in document[kind]:
             name = "/".join(str(drawn.get(part, "")) for part in ("test", "configuration", "name"))
-            found[f"{kind}: {name}"] = json.dumps(drawn, sort_keys=True)
+            found[f"{kind}: {name}"] = drawn
     return found
 
 
-def definitions(document: dict[str, Any]) -> Answers:
-    return {s["key"]: s["test_version"] for s in document["series"]}
+def definitions(document: dict[str, Any]) -> dict[str, Answer]:
+    return {s["key"]: {"definition": s["test_version"]} for s in document["series"]}
 
 
-def difference(before: Answers, after: Answers) -> list[str]:
-    """What only one side holds, and what differs."""
-    apart = [f"gone: {name}" for name in before.keys() - after.keys()]
-    apart += [f"new: {name}" for name in after.keys() - before.keys()]
-    apart += [
-        f"differs: {name}\n    {before[name][:300]}\n    {after[name][:300]}"
-        for name in before.keys() & after.keys()
-        if before[name] != after[name]
+def parts(before: Answer, after: Answer) -> list[str]:
+    """The parts that are not the same text: NaN equals itself, and -0 is not 0."""
+    written = [
+        {part: json.dumps(told, sort_keys=True) for part, told in side.items()} for side in (before, after)
     ]
-    return sorted(apart)
+    return sorted(
+        part for part in before.keys() | after.keys() if written[0].get(part) != written[1].get(part)
+    )
+
+
+def difference(before: dict[str, Answer], after: dict[str, Answer]) -> dict[str, list[str]]:
+    """By name what differs: its parts, or that one side alone has it."""
+    apart = {name: ["gone"] for name in before.keys() - after.keys()}
+    apart |= {name: ["new"] for name in after.keys() - before.keys()}
+    apart |= {
+        name: found for name in before.keys() & after.keys() if (found := parts(before[name], after[name]))
+    }
+    return dict(sorted(apart.items()))
+
+
+def line(name: str, found: list[str], before: dict[str, Answer], after: dict[str, Answer]) -> str:
+    told = f"{name}: {', '.join(found)}"
+    if "value" in found:
+        told += f"; {before[name]['value']!r} -> {after[name]['value']!r}"
+    return told
+
+
+def test_of(name: str) -> str:
+    return name.removeprefix("maps: ").removeprefix("figures: ").split("/")[0]
 
 
 def main(before_file: str, after_file: str) -> int:
     before, after = (json.loads(Path(file).read_text()) for file in (before_file, after_file))
-    apart = difference(answers(before), answers(after))
+    old, new = answers(before), answers(after)
+    apart = difference(old, new)
     hashes = difference(definitions(before), definitions(after))
-    for line in apart[:SHOWN]:
-        print(line)
+    # What a reader sees first, then states and counts of work.
+    telling = {
+        name: found for name, found in apart.items() if found not in (["counters"], ["state_hash"], WORK)
+    }
+    for name, found in list((telling | apart).items())[:SHOWN]:
+        print(line(name, found, old, new))
+    for test, count in sorted(Counter(map(test_of, telling)).items()):
+        print(f"  {test}: {count} values, outcomes, maps or figures differ")
     print(
-        f"{len(answers(after))} answers, {len(apart)} differ; {len(definitions(after))} definitions, {len(hashes)} differ"
+        f"{len(new)} answers: {len(telling)} differ, {len(apart) - len(telling)} only in final state or work"
     )
+    print(f"{len(definitions(after))} definitions, {len(hashes)} differ")
     return 1 if apart else 0
 
 

@@ -76,17 +76,17 @@ def test_a_creep_is_told_by_five_nights_at_both_ends() -> None:
     assert set(range(red[0], len(slow))) == set(red)
 
 
-WORSE = [("value", "out_of_limit"), ("out_of_limit", "not_finite"), ("not_finite", "diverged"),
+WORSE = [("value", "unsettled"), ("unsettled", "out_of_limit"), ("out_of_limit", "not_finite"), ("not_finite", "diverged"),
          ("not_finite", "crashed"), ("not_finite", "timed_out"), ("diverged", "missing"), ("crashed", "missing"),
          ("timed_out", "missing")]  # fmt: skip
 
 
 @pytest.mark.parametrize(("better", "worse"), WORSE)
 def test_outcomes_have_the_documented_order(better: str, worse: str) -> None:
-    """value < out of limit < not finite < diverged, crashed, timed out < missing."""
+    """value < unsettled < out of limit < not finite < diverged, crashed, timed out < missing."""
 
     def one(outcome: str):
-        return sample(1.0 if outcome in ("value", "out_of_limit") else math.nan, outcome)
+        return sample(1.0 if outcome in ("value", "unsettled", "out_of_limit") else math.nan, outcome)
 
     word = "missing" if worse == "missing" else "regressed"
     assert judge(series(limit=1.0), one(better), one(worse)).word == word

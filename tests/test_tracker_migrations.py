@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shutil import copytree
+from typing import get_args
 
 import pytest
 from alembic.script import ScriptDirectory
@@ -10,6 +11,7 @@ from sqlalchemy import DateTime, create_engine, inspect, select, text
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.document.run_document import OutcomeClass
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.database import database_url, head, open_database, upgrade
@@ -67,6 +69,18 @@ def test_revisions_carry_the_comments_of_the_models(postgresql_url):
         stored = {column["name"]: column["comment"] for column in inspector.get_columns(table.name)}
         assert stored == {column.name: column.comment for column in table.columns}
     engine.dispose()
+
+
+def test_every_class_of_outcome_can_be_stored(session):
+    """A constraint left behind by an older revision refused one of them."""
+    classes = get_args(OutcomeClass)
+    keys = [f"t/c/m{place}" for place in range(len(classes))]
+    samples = tuple(
+        sample(key, 1.0, outcome=outcome, passed=False) for key, outcome in zip(keys, classes, strict=True)
+    )
+    record(session, run(series=tuple(definition(key) for key in keys), samples=samples))
+
+    assert {row.outcome for row in session.scalars(select(models.Sample))} == set(classes)
 
 
 def test_all_the_way_down_and_up_again(session, url):

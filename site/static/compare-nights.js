@@ -1,7 +1,7 @@
 // Nights as the files of compare/ hold them, in blocks: loaded when asked for, decoded, handed to judge.js.
 "use strict";
 
-const NIGHT_OUTCOMES = ["value", "out_of_limit", "not_finite", "diverged", "crashed", "timed_out", "missing", "not_supported"];
+const NIGHT_OUTCOMES = ["value", "out_of_limit", "not_finite", "diverged", "crashed", "timed_out", "missing", "not_supported", "unsettled"];
 const nightBlocks = new Map();
 
 // Called by each file of compare/.

@@ -2,7 +2,7 @@
 // A test asks both about ten thousand pairs and wants the same words. No page: also for Node.
 "use strict";
 
-const RANKS = { value: 0, out_of_limit: 1, not_finite: 2, diverged: 3, crashed: 3, timed_out: 3, missing: 4 };
+const RANKS = { value: 0, unsettled: 1, out_of_limit: 2, not_finite: 3, diverged: 4, crashed: 4, timed_out: 4, missing: 5 };
 const NO_VALUE = ["not_finite", "diverged", "crashed", "timed_out", "missing"];
 const WORDS = ["missing", "removed", "regressed", "non_deterministic", "accepted", "expected", "not_comparable", "fixed", "improved", "changed", "new", "not_measured", "same", "identical"];
 const RED = ["missing", "removed", "regressed", "non_deterministic"];

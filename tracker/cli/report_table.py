@@ -16,7 +16,7 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
 )
-from spook_tracker.tracker.judge.standing import count, is_red, standing
+from spook_tracker.tracker.judge.standing import HAVE_VALUES, count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
@@ -31,11 +31,12 @@ def number(value: float, digits: int = 6) -> str:
 
 
 def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> str:
-    """The value with its unit, or the class of its failure."""
+    """The value with its unit, or the class of its failure; an unsettled one says both."""
     value = float(sample.value)
-    if sample.outcome not in ("value", "out_of_limit") and not math.isinf(value):
+    if sample.outcome not in HAVE_VALUES and not math.isinf(value):
         return sample.outcome.replace("_", " ")
-    return f"{number(value, digits)} {_unit(definition)}".rstrip()
+    said = " unsettled" if sample.outcome == "unsettled" else ""
+    return f"{number(value, digits)} {_unit(definition)}".rstrip() + said
 
 
 def limit(definition: SeriesDefinition) -> str:
@@ -192,7 +193,7 @@ def _styles(narrow: bool) -> dict[int, Style]:
 
 
 def failures(run: RunDocument) -> list[str]:
-    """One sentence for each value that is not there."""
+    """One sentence for each value that is not there or not settled."""
     return [
         f"{definition.key}: {sample.outcome.replace('_', ' ')}: {clean(sample.failure)}"
         for definition, sample in pairs(run)

@@ -46,6 +46,8 @@ def name_of(judged: Judged) -> str:
         return verdict.name
     if judged.night.sample.outcome == "out_of_limit":
         return "outside the limit"
+    if judged.night.sample.outcome == "unsettled":
+        return "unsettled"
     if judged.stands == "watch" and not judged.night.sample.set_point_held:
         return "off its set point"
     return "no value" if judged.stands == "fail" else "worse"

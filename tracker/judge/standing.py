@@ -17,6 +17,7 @@ from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 NOT_SUPPORTED = "not_supported"  # outside the order: an engine cannot be asked this
+HAVE_VALUES = ("value", "unsettled", "out_of_limit")
 NO_VALUE = ("not_finite", "diverged", "crashed", "timed_out", "missing")
 
 

@@ -21,19 +21,19 @@ from spook_tracker.tracker.document.run_document import (
     OutcomeClass,
     Sample,
     SeriesDefinition,
-    from_number,
 )
 from spook_tracker.tracker.judge.standing import honest
 from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
 
 RANK: dict[OutcomeClass, int] = {
     "value": 0,
-    "out_of_limit": 1,
-    "not_finite": 2,
-    "diverged": 3,
-    "crashed": 3,
-    "timed_out": 3,
-    "missing": 4,
+    "unsettled": 1,
+    "out_of_limit": 2,
+    "not_finite": 3,
+    "diverged": 4,
+    "crashed": 4,
+    "timed_out": 4,
+    "missing": 5,
 }
 DEEP_INSIDE = 1e-3  # of the limit: an error that small may grow without being called a regression
 SAID_IN_ULPS = 1e-10  # decades, a million doubles: below, a difference of logarithms is rounding
@@ -77,7 +77,7 @@ def judge(
     if "not_supported" in (before.outcome, after.outcome):
         return _unasked(before, after)
     before, after = honest(before), honest(after)
-    old, new = from_number(before.value), from_number(after.value)
+    old, new = before.value, after.value
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
     if same_bits(old, new) and before.outcome == after.outcome:
         same_state = before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash)

@@ -59,7 +59,7 @@ QUIET = frozenset(word for word, said in WORDS.items() if said.quiet)
 WORD_RANK = {word: rank for rank, word in enumerate(WORDS)}
 
 CLASSES: dict[Class, tuple[str, str, str]] = {  # the worst first: mark, word, what it means
-    "fail": ("✗", "FAIL", "a limit broken, or no value"),
+    "fail": ("✗", "FAIL", "a limit broken, a solve left unsettled, or no value"),
     "watch": ("!", "WATCH", "limits kept; a set point left, or worse than before"),
     "accepted": ("!", "ACCEPTED", "worse, and accepted by somebody who says why"),
     "none": ("·", "NO DATA", "not run"),

@@ -26,6 +26,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityMap,
     StabilityStudy,
 )
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     Curve,
     FigureData,
@@ -33,7 +34,6 @@ from spook_tracker.tracker.document.run_document import (
     OutcomeClass,
     Sample,
     SeriesDefinition,
-    to_number,
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 
@@ -51,6 +51,7 @@ class Witness:
     time_limit: float | None = DEFAULT_TIME_LIMIT
     counters: dict[str, int] = field(default_factory=dict)
     hashes: list[str] = field(default_factory=list)
+    unsettled: Result | None = None  # the simulation whose solver left the most
 
     def __call__(self, scene: Any, **options: Any) -> Result:
         if options.get("time_limit") is None:
@@ -59,6 +60,10 @@ class Witness:
         for name, count in result.counters.items():
             self.counters[name] = self.counters.get(name, 0) + int(count)
         self.hashes.append(result.state_hash)
+        if result.status == "unsettled" and (
+            self.unsettled is None or result.residual > self.unsettled.residual
+        ):
+            self.unsettled = result
         return result
 
     @property
@@ -76,6 +81,12 @@ class Outcome:
     value: Any
     outcome: OutcomeClass = "value"
     failure: str = ""
+
+    def settled(self, witness: Witness) -> Outcome:
+        """The same; a value that rests on a solve which did not settle is "unsettled", with body, step, residual."""
+        if self.outcome != "value" or witness.unsettled is None:
+            return self
+        return Outcome(self.value, "unsettled", sentence(witness.unsettled.failure))
 
 
 class NoAnswer(Exception):
@@ -178,7 +189,7 @@ def measure(name: str, test: ScalarTest, measurement: Measurement, simulate: Sim
         outcome = answer
         if outcome.outcome == "value":
             if metric.name in answer.value:
-                outcome = ask(partial(float, answer.value[metric.name]))
+                outcome = ask(partial(float, answer.value[metric.name])).settled(witness)
             else:
                 given = ", ".join(sorted(map(str, answer.value))) or "nothing"
                 outcome = Outcome(
@@ -199,16 +210,16 @@ def judged_sample(key: str, metric: Metric, outcome: Outcome, witness: Witness) 
     """A sample judged against tonight's limit and set point; what is not finite never passes."""
     value = float("nan") if outcome.value is None else float(outcome.value)
     kind, failure = outcome.outcome, outcome.failure
-    if kind == "value" and not math.isfinite(value):
-        kind, failure = "not_finite", f"the value is {value}"
-    elif kind == "value" and not metric.passes(value):
-        kind = "out_of_limit"
+    if kind in ("value", "unsettled") and not math.isfinite(value):
+        kind, failure = "not_finite", failure or f"the value is {value}"
+    elif kind in ("value", "unsettled") and not metric.passes(value):
+        kind = "out_of_limit"  # the worse class; the sentence still says what was unsettled
     return Sample(
         series=key,
-        value=to_number(value),
+        value=Number(value),
         outcome=kind,
         passed=kind == "value",
-        set_point_held=kind in ("value", "out_of_limit") and metric.holds_set_point(value),
+        set_point_held=kind in ("value", "unsettled", "out_of_limit") and metric.holds_set_point(value),
         failure=failure,
         counters=dict(sorted(witness.counters.items())),
         state_hash=witness.state_hash,
@@ -232,8 +243,8 @@ def draw(name: str, figure: Figure, simulate: Simulate) -> FigureData:
         curves=tuple(
             Curve(
                 name=curve.name,
-                x=tuple(to_number(float(x)) for x in curve.x),
-                y=tuple(to_number(float(y)) for y in curve.y),
+                x=tuple(Number(x) for x in curve.x),
+                y=tuple(Number(y) for y in curve.y),
                 style=curve.style,
             )
             for curve in (drawing.curves if drawing else ())
@@ -309,6 +320,6 @@ def _map(name: str, question: StabilityStudy, found: StabilityMap) -> MapData:
         x=tuple(map(float, found.x)),
         y=tuple(map(float, found.y)),
         cells=found.cells,
-        prediction=tuple(tuple(map(to_number, row)) for row in prediction) if prediction else None,
+        prediction=tuple(tuple(map(Number, row)) for row in prediction) if prediction else None,
         note=found.note,
     )

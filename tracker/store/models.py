@@ -37,6 +37,7 @@ NAMING = {
 }
 OUTCOMES = (
     "value",
+    "unsettled",
     "out_of_limit",
     "not_finite",
     "diverged",
@@ -259,9 +260,7 @@ class Sample(Base):
     position: Mapped[int] = mapped_column(BigInteger, comment="place in the document, from 0")
     value: Mapped[float | None] = mapped_column(Double, comment="the float64; NULL if it is not finite")
     special: Mapped[str | None] = _text("nan, inf, -inf or -0.0 where the value is one of these")
-    outcome: Mapped[str] = _text(
-        "class: value, out_of_limit, not_finite, diverged, timed_out, crashed, missing, not_supported"
-    )
+    outcome: Mapped[str] = _text(f"class: {', '.join(OUTCOMES)}")
     passed: Mapped[bool] = mapped_column(comment="inside the limit of that night")
     set_point_held: Mapped[bool] = mapped_column(comment="inside the band theory expects")
 

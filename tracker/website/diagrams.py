@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample, from_number
+from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
@@ -34,6 +34,10 @@ WORDS = {
     "out_of_limit": "out of limit",
     "not_finite": "not finite",
     "timed_out": "timed out",
+}
+BROKEN = {  # values that do not pass, and what their points are called
+    "out_of_limit": "outside the limit",
+    "unsettled": "a solve left unsettled",
 }
 
 
@@ -93,21 +97,23 @@ def trend_chart(
     values = trend.values[-MOST_NIGHTS * 4 :]
     at = trend.nights[-MOST_NIGHTS * 4 :]
     outcomes = trend.outcomes[-MOST_NIGHTS * 4 :]
-    places = turning(values)
+    turned = {i for i, now in enumerate(outcomes) if i and now != outcomes[i - 1]}
+    places = sorted({*turning(values), *turned})  # a class may change where the value stands still
     places = [places[i] for i in thinned(len(places), MOST_NIGHTS)]
     notes = tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in places)
     x = tuple(float(at[i]) for i in places)
     y = tuple(values[i] for i in places)
-    broken = [i for i in places if outcomes[i] == "out_of_limit" and math.isfinite(values[i])]
     lines = [Line(name="measured", x=x, y=y, style="both", notes=notes)]
-    if broken:
-        lines.append(
-            Line(
-                name="outside the limit", style="broken", colour=1, x=tuple(float(at[i]) for i in broken),
-                y=tuple(values[i] for i in broken),
-                notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in broken),
-            )
-        )  # fmt: skip
+    for outcome, name in BROKEN.items():
+        broken = [i for i in places if outcomes[i] == outcome and math.isfinite(values[i])]
+        if broken:
+            lines.append(
+                Line(
+                    name=name, style="broken", colour=1, x=tuple(float(at[i]) for i in broken),
+                    y=tuple(values[i] for i in broken),
+                    notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcome) for i in broken),
+                )
+            )  # fmt: skip
     began = [e for e in events if e.definition.key == trend.definition.key and e.first.index in at]
     if began:
         lines.append(_beginnings(began, trend))
@@ -223,8 +229,8 @@ def figure_chart(data: FigureData, prefix: str = "") -> Chart:
     lines = tuple(
         Line(
             name=curve.name,
-            x=tuple(from_number(x) for x in curve.x),
-            y=tuple(from_number(y) for y in curve.y),
+            x=curve.x,
+            y=curve.y,
             style=curve.style,
             colour=i,
         )
@@ -255,7 +261,7 @@ def map_grid(data: MapData, prefix: str = "", title: str = "") -> Grid:
         x=data.x,
         y=data.y,
         cells=data.cells,
-        prediction=tuple(tuple(from_number(v) for v in row) for row in prediction) if prediction else None,
+        prediction=prediction,
         note=" ".join(filter(None, (data.note, data.definition))),
     )
 
@@ -284,7 +290,7 @@ def rungs(trends: Iterable[Trend], sample_of: Callable[[Trend], Sample | None]) 
         found.append(
             Rung(
                 time_step=trend.definition.time_step,
-                error=from_number(sample.value),
+                error=sample.value,
                 seconds=min(timing.seconds) if timing and timing.seconds else math.nan,
                 spread=max(timing.seconds) / min(timing.seconds)
                 if timing and min(timing.seconds) > 0.0

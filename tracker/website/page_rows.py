@@ -116,7 +116,9 @@ def _shown(trend: Trend, word: str) -> str:
         return "never"
     if not math.isfinite(trend.value):
         return word
-    return seconds(trend.value) if d.kind == "time" and d.unit == "s" else quantity(trend.value, d.unit)
+    if d.kind == "time" and d.unit == "s":
+        return seconds(trend.value)
+    return quantity(trend.value, d.unit) + (", unsettled" if word == "unsettled" else "")
 
 
 def address(test: TestHistory, root: str = "") -> str:
