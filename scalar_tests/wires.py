@@ -28,6 +28,7 @@ from spook_tracker.engine import (
     Violation,
     Wire,
 )
+from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
@@ -135,11 +136,11 @@ def tow(restitution: float = 0.0) -> Scene:
 
 def fall(simulate: Simulate) -> dict[str, float]:
     """Speeds after two seconds, the wire's pull, and the tackle."""
-    speed = {"v": Final(quantity=Velocity("heavy"))}
-    pull = {"pull": Final(quantity=ConstraintForce("wire"))}
+    speed: dict[str, Observable] = {"v": Final(quantity=Velocity("heavy"))}
+    pull: dict[str, Observable] = {"pull": Final(quantity=ConstraintForce("wire"))}
     wire = simulate(atwood(), time_step=TIME_STEP, duration=1.0, observe=speed | pull)
     wound = simulate(drum(), time_step=TIME_STEP, duration=DURATION, observe=speed)
-    still = {"v": MaximumAbsolute(quantity=Velocity())}
+    still: dict[str, Observable] = {"v": MaximumAbsolute(quantity=Velocity())}
     held = simulate(tackle(float(STRANDS)), time_step=TIME_STEP, duration=1.0, observe=still | pull)
     lifted = simulate(
         tackle(2.0 * STRANDS),
