@@ -27,6 +27,7 @@ from spook_tracker.engine import (
     MethodError,
     Momentum,
     Motor,
+    Orientation,
     Particle,
     Planar,
     PointOnLine,
@@ -42,9 +43,11 @@ from spook_tracker.engine import (
     Velocity,
     Violation,
     Wire,
+    recorded_joints,
     simulate,
     start,
 )
+from spook_tracker.engine.protocol import Capabilities, unsupported
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 H = 0.01
@@ -392,6 +395,51 @@ def test_energy_is_kept_while_they_move(kind: Any, method: Method) -> None:
 
     assert np.abs(result["g"]).max() < 1e-6
     assert np.abs(result["E"] - rest).max() < 1e-4 * rest
+
+
+@pytest.mark.parametrize("kind", FREE)
+def test_a_recording_reads_the_same_violations(kind: Any) -> None:
+    """Two bodies on a soft joint, both moving: the rows of the engine and those found from places and turns."""
+    bodies = tuple(
+        RigidBody(
+            name=name,
+            mass=mass,
+            inertia=(1.0, 1.5, 2.0),
+            position=(x, 0.2, 0.0),
+            velocity=(0.1, x, -0.2),
+            angular_velocity=(0.3, -x, 0.4),
+        )
+        for name, mass, x in (("one", 1.0, 0.0), ("two", 2.0, 1.0))
+    )
+    joint = kind(
+        name="joint", between=("one", "two"), at=(0.4, 0.1, 0.3), axis=(1.0, 2.0, 2.0), compliance=0.1
+    )
+    scene = Scene(bodies=bodies, constraints=(joint,))
+    observe = {
+        "g": Trace(quantity=Violation("joint")),
+        "x": Trace(quantity=Position()),
+        "q": Trace(quantity=Orientation()),
+    }
+    result = simulate(scene, time_step=H, steps=100, observe=observe)
+
+    assert np.abs(result["g"][-1]).min() > 1e-4
+    np.testing.assert_allclose(
+        recorded_joints.violation(scene, joint, result["x"], result["q"]), result["g"], rtol=0, atol=1e-13
+    )
+
+
+def test_other_engines_are_not_asked_for_what_they_lack() -> None:
+    able = Capabilities(
+        particles=True,
+        rigid_bodies=True,
+        joints=frozenset({Lock, Hinge}),
+        forces=frozenset({Load}),
+        motors=True,
+        compliance=True,
+    )
+    assert unsupported(able, masses(), {}) == ("the joint wire",)
+    assert "the joint relation" in unsupported(able, pair(), {})
+    assert unsupported(able, hung(strength=1.0), {}) == ("a joint that breaks", "functions of time")
 
 
 # --- joints that break, and that rub ------------------------------------------------------------------------
