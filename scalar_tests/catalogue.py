@@ -28,6 +28,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "blow": "blow",
     "between_walls": "between_walls",
     "billiards": "billiards",
+    "cradle": "cradle",
     "near_miss": "near_miss",
     "edge_roll": "edge_roll",
     "overhang": "overhang",
