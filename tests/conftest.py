@@ -1,25 +1,25 @@
-"""Fixtures of the storage tests: an empty database of each kind."""
+"""Fixtures of more than one file: an empty database of each kind, a browser."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.store.database import open_database
 from tests import postgresql
+from tests.browser import MISSING, browser, programs
+from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
 
 
 @pytest.fixture(scope="session")
 def postgresql_server() -> Iterator[postgresql.Server]:
-    """A server for this session. Without binaries tests are skipped, but in CI, which installs them, they fail."""
+    """A server for this session."""
     programs = postgresql.binaries()
     if programs is None:
-        if os.environ.get("CI"):
-            pytest.fail(postgresql.MISSING)
         pytest.skip(postgresql.MISSING)
     with postgresql.running_server(programs) as server:
         yield server
@@ -51,3 +51,14 @@ def session(url: str) -> Iterator[Session]:
     with Session(engine) as session:
         yield session
     engine.dispose()
+
+
+@pytest.fixture(scope="module")
+def driver() -> Iterator[Any]:
+    """A browser of this file's own."""
+    found = programs()
+    if found is None:
+        pytest.skip(MISSING)
+    with browser(*found) as opened:
+        opened.set_script_timeout(90)
+        yield opened

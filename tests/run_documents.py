@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import spook_tracker.tracker.measure.trajectory as motion
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     Curve,
     DrawnSolid,
@@ -83,7 +84,7 @@ def definition(key: str = KEY, **changes: Any) -> SeriesDefinition:
 def sample(series: str = KEY, value: Any = 0.407038, **changes: Any) -> Sample:
     fields: dict[str, Any] = {
         "series": series,
-        "value": value,
+        "value": Number(value),
         "outcome": "value",
         "passed": True,
         "set_point_held": True,
@@ -136,7 +137,9 @@ def figure(name: str = "length", **changes: Any) -> FigureData:
         "x_scale": "linear",
         "y_scale": "log",
         "note": "note",
-        "curves": (Curve(name="plain", x=(0.0, 1.0, 2.0), y=(1.0, "nan", -0.0), style="line"),),
+        "curves": (
+            Curve(name="plain", x=(0.0, 1.0, 2.0), y=tuple(map(Number, (1.0, "nan", -0.0))), style="line"),
+        ),
     }
     return FigureData(**fields | changes)
 
@@ -153,7 +156,7 @@ def stability_map(name: str = "tau-eps", **changes: Any) -> MapData:
         "x": (0.0, 1.0),
         "y": (1e-9,),
         "cells": (("growing", "settled"),),
-        "prediction": ((1.5, "inf"),),
+        "prediction": ((Number(1.5), Number("inf")),),
         "note": "note",
     }
     return MapData(**fields | changes)

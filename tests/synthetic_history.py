@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     Curve,
     DrawnLink,
@@ -27,8 +28,6 @@ from spook_tracker.tracker.document.run_document import (
     TestCard,
     Timing,
     Trajectory,
-    from_number,
-    to_number,
 )
 
 HOSTILE = "<img src=x onerror=alert(1)></script><script>alert('x')</script> {{7*7}} %{x} =cmd() ../ \u202egnp.exe\x00 🚀"
@@ -98,7 +97,7 @@ def sample(definition: SeriesDefinition, value: float, **changes: Any) -> Sample
         outcome = "value" if abs(value) <= limit else "out_of_limit"
     band = definition.set_point
     facts: dict[str, Any] = {
-        "series": definition.key, "value": to_number(value), "outcome": outcome, "passed": outcome == "value",
+        "series": definition.key, "value": Number(value), "outcome": outcome, "passed": outcome == "value",
         "set_point_held": math.isfinite(value) and (band is None or band[0] <= value <= band[1]),
         "counters": {"steps": 1320, "block_operations": 2640}, "state_hash": "a1b2",
     }  # fmt: skip
@@ -242,7 +241,7 @@ def _figures(hostile: bool) -> Iterable[FigureData]:
         yield FigureData(
             test=test, name="deviation-against-step", title=f"{title}: deviation against time step", thesis="Fig 3.21",
             x_label="time step [s]", y_label=f"deviation [{unit}]", x_scale="log", y_scale="log", note="",
-            curves=(Curve(name="plain", x=STEPS, y=("nan", *(0.4 * h * h for h in STEPS[1:-1]), 0.0), style="both"),),
+            curves=(Curve(name="plain", x=STEPS, y=tuple(map(Number, ("nan", *(0.4 * h * h for h in STEPS[1:-1]), 0.0))), style="both"),),
         )  # fmt: skip
     angles = tuple(float(a) for a in range(0, 361, 10))
     yield FigureData(
@@ -257,7 +256,7 @@ def _figures(hostile: bool) -> Iterable[FigureData]:
         yield FigureData(
             test=HOSTILE, name=HOSTILE, title=HOSTILE, thesis=HOSTILE, x_label=HOSTILE, y_label=HOSTILE,
             x_scale="linear", y_scale="linear", note=HOSTILE,
-            curves=(Curve(name=HOSTILE, x=(0.0, 1.0), y=(0.0, "inf"), style="both"),) * 2,
+            curves=(Curve(name=HOSTILE, x=(0.0, 1.0), y=(0.0, Number("inf")), style="both"),) * 2,
         )  # fmt: skip
 
 
@@ -350,4 +349,4 @@ def decade(nights: int = 3650) -> DocumentHistory:
     )
 
 
-__all__ = ["DocumentHistory", "decade", "document", "from_number", "history"]
+__all__ = ["DocumentHistory", "decade", "document", "history"]

@@ -6,7 +6,7 @@ from importlib.resources import files
 import pytest
 
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import MISSING, arrive, browser, look, programs
+from tests.browser import arrive, look
 from tests.test_site_causes import nights
 from tests.test_site_causes import recorded as recorded  # a fixture
 
@@ -59,18 +59,6 @@ def site(tmp_path_factory, recorded):
     out = tmp_path_factory.mktemp("seen") / "public"
     publish(nights(motions=recorded), out)
     return out
-
-
-@pytest.fixture(scope="module")
-def driver():
-    found = programs()
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail(MISSING)
-        pytest.skip(MISSING)
-    with browser(*found) as opened:
-        opened.set_script_timeout(90)
-        yield opened
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,7 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.series_history import commit_of
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import MISSING, arrive, browser, look, programs, wait_for
+from tests.browser import arrive, look, wait_for
 from tests.synthetic_history import SEVEN, history
 
 PAGES = (
@@ -74,18 +72,6 @@ def site(tmp_path_factory: pytest.TempPathFactory, nights: Any) -> Path:
     out = tmp_path_factory.mktemp("browsed") / "public"
     publish(nights, out)
     return out
-
-
-@pytest.fixture(scope="module")
-def driver() -> Iterator[Any]:
-    found = programs()
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail(MISSING)
-        pytest.skip(MISSING)
-    with browser(*found) as opened:
-        opened.set_script_timeout(90)
-        yield opened
 
 
 def visit(driver: Any, site: Path, page: str, *, scripts: bool = True, **how: Any) -> None:

@@ -1,7 +1,6 @@
 """A red night on the website: one cause with its commit, what it hit and how badly, and the way to the moment."""
 
 import hashlib
-import os
 import re
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
@@ -15,7 +14,7 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.website.causes import causes_of, told
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import MISSING, arrive, browser, look, programs, wait_for
+from tests.browser import arrive, look, wait_for
 from tests.synthetic_history import DocumentHistory, document
 from tests.test_site_motion import shifted
 
@@ -149,18 +148,6 @@ def test_a_cause_keeps_its_place_when_a_night_is_added():
 
     assert before == after
     assert f"c-{hashlib.sha256(b'run-spook-0009').hexdigest()[:10]}" in before
-
-
-@pytest.fixture(scope="module")
-def driver():
-    found = programs()
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail(MISSING)
-        pytest.skip(MISSING)
-    with browser(*found) as opened:
-        opened.set_script_timeout(90)
-        yield opened
 
 
 def opened(driver, site, page, **how):

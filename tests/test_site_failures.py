@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.store.database import open_database, session_on
 from spook_tracker.tracker.store.database_check import check
 from spook_tracker.tracker.store.history import History
@@ -51,14 +52,17 @@ def test_any_id_of_a_run_can_be_published(tmp_path, name):
 def test_any_number_can_be_drawn(tmp_path, value):
     night = document(1)
     samples = [
-        msgspec.structs.replace(s, value=value) if "ladder" in s.series or "deviation" in s.series else s
+        msgspec.structs.replace(s, value=Number(value))
+        if "ladder" in s.series or "deviation" in s.series
+        else s
         for s in night.samples
     ]
     figures = [
         msgspec.structs.replace(
             f,
             curves=tuple(
-                msgspec.structs.replace(c, x=(1e-300, *c.x[1:]), y=(value, *c.y[1:])) for c in f.curves
+                msgspec.structs.replace(c, x=(1e-300, *c.x[1:]), y=(Number(value), *c.y[1:]))
+                for c in f.curves
             ),
         )
         for f in night.figures

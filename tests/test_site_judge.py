@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from spook_tracker.tracker.document.run_document import to_number
+from spook_tracker.tracker.document.json_form import boxed
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, Known, compare
 from spook_tracker.tracker.judge.comparison_document import Side
@@ -198,5 +198,5 @@ def test_a_row_carries_every_bit():
     definition = series("t", "m", limit=1.0, role="gate")
     for value in (5e-324, -0.0, 0.1 + 0.2, math.nan, -math.inf, 1e308):
         row = json.loads(json.dumps(texts.row(definition, sample(definition, value)), allow_nan=False))
-        assert row[1] == to_number(value) and math.copysign(1, float(row[1])) == math.copysign(1, value)
+        assert row[1] == boxed(value) and math.copysign(1, float(row[1])) == math.copysign(1, value)
     assert definition_fields(definition)["said"]["limit"] == "1.0"

@@ -1,7 +1,6 @@
 """What moves on the website, in a real browser and without a network: replay, live engine, dragging in a chart."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.engine import simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import MISSING, browser, look, programs, wait_for
+from tests.browser import look, wait_for
 from tests.synthetic_history import DocumentHistory, document
 
 ROOT = Path(__file__).parent.parent
@@ -49,18 +48,6 @@ def site(tmp_path_factory, recorded):
     out = tmp_path_factory.mktemp("moving") / "public"
     publish(DocumentHistory(nights), out)
     return out
-
-
-@pytest.fixture(scope="module")
-def driver():
-    found = programs()
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail(MISSING)
-        pytest.skip(MISSING)
-    with browser(*found) as opened:
-        opened.set_script_timeout(90)
-        yield opened
 
 
 def visit(driver, site, page, **how):

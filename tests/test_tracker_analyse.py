@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
@@ -17,7 +18,6 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     SeriesHistory,
     Timing,
-    to_number,
 )
 from spook_tracker.tracker.judge import series_history
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -86,7 +86,7 @@ def sample(value: float, limit: float = 0.1, **evidence) -> Sample:
     passed = outcome == "value"
     return Sample(
         series="t/c/m",
-        value=to_number(value),
+        value=Number(value),
         outcome=outcome,
         passed=passed,
         set_point_held=passed,

@@ -7,6 +7,7 @@ from datetime import date
 
 import msgspec
 
+from spook_tracker.tracker.document.json_form import NAN
 from spook_tracker.tracker.document.run_document import SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, unused
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, known
@@ -128,7 +129,7 @@ def test_no_value_on_either_side_is_said() -> None:
 def test_what_an_engine_cannot_be_asked_is_never_red_and_hides_no_regression() -> None:
     nights = history(0.01, 0.01, 0.02)
     lost = msgspec.structs.replace(
-        nights[1].sample, value="nan", outcome="not_supported", passed=False, set_point_held=False
+        nights[1].sample, value=NAN, outcome="not_supported", passed=False, set_point_held=False
     )
     told = judge_history("t/c/m", SERIES, [nights[0], nights[1]._replace(sample=lost), nights[2]])
 

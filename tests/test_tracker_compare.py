@@ -8,7 +8,8 @@ import random
 import msgspec
 import pytest
 
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, Timing, to_number
+from spook_tracker.tracker.document.json_form import Number, decode, encode
+from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, Known, compare
 from spook_tracker.tracker.judge.comparison_document import CompareDocument, Side
@@ -47,7 +48,7 @@ def pair(key: str, value: float, timing: Timing | None = None, steps: int = 0, *
     finite = math.isfinite(value)
     sample = Sample(
         series=key,
-        value=to_number(value),
+        value=Number(value),
         outcome="value" if finite else "not_finite",
         passed=finite,
         set_point_held=finite,
@@ -256,4 +257,4 @@ def test_a_comparison_survives_its_way_through_json():
         run("a", *ladder(1), pair("t/c/m", math.nan)), run("b", *ladder(2), pair("t/c/m", 0.0))
     )
 
-    assert msgspec.json.decode(msgspec.json.encode(document), type=CompareDocument) == document
+    assert decode(encode(document), CompareDocument) == document

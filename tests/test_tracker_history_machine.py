@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.document.run_document import to_number
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.store.database import open_database, upgrade
 from spook_tracker.tracker.store.database_check import check
 from spook_tracker.tracker.store.database_copy import copy_database
@@ -60,7 +60,7 @@ class Storage(RuleBasedStateMachine):
 
     @rule(
         commit=st.sampled_from(range(len(COMMITS))),
-        values=st.dictionaries(st.sampled_from(KEYS), st.floats().map(to_number), min_size=1),
+        values=st.dictionaries(st.sampled_from(KEYS), st.floats().map(Number), min_size=1),
         dirty=st.booleans(),
     )
     def records_a_run(self, commit, values, dirty):

@@ -13,7 +13,8 @@ from sqlalchemy import insert, select
 from sqlalchemy.exc import IntegrityError
 
 from spook_tracker.tracker.document.errors import DatabaseError
-from spook_tracker.tracker.document.run_document import RunDocument, from_number, to_number
+from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.border import checked, clean_text
 from spook_tracker.tracker.store.history import History
@@ -33,7 +34,7 @@ def same_bits(one: float, other: float) -> bool:
 
 @given(ANY_FLOAT)
 def test_any_float_survives_being_split_into_columns(value):
-    assert same_bits(from_number(joined(*split(to_number(value)))), value)
+    assert same_bits(joined(*split(value)), value)
 
 
 @STORED
@@ -47,7 +48,7 @@ def test_any_float_and_any_text_come_back_from_the_database(session, value, word
             definition(key, description=words, parameters={words: finite}, reference=finite, limit=finite),
         ),
         samples=(
-            sample(key, to_number(value), outcome=outcome, passed=False, failure=words, counters={words: 1}),
+            sample(key, Number(value), outcome=outcome, passed=False, failure=words, counters={words: 1}),
         ),
     )
 
@@ -55,7 +56,7 @@ def test_any_float_and_any_text_come_back_from_the_database(session, value, word
 
     stored = History(session).document(given_run.id)
     assert stored == checked(given_run)
-    assert same_bits(from_number(stored.samples[0].value), value)
+    assert same_bits(stored.samples[0].value, value)
     assert same_bits(stored.series[0].reference, finite)
     assert same_bits(stored.series[0].parameters[clean_text(words)], finite)
     if clean_text(words) == words and clean_text(key) == key:

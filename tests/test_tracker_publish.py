@@ -17,7 +17,7 @@ import plotly.graph_objects as go
 import plotly.offline
 import pytest
 
-from spook_tracker.tracker.document.run_document import to_number
+from spook_tracker.tracker.document.json_form import NAN
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website.folder import MARKER, FolderError, replacing
 from spook_tracker.tracker.website.publish import publish
@@ -315,7 +315,7 @@ def test_a_value_that_is_no_number_is_never_green(tmp_path: Path) -> None:
     run = document(0)
     gate = next(s for s in run.series if s.role == "gate" and s.test == "beam")
     lost = tuple(
-        type(s)(series=s.series, value=to_number(float("nan")), outcome="diverged", passed=False, set_point_held=False)
+        type(s)(series=s.series, value=NAN, outcome="diverged", passed=False, set_point_held=False)
         if s.series == gate.key else s
         for s in run.samples
     )  # fmt: skip

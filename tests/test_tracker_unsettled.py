@@ -16,7 +16,7 @@ from click import unstyle
 
 from spook_tracker.tracker import library
 from spook_tracker.tracker.cli.report_table import failures, pairs, pass_table
-from spook_tracker.tracker.document.run_document import RunDocument, from_number
+from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.standing import count
 from spook_tracker.tracker.measure.run import Questions, Request, run
 from spook_tracker.tracker.store.history import History
@@ -52,7 +52,7 @@ def test_the_value_is_kept_with_body_step_and_residual_and_does_not_pass(nights)
     assert good[WIDE].outcome == "value" and good[WIDE].passed
     for key in (WIDE, FOLLOWED):
         assert (bad[key].outcome, bad[key].passed) == ("unsettled", False)
-        assert math.isfinite(from_number(bad[key].value))
+        assert math.isfinite(bad[key].value)
         assert SAID.match(bad[key].failure)
     assert bad[WIDE].set_point_held
 
@@ -71,9 +71,9 @@ def test_a_rung_is_unsettled_and_reaches_no_error_but_a_break_point_is_a_value(n
     swept = good["stack/fifty sweeps/ladder:top/h=0.0166667"]
     assert swept.outcome == "unsettled" and swept.timing is None and SAID.match(swept.failure)
     assert good["stack/direct/ladder:top/h=0.0166667"].outcome == "value"
-    assert from_number(good["stack/fifty sweeps/ladder:top:time-to-error"].value) == math.inf
+    assert good["stack/fifty sweeps/ladder:top:time-to-error"].value == math.inf
     point = good["stack/plain/stability:tallest"]
-    assert point.outcome == "value" and 2 <= from_number(point.value) < 100
+    assert point.outcome == "value" and 2 <= point.value < 100
 
 
 def test_the_table_shows_value_and_class_and_counts_no_kept_limit(nights):

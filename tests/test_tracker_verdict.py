@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, to_number
+from spook_tracker.tracker.document.json_form import NAN, Number
+from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.verdict import RANK, Verdict, judge, judge_map, ulp_distance
 
 
@@ -41,7 +42,7 @@ def sample(value: float, outcome: str = "value", held: bool = True, state: str =
         outcome = "not_finite"
     return Sample(
         series="t/c/m",
-        value=to_number(value),
+        value=Number(value),
         outcome=outcome,
         passed=outcome == "value",
         set_point_held=held and outcome == "value",
@@ -133,7 +134,7 @@ def test_what_is_not_finite_is_the_worst_value_at_once(broken):
 
 
 def test_a_document_that_calls_nan_a_value_is_not_believed():
-    lying = Sample(series="t/c/m", value="nan", outcome="value", passed=True, set_point_held=True)
+    lying = Sample(series="t/c/m", value=NAN, outcome="value", passed=True, set_point_held=True)
 
     assert judge(series(limit=1.0), sample(0.1), lying).name == "not finite"
 

@@ -72,11 +72,9 @@ def compare(
             return
         document = compared(history, before, after, levels)
     if form == "json":
-        import msgspec
+        from spook_tracker.tracker.document.json_form import readable
 
-        import spook_tracker.tracker.document.outside as outside
-
-        click.echo(outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()))
+        click.echo(readable(document))
     elif form == "junit":
         from spook_tracker.tracker.cli.report_junit import junit_of_comparison
 

@@ -292,6 +292,7 @@ def serve(folder: Path, port: int) -> None:
 
 for command in (
     releases.backfill,
+    releases.releases_command,
     ranking.rank,
     compare,
     judge_command,
@@ -354,11 +355,9 @@ def _say_published(report: Any, out: Path) -> None:
 
 
 def _json(document: Any) -> str:
-    import msgspec
+    from spook_tracker.tracker.document.json_form import readable
 
-    import spook_tracker.tracker.document.outside as outside
-
-    return outside.escaped(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()) + "\n"
+    return readable(document) + "\n"
 
 
 def _write(file: Path, text: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import click
 
 from spook_tracker.tracker.cli.console import Column, clean, table, width
-from spook_tracker.tracker.document.run_document import Number
+from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.document.wording import page_of
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
@@ -23,14 +23,14 @@ def value(number: Number | None, unit: str = "") -> str:
     """A value for a table; enough digits to see a change."""
     if number is None:
         return "-"
-    return f"{float(number):.9g} {unit if unit != '1' else ''}".rstrip()
+    return f"{number:.9g} {unit if unit != '1' else ''}".rstrip()
 
 
 def both(change: Change) -> tuple[str, str]:
     """Values before and after with as many digits as it takes to tell them apart, the later with its unit."""
     if change.before is None or change.after is None:
         return value(change.before), value(change.after, change.unit)
-    old, new = float(change.before), float(change.after)
+    old, new = change.before, change.after
     digits = 6
     while digits < 17 and old != new and f"{old:.{digits}g}" == f"{new:.{digits}g}":
         digits += 1
@@ -263,7 +263,6 @@ def _finding_line(finding: Finding, site: str) -> str:
 
 def findings_json(findings: Sequence[Finding]) -> str:
     """What tonight came to, the worst first, as JSON: a list with an object for each series."""
-    import msgspec
 
     told = [
         {
@@ -280,4 +279,4 @@ def findings_json(findings: Sequence[Finding]) -> str:
         }
         for finding in findings
     ]
-    return msgspec.json.format(msgspec.json.encode(told), indent=1).decode()
+    return readable(told)

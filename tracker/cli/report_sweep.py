@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import click
 
 from spook_tracker.tracker.cli.console import Column, table
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 
 WIDE = 100  # columns; below, order and time to error are all there is room for
 Pair = tuple[SeriesDefinition, Sample]
@@ -61,7 +61,7 @@ def _order(pair: Pair | None) -> str:
     if pair is None:
         return "-"
     definition, sample = pair
-    value = from_number(sample.value)
+    value = sample.value
     shown = f"{value:.3f}" if math.isfinite(value) else sample.outcome
     return f"{shown} ({definition.reference:g})" if definition.reference is not None else shown
 
@@ -70,7 +70,7 @@ def _reached(pair: Pair | None, parameter: str) -> str:
     if pair is None:
         return "-"
     definition, sample = pair
-    value, target = from_number(sample.value), definition.parameters.get(parameter, math.nan)
+    value, target = sample.value, definition.parameters.get(parameter, math.nan)
     if parameter == "target_error":
         return f"{seconds(value)} to {target:g}" if math.isfinite(value) else f"never {target:g}"
     return f"{value:.3g} {definition.unit} in {seconds(target)}" if math.isfinite(value) else "too slow"

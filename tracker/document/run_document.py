@@ -2,16 +2,17 @@
 
 This is the one place where the published JSON Schema comes from (`tracker schema`). A document is complete in
 itself: it carries the definitions of its series, so that results of other machines, engines and tools can be
-imported with nothing else. Non-finite values travel as the strings "nan", "inf" and "-inf".
+imported with nothing else.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
 import msgspec
+
+from spook_tracker.tracker.document.json_form import Number
 
 SCHEMA_VERSION = 1
 
@@ -28,7 +29,6 @@ OutcomeClass = Literal[
 ]
 Text = Annotated[str, msgspec.Meta(max_length=65_536)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
-Number = float | Literal["nan", "inf", "-inf"]
 
 
 class Struct(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -101,7 +101,7 @@ class Sample(Struct, frozen=True, kw_only=True):
     """One value of one series in this run."""
 
     series: Name  # a SeriesDefinition's key
-    value: Number  # exactly the float64; "nan" if there is none
+    value: Number  # exactly the float64; NaN if there is none
     outcome: OutcomeClass
     passed: bool  # against the limit of that night
     set_point_held: bool
@@ -307,8 +307,7 @@ class Point(NamedTuple):
 
     @property
     def value(self) -> float:
-        """The value as a float; NaN and infinities are what they are."""
-        return float(self.sample.value)
+        return self.sample.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,17 +319,3 @@ class SeriesHistory:
 
     definition: SeriesDefinition
     points: tuple[Point, ...]
-
-
-def to_number(value: float) -> Number:
-    """A float as the document carries it."""
-    if math.isnan(value):
-        return "nan"
-    if math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    return value
-
-
-def from_number(number: Number) -> float:
-    """The float a document's number stands for."""
-    return float(number)

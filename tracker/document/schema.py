@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from spook_tracker.tracker.document.json_form import schema_hook
 from spook_tracker.tracker.document.run_document import SCHEMA_VERSION, RunDocument
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -13,7 +14,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def document_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of RunDocument. Beyond it, import asks for sense: see tracker/store/border.py."""
-    schema = msgspec.json.schema(RunDocument)
+    schema = msgspec.json.schema(RunDocument, schema_hook=schema_hook)
     about = {
         "$schema": DIALECT,
         "$id": f"urn:spook-tracker:run-document:{SCHEMA_VERSION}",

@@ -7,8 +7,9 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from statistics import median
 
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.order import error_in_time, time_at_error
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing, from_number
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.judge.calibration import geometric_mean
 from spook_tracker.tracker.judge.comparison_document import Change, Frontier
 from spook_tracker.tracker.judge.timing_statistics import compare_times
@@ -48,8 +49,8 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
                 stands="watch" if word == "regressed" else "followed",
                 name="slower at equal error" if word == "regressed" else "",
                 sentence=sentence,
-                before=geometric_mean(min(old.seconds) for old, _ in both),
-                after=geometric_mean(min(new.seconds) for _, new in both),
+                before=Number(geometric_mean(min(old.seconds) for old, _ in both)),
+                after=Number(geometric_mean(min(new.seconds) for _, new in both)),
                 before_outcome="value",
                 after_outcome="value",
                 limit=None,
@@ -88,8 +89,8 @@ def _single(before: Samples, after: Samples) -> Iterator[list[Rung]]:
 def frontiers(before: Samples, after: Samples, same_machine: bool) -> Iterator[Frontier]:
     """Both versions on each ladder, as ratios later to earlier; None where they share no error or time."""
     for (test, ladder, configuration), rungs in sorted(_ladders(before, after).items()):
-        old = [(_seconds(s), _steps(s), abs(from_number(s.value))) for _, s, _ in rungs]
-        new = [(_seconds(s), _steps(s), abs(from_number(s.value))) for _, _, s in rungs]
+        old = [(_seconds(s), _steps(s), abs(s.value)) for _, s, _ in rungs]
+        new = [(_seconds(s), _steps(s), abs(s.value)) for _, _, s in rungs]
         seconds = [[point[0] for point in side] for side in (old, new)]
         steps = [[point[1] for point in side] for side in (old, new)]
         errors = [[point[2] for point in side] for side in (old, new)]

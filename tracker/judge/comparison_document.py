@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from spook_tracker.tracker.document.run_document import Name, Number, OutcomeClass, Struct, Text
+from spook_tracker.tracker.document.json_form import Number, schema_hook
+from spook_tracker.tracker.document.run_document import Name, OutcomeClass, Struct, Text
 from spook_tracker.tracker.judge.vocabulary import Class, Word
 
 COMPARE_SCHEMA_VERSION = 1
@@ -85,5 +86,5 @@ def compare_schema() -> dict[str, object]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Two versions of an engine compared",
-        **msgspec.json.schema(CompareDocument),
+        **msgspec.json.schema(CompareDocument, schema_hook=schema_hook),
     }

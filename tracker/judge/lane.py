@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import msgspec
 
+from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.document.run_document import (
     MapData,
     Point,
@@ -178,7 +179,7 @@ def with_missing(
                 continue
             why = "removed from the catalogue" if gone else "asked for and not answered"
             lost = Sample(
-                series=key, value="nan", outcome="missing", passed=False, set_point_held=False, failure=why
+                series=key, value=NAN, outcome="missing", passed=False, set_point_held=False, failure=why
             )
             points.append(Point(runs[i], lost, definition.test_version))
         if len(points) > len(series.points):
@@ -248,7 +249,7 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
             timing = ladder_timing(p.sample.timing for p in found if p.sample.timing)
             sample = Sample(
                 series=key,
-                value=timing.seconds[0],
+                value=Number(timing.seconds[0]),
                 outcome="value",
                 passed=True,
                 set_point_held=True,

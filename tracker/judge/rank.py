@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.tracker.document.order import time_at_error
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, from_number
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 
 ERRORS = (1e-2, 1e-4, 1e-6)
 STEP = 1.0 / 60.0  # s
@@ -30,7 +30,7 @@ class Standing:
     error: float | None  # magnitude at h = 1/60, the best configuration
     configuration: str
     seconds: tuple[float | None, ...]  # to reach each of ERRORS, the best configuration
-    outcome: str  # "value", or what became of the rung at h = 1/60 in every configuration
+    outcome: str  # "value", what became of the rung at h = 1/60 in every configuration, or that there is none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +92,10 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
             if not math.isclose(definition.time_step, STEP, rel_tol=1e-9):
                 continue
             outcomes.append(sample.outcome)
-            if sample.outcome == "value" and abs(from_number(sample.value)) < best:
-                best, chosen = abs(from_number(sample.value)), name
-    outcome = "value" if chosen else (outcomes[0] if outcomes else "not asked")
+            if sample.outcome == "value" and abs(sample.value) < best:
+                best, chosen = abs(sample.value), name
+    none = "no such step" if configurations else "not asked"
+    outcome = "value" if chosen else (outcomes[0] if outcomes else none)
     return Standing(
         test=test,
         ladder=ladder,
@@ -112,7 +113,7 @@ def _soonest(configurations: Mapping[str, Rungs], error: float) -> float | None:
     times = []
     for rungs in configurations.values():
         timed = [
-            (min(sample.timing.seconds), abs(from_number(sample.value)))
+            (min(sample.timing.seconds), abs(sample.value))
             for _, sample in rungs
             if sample.outcome == "value" and sample.timing is not None and sample.timing.seconds
         ]

@@ -21,7 +21,6 @@ from spook_tracker.tracker.document.run_document import (
     OutcomeClass,
     Sample,
     SeriesDefinition,
-    from_number,
 )
 from spook_tracker.tracker.judge.standing import honest
 from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
@@ -78,7 +77,7 @@ def judge(
     if "not_supported" in (before.outcome, after.outcome):
         return _unasked(before, after)
     before, after = honest(before), honest(after)
-    old, new = from_number(before.value), from_number(after.value)
+    old, new = before.value, after.value
     decades, ulps = _decades(definition, old, new), ulp_distance(old, new)
     if same_bits(old, new) and before.outcome == after.outcome:
         same_state = before.state_hash == after.state_hash or "" in (before.state_hash, after.state_hash)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import EngineVersion, Sample, SeriesDefinition
 
 EXACT = frozenset(
@@ -78,7 +79,7 @@ def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[Series
             found[key] = (
                 definition,
                 Sample(
-                    series=key, value=float(done), outcome="value", passed=True, set_point_held=True,
+                    series=key, value=Number(done), outcome="value", passed=True, set_point_held=True,
                     state_hash=answers,
                 ),
             )  # fmt: skip

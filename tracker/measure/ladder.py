@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 from spook_tracker.engine.method import STAGES_THAT_CAN_BE_FORCED
 from spook_tracker.scalar_tests.case import Configuration, Example, Ladder, ScalarTest, Simulate
+from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
 from spook_tracker.tracker.document.run_document import (
     OutcomeClass,
     Sample,
     SeriesDefinition,
     Timing,
-    to_number,
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 from spook_tracker.tracker.measure.question import Witness, ask, series_key
@@ -128,7 +128,7 @@ def _ladder_pairs(
             series,
             Sample(
                 series=series.key,
-                value=to_number(point.error),
+                value=Number(point.error),
                 outcome=point.outcome,
                 passed=point.outcome == "value",
                 set_point_held=point.outcome == "value",
@@ -254,7 +254,7 @@ def _scalar(
         outcome = "out_of_limit"
     return Sample(
         series=series.key,
-        value="nan" if value is None else to_number(value),
+        value=NAN if value is None else Number(value),
         outcome=outcome,
         passed=outcome == "value",
         set_point_held=outcome in ("value", "out_of_limit"),

@@ -26,6 +26,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityMap,
     StabilityStudy,
 )
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     Curve,
     FigureData,
@@ -33,7 +34,6 @@ from spook_tracker.tracker.document.run_document import (
     OutcomeClass,
     Sample,
     SeriesDefinition,
-    to_number,
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 
@@ -216,7 +216,7 @@ def judged_sample(key: str, metric: Metric, outcome: Outcome, witness: Witness) 
         kind = "out_of_limit"  # the worse class; the sentence still says what was unsettled
     return Sample(
         series=key,
-        value=to_number(value),
+        value=Number(value),
         outcome=kind,
         passed=kind == "value",
         set_point_held=kind in ("value", "unsettled", "out_of_limit") and metric.holds_set_point(value),
@@ -243,8 +243,8 @@ def draw(name: str, figure: Figure, simulate: Simulate) -> FigureData:
         curves=tuple(
             Curve(
                 name=curve.name,
-                x=tuple(to_number(float(x)) for x in curve.x),
-                y=tuple(to_number(float(y)) for y in curve.y),
+                x=tuple(Number(x) for x in curve.x),
+                y=tuple(Number(y) for y in curve.y),
                 style=curve.style,
             )
             for curve in (drawing.curves if drawing else ())
@@ -320,6 +320,6 @@ def _map(name: str, question: StabilityStudy, found: StabilityMap) -> MapData:
         x=tuple(map(float, found.x)),
         y=tuple(map(float, found.y)),
         cells=found.cells,
-        prediction=tuple(tuple(map(to_number, row)) for row in prediction) if prediction else None,
+        prediction=tuple(tuple(map(Number, row)) for row in prediction) if prediction else None,
         note=found.note,
     )

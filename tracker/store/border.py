@@ -12,8 +12,8 @@ from typing import Any
 
 import msgspec
 
-from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.document.json_form import boxed, builtins, convert, decode
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.rows import moment
 
@@ -39,7 +39,7 @@ def _cleaned(part: Any, place: str) -> Any:
             raise DocumentError(f"{place}: a text of {len(part)} characters; at most {MAX_TEXT} are stored")
         return clean_text(part)
     if isinstance(part, float):
-        return part if math.isfinite(part) else document.to_number(part)
+        return boxed(part)
     if isinstance(part, int):
         if abs(part) > MAX_INTEGER:
             digits = int(part.bit_length() * 0.30103) + 1
@@ -52,17 +52,12 @@ def _cleaned(part: Any, place: str) -> Any:
     return part
 
 
-def _plain(number: Any) -> Any:
-    """NumPy scalars, which msgspec does not know, as Python numbers."""
-    if hasattr(number, "item"):
-        return number.item()
-    raise DocumentError(f"a {type(number).__name__} cannot be part of a run document")
-
-
 def checked(run: RunDocument) -> RunDocument:
     """The document as it can be stored. DocumentError, naming the place, if it is not valid."""
     try:
-        parts = msgspec.to_builtins(run, enc_hook=_plain)
+        parts = builtins(run)
+    except TypeError as error:
+        raise DocumentError(f"the run document holds what JSON cannot: {error}") from None
     except UnicodeError as error:  # msgspec checks no text here, but a hook might
         raise DocumentError(f"the run document holds text that is not Unicode: {error}") from None
     return _sensible(_typed(_cleaned(parts, "$")))
@@ -76,7 +71,7 @@ def decoded(data: bytes, origin: str = "the document") -> RunDocument:
     if len(data) > MAX_BYTES:
         raise DocumentError(f"{origin}: {len(data)} bytes; a run document has at most {MAX_BYTES}")
     try:
-        return checked(msgspec.json.decode(_without_surrogates(data), type=RunDocument))
+        return checked(decode(_without_surrogates(data), RunDocument))
     except (msgspec.ValidationError, DocumentError) as error:
         raise DocumentError(f"{origin} is not a valid run document: {error}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -109,7 +104,7 @@ def _without_surrogates(data: bytes) -> bytes:
 
 def _typed(parts: Any) -> RunDocument:
     try:
-        return msgspec.convert(parts, RunDocument)
+        return convert(parts, RunDocument)
     except msgspec.ValidationError as error:
         raise DocumentError(str(error)) from None
 
@@ -130,8 +125,6 @@ def _sensible(run: RunDocument) -> RunDocument:
         if count > 1:
             raise DocumentError(f"the series {key!r} has {count} samples; one run has one")
     for sample in run.samples:
-        if (sample.outcome == "value" or sample.passed) and not math.isfinite(
-            document.from_number(sample.value)
-        ):
+        if (sample.outcome == "value" or sample.passed) and not math.isfinite(sample.value):
             raise DocumentError(f"the series {sample.series!r} is {sample.value} and yet called good")
     return run

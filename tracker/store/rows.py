@@ -12,7 +12,7 @@ import msgspec
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
-from spook_tracker.tracker.document.run_document import Number
+from spook_tracker.tracker.document.json_form import Number, decode, encode
 from spook_tracker.tracker.store.models import identity
 
 Row = dict[str, Any]
@@ -21,21 +21,17 @@ Part = TypeVar("Part")
 
 def json_of(part: Any) -> str:
     """Compact JSON; floats in the shortest form that reads back to the same bits."""
-    return msgspec.json.encode(part).decode()
-
-
-def from_json(text: str, kind: type[Part]) -> Part:
-    return msgspec.json.decode(text, type=kind)
+    return encode(part).decode()
 
 
 def packed(part: Any) -> bytes:
     """Compressed JSON, for the bulky parts nobody queries."""
-    return zlib.compress(msgspec.json.encode(part), 6)
+    return zlib.compress(encode(part), 6)
 
 
 def unpacked(body: bytes, kind: type[Part]) -> Part:
     try:
-        return msgspec.json.decode(zlib.decompress(body), type=kind)
+        return decode(zlib.decompress(body), kind)
     except (zlib.error, msgspec.DecodeError) as error:
         raise DatabaseError(
             f"a stored figure or map is damaged ({error}); restore the database from a copy"
@@ -51,25 +47,20 @@ def moment(text: str) -> datetime:
         raise DocumentError(f"{text[:60]!r} is not a time; write it as 2026-11-21T03:17:00+00:00") from None
 
 
-def split(number: Number) -> tuple[float | None, str | None]:
+def split(number: float) -> tuple[float | None, str | None]:
     """A float64 as (value, special): every bit survives in databases that lose NaN or the sign of zero."""
-    if isinstance(number, str):
-        return None, number
-    value = float(number)
-    if not math.isfinite(value):
-        return None, str(document.to_number(value))
-    if value == 0.0 and math.copysign(1.0, value) < 0:
+    if not math.isfinite(number):
+        return None, str(Number(number))
+    if number == 0.0 and math.copysign(1.0, number) < 0:
         return 0.0, "-0.0"
-    return value, None
+    return float(number), None
 
 
 def joined(value: float | None, special: str | None) -> Number:
-    if special == "-0.0":
-        return -0.0
     if special is not None:
-        return document.to_number(float(special))
+        return Number(special)
     assert value is not None  # the table's own check
-    return value
+    return Number(value)
 
 
 def engine_row(engine: document.EngineVersion) -> Row:
@@ -80,7 +71,7 @@ def engine_row(engine: document.EngineVersion) -> Row:
 
 def engine_of(row: Mapping[str, Any]) -> document.EngineVersion:
     columns = {name: row[name] for name in document.EngineVersion.__struct_fields__}
-    return document.EngineVersion(**columns | {"parents": from_json(row["parents"], tuple[str, ...])})
+    return document.EngineVersion(**columns | {"parents": decode(row["parents"], tuple[str, ...])})
 
 
 def machine_row(machine: document.Machine) -> Row:
@@ -97,7 +88,7 @@ def cards_row(cards: tuple[document.TestCard, ...]) -> Row:
 
 
 def cards_of(body: str) -> tuple[document.TestCard, ...]:
-    return from_json(body, tuple[document.TestCard, ...])
+    return decode(body, tuple[document.TestCard, ...])
 
 
 def limits(definition: document.SeriesDefinition) -> tuple[float | None, float | None]:
@@ -130,7 +121,7 @@ def definition_row(definition: document.SeriesDefinition) -> Row:
 
 
 def definition_of(body: str) -> document.SeriesDefinition:
-    return from_json(body, document.SeriesDefinition)
+    return decode(body, document.SeriesDefinition)
 
 
 def asked_text(asked: document.Asked | None) -> str:
@@ -138,7 +129,7 @@ def asked_text(asked: document.Asked | None) -> str:
 
 
 def asked_of(text: str) -> document.Asked | None:
-    return from_json(text, document.Asked) if text else None
+    return decode(text, document.Asked) if text else None
 
 
 def sample_row(sample: document.Sample) -> Row:

@@ -11,11 +11,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
 from sqlalchemy.orm import Session
 
-import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.document.json_form import readable
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
@@ -33,8 +32,7 @@ class Imported:
 
 def encoded(run: RunDocument) -> bytes:
     """The document as JSON, one line for each part, with a line feed at the end."""
-    text = msgspec.json.format(msgspec.json.encode(checked(run)), indent=1).decode()
-    return outside.escaped(text).encode() + b"\n"
+    return readable(checked(run)).encode() + b"\n"
 
 
 def write_document(run: RunDocument, path: Path) -> None:

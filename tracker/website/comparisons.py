@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import Number
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
@@ -197,7 +197,7 @@ def _change(change: Change, titles: dict[str, str], descriptions: dict[str, str]
 
 
 def value_in_words(value: Number | None, unit: str) -> str:
-    return "–" if value is None else quantity(float(value), unit, 7)
+    return "–" if value is None else quantity(value, unit, 7)
 
 
 def _ratio(value: float | None) -> str:

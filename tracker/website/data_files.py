@@ -12,9 +12,7 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import msgspec
-
-from spook_tracker.tracker.document.run_document import to_number
+from spook_tracker.tracker.document.json_form import boxed, builtins
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 
@@ -51,7 +49,7 @@ def records(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
     """The same table as JSON: a list of objects, non-finite numbers as strings."""
     found = [
         {
-            name: to_number(cell) if isinstance(cell, float) else cell
+            name: boxed(cell) if isinstance(cell, float) else cell
             for name, cell in zip(columns, line, strict=True)
         }
         for line in lines
@@ -155,22 +153,22 @@ def _night_line(night: Night) -> list[Any]:
 def test_json(book: Book, test: TestHistory) -> bytes:
     """Everything about one test: its card, and each series with its definition and all values."""
     whole = {
-        "test": msgspec.to_builtins(test.card),
+        "test": builtins(test.card),
         "nights": [
             {"run": n.id, "started": n.started, "version": n.engine.version, "git_hash": n.engine.git_hash}
             for n in book.nights
         ],
         "series": [
             {
-                "definition": msgspec.to_builtins(t.definition),
+                "definition": builtins(t.definition),
                 "nights": t.nights,
-                "values": [to_number(v) for v in t.values],
+                "values": [boxed(v) for v in t.values],
                 "outcomes": t.outcomes,
-                "newest": msgspec.to_builtins(t.latest) if t.latest else None,
+                "newest": builtins(t.latest) if t.latest else None,
             }
             for t in test.trends
         ],
-        "figures": msgspec.to_builtins(test.figures),
-        "maps": msgspec.to_builtins(test.maps),
+        "figures": builtins(test.figures),
+        "maps": builtins(test.maps),
     }
     return json.dumps(whole, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()

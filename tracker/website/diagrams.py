@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample, from_number
+from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
@@ -229,8 +229,8 @@ def figure_chart(data: FigureData, prefix: str = "") -> Chart:
     lines = tuple(
         Line(
             name=curve.name,
-            x=tuple(from_number(x) for x in curve.x),
-            y=tuple(from_number(y) for y in curve.y),
+            x=curve.x,
+            y=curve.y,
             style=curve.style,
             colour=i,
         )
@@ -261,7 +261,7 @@ def map_grid(data: MapData, prefix: str = "", title: str = "") -> Grid:
         x=data.x,
         y=data.y,
         cells=data.cells,
-        prediction=tuple(tuple(from_number(v) for v in row) for row in prediction) if prediction else None,
+        prediction=prediction,
         note=" ".join(filter(None, (data.note, data.definition))),
     )
 
@@ -290,7 +290,7 @@ def rungs(trends: Iterable[Trend], sample_of: Callable[[Trend], Sample | None]) 
         found.append(
             Rung(
                 time_step=trend.definition.time_step,
-                error=from_number(sample.value),
+                error=sample.value,
                 seconds=min(timing.seconds) if timing and timing.seconds else math.nan,
                 spread=max(timing.seconds) / min(timing.seconds)
                 if timing and min(timing.seconds) > 0.0

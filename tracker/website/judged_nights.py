@@ -12,7 +12,8 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, to_number
+from spook_tracker.tracker.document.json_form import boxed
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, conditions, named, page_of
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
@@ -66,12 +67,12 @@ class Texts:
         """One sample, without what is empty at its end."""
         row = [
             self.definition(definition),
-            to_number(float(sample.value)),
+            boxed(sample.value),
             OUTCOMES.index(sample.outcome),
             int(sample.passed) + 2 * int(sample.set_point_held),
             self.place(sample.state_hash),
             self.place(sample.failure),
-            0 if usual is None else [to_number(end) for end in usual],
+            0 if usual is None else [boxed(end) for end in usual],
             int(suspected),
             self.place(blame),
         ]
@@ -96,7 +97,7 @@ def accepted_fields(accepted: Sequence[Accepted], keys: Sequence[str]) -> list[d
     return [
         {
             "keys": [key for key in keys if level.names(key)],
-            "low": to_number(level.low), "high": to_number(level.high),
+            "low": boxed(level.low), "high": boxed(level.high),
             "until": level.until.isoformat() if level.until else "", "said": clean(str(level)),
         }
         for level in accepted

@@ -17,6 +17,7 @@ from typing import Any
 
 import msgspec
 
+from spook_tracker.tracker.document.json_form import plain
 from spook_tracker.tracker.document.wording import clean, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
@@ -236,9 +237,9 @@ def _sources() -> list[Path]:
 def _bytes_of(context: dict[str, Any]) -> bytes:
     """What stands on a page, as bytes to be hashed."""
 
-    def plain(thing: Any) -> Any:
+    def told(thing: Any) -> Any:
         if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
             return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
-        raise TypeError(f"a page cannot hold {type(thing).__name__}")
+        return plain(thing)
 
-    return msgspec.json.encode(context, enc_hook=plain, order="deterministic")
+    return msgspec.json.encode(context, enc_hook=told, order="deterministic")

@@ -12,8 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
+from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.run_document import Trajectory
 from spook_tracker.tracker.document.wording import day, number, short_hash, slug, version
 from spook_tracker.tracker.website.folder import digest
@@ -78,7 +77,7 @@ def replay_files(tests: Iterable[TestHistory]) -> Iterator[tuple[str, bytes]]:
 
 def key_of(motion: Trajectory) -> str:
     """What a motion is called: the same for the same motion, whatever night it is of."""
-    return f"{slug(motion.test)}-{digest(msgspec.json.encode(motion))[:10]}"
+    return f"{slug(motion.test)}-{digest(encode(motion))[:10]}"
 
 
 def _script(key: str, motion: Trajectory) -> bytes:

@@ -1,0 +1,87 @@
+"""A document as JSON, and the numbers in it: the one place where they are written and read.
+
+JSON has no NaN and no infinity: there they are the strings "nan", "inf" and "-inf". Everywhere else a `Number` is
+the float it stands for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeVar
+
+import msgspec
+
+from spook_tracker.tracker.document.outside import escaped
+
+SPECIAL = ("nan", "inf", "-inf")  # how JSON says what is not finite
+Part = TypeVar("Part")
+
+
+class Number(float):
+    """A float64, read also from "nan", "inf" and "-inf". All NaN are one object, so equal documents compare equal."""
+
+    __slots__ = ()
+
+    def __new__(cls, value: float | str) -> Number:
+        number = float(value)
+        return NAN if math.isnan(number) else float.__new__(cls, number)
+
+
+NAN: Number = float.__new__(Number, "nan")
+
+
+def boxed(number: float) -> float | str:
+    """As JSON carries it."""
+    if math.isfinite(number):
+        return float(number)
+    return "nan" if math.isnan(number) else "inf" if number > 0 else "-inf"
+
+
+def encode(part: Any) -> bytes:
+    """A part of a document as compact JSON; floats in the shortest form that reads back to the same bits."""
+    return msgspec.json.encode(part, enc_hook=plain)
+
+
+def decode(data: bytes | str, kind: type[Part]) -> Part:
+    """A part of a document from JSON. msgspec.DecodeError if it is no such part."""
+    return msgspec.json.decode(data, type=kind, dec_hook=_read)
+
+
+def readable(document: Any) -> str:
+    """The JSON that files and terminals get: a line for each part, nothing a reader cannot see."""
+    return escaped(msgspec.json.format(encode(document), indent=1).decode())
+
+
+def convert(parts: Any, kind: type[Part]) -> Part:
+    """The same from dictionaries and lists. msgspec.ValidationError if it is no such part."""
+    return msgspec.convert(parts, kind, dec_hook=_read)
+
+
+def builtins(part: Any) -> Any:
+    """A part as dictionaries, tuples, texts and numbers, numbers as JSON carries them."""
+    return msgspec.to_builtins(part, enc_hook=plain)
+
+
+def plain(thing: Any) -> Any:
+    """What msgspec does not know itself, for its `enc_hook`. TypeError if it has no place in a document."""
+    if isinstance(thing, Number):
+        return boxed(thing)
+    if hasattr(thing, "item"):  # NumPy's scalars
+        return thing.item()
+    raise TypeError(f"a {type(thing).__name__} cannot be part of a document")
+
+
+def _read(kind: type, told: Any) -> Any:
+    if kind is Number and (told in SPECIAL if isinstance(told, str) else type(told) in (int, float)):
+        try:
+            return Number(told)
+        except OverflowError:
+            raise ValueError("a whole number beyond what a float64 holds") from None
+    raise TypeError(f'expected a number, "nan", "inf" or "-inf", got {str(told)[:40]!r}')
+
+
+def schema_hook(kind: type) -> dict[str, Any]:
+    """What the published schema says of a `Number`."""
+    if kind is Number:
+        return {"anyOf": [{"type": "number"}, {"enum": sorted(SPECIAL)}]}
+    raise NotImplementedError(kind)
