@@ -53,16 +53,20 @@ What cannot be simulated is refused with one sentence, and a run that goes wrong
 from spook_tracker.engine.bodies import WORLD, Body, Material, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo, build_info
 from spook_tracker.engine.compiler import compile, explain
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import EngineError, MethodError, SceneError
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
 from spook_tracker.engine.joints import (
     Ball,
+    Cylindrical,
     Distance,
     Hinge,
     JointSpring,
     Limit,
     Lock,
     Motor,
+    Planar,
+    PointOnLine,
     Prismatic,
     Universal,
 )
@@ -92,9 +96,11 @@ from spook_tracker.engine.observe import (
 )
 from spook_tracker.engine.program import Program, StageChoice
 from spook_tracker.engine.result import Result, SimulationFailed
+from spook_tracker.engine.run import Run, Snapshot, start
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Shape, Sphere
 from spook_tracker.engine.simulation import simulate
+from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
 
 __all__ = [
     "PLAIN",
@@ -111,10 +117,12 @@ __all__ = [
     "ConstraintForce",
     "ContactCount",
     "ContactForce",
+    "Cylindrical",
     "Distance",
     "Energy",
     "EngineError",
     "Final",
+    "Fluid",
     "Hinge",
     "JointCoordinate",
     "JointSpring",
@@ -135,26 +143,37 @@ __all__ = [
     "Part",
     "Particle",
     "Penetration",
+    "Planar",
     "Plane",
+    "PointOnLine",
     "Position",
     "PotentialEnergy",
     "Prismatic",
     "Program",
+    "Ramp",
+    "Relation",
     "Result",
     "RigidBody",
+    "Run",
     "Scene",
     "SceneError",
     "Shape",
     "SimulationFailed",
+    "Sinusoid",
+    "Snapshot",
     "Sphere",
     "Spring",
     "StageChoice",
+    "Table",
+    "TimeFunction",
     "Trace",
     "Universal",
     "Velocity",
     "Violation",
+    "Wire",
     "build_info",
     "compile",
     "explain",
     "simulate",
+    "start",
 ]

@@ -9,6 +9,7 @@ from spook_tracker.engine import check
 from spook_tracker.engine.check import Rotation, Vector
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.shapes import Plane, Shape
+from spook_tracker.engine.time_functions import TimeFunction
 
 WORLD = "world"  # the name that stands for the fixed world at one end of a constraint
 
@@ -62,7 +63,7 @@ class RigidBody:
 
     `inertia` holds the principal moments [kg m²] about the body axes; None takes those of the shape, of
     uniform density. A static body never moves; a kinematic one moves with its given velocities whatever
-    pushes it; neither needs a mass. `shape` None means the body has no surface and touches nothing.
+    pushes it, times its `pace` if that is given; neither needs a mass. `shape` None means the body has no surface and touches nothing.
     """
 
     name: str
@@ -75,6 +76,7 @@ class RigidBody:
     angular_velocity: Vector = (0.0, 0.0, 0.0)  # world frame, rad/s
     motion: Literal["dynamic", "static", "kinematic"] = "dynamic"
     material: Material = field(default_factory=Material)
+    pace: TimeFunction | None = None  # of a kinematic body: what both velocities are times
 
     def __post_init__(self) -> None:
         check.name("rigid body", self.name)
@@ -90,6 +92,10 @@ class RigidBody:
         for name in ("position", "velocity", "angular_velocity"):
             object.__setattr__(self, name, check.vector(owner, name, getattr(self, name)))
         object.__setattr__(self, "orientation", check.rotation(owner, "orientation", self.orientation))
+        if self.pace is not None and not isinstance(self.pace, TimeFunction):
+            raise SceneError(f"{owner}: pace must be a Sinusoid, Ramp or Table, not {self.pace!r}")
+        if self.pace is not None and self.motion != "kinematic":
+            raise SceneError(f"{owner}: only a kinematic body has a pace; forces move a dynamic one")
         if self.motion == "static" and (any(self.velocity) or any(self.angular_velocity)):
             raise SceneError(f"{owner}: a static body cannot have a velocity; make it kinematic")
         if self.motion != "dynamic":

@@ -9,6 +9,8 @@ from types import MappingProxyType
 
 from spook_tracker.engine.bodies import Particle
 from spook_tracker.engine.errors import MethodError, SceneError
+from spook_tracker.engine.forces import Fluid, Load
+from spook_tracker.engine.joints import Distance
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.particle_program import compile_particles
@@ -25,8 +27,11 @@ def compile(
     time_step: float,
     method: Method = PLAIN,
     observe: Mapping[str, Observable] = NOTHING,
+    held: bool = False,
 ) -> Program:
     """Compile a scene for a time step [s]: only the stages it needs, nothing else in the loop.
+
+    `held` keeps what can be set from outside while it runs (`start`): every Load, even one of zero.
 
     Raises MethodError for a time step that is not positive and finite, an option that makes no sense for the
     scene or an observable of something unknown.
@@ -41,9 +46,9 @@ def compile(
         raise MethodError("time_step is a number too large for arithmetic")
     if not (math.isfinite(time_step) and time_step > 0.0):
         raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
-    if all(isinstance(body, Particle) for body in scene.bodies) and not _forces_rigid_stages(method):
-        return compile_particles(scene, float(time_step), method, observe)
-    return compile_rigid(scene, float(time_step), method, observe)
+    if _only_particles(scene) and not _forces_rigid_stages(method):
+        return compile_particles(scene, float(time_step), method, observe, held)
+    return compile_rigid(scene, float(time_step), method, observe, held)
 
 
 def explain(
@@ -55,6 +60,17 @@ def explain(
 ) -> tuple[StageChoice, ...]:
     """Every stage of the step, kept or left out for this scene, with the reason; nothing is run."""
     return compile(scene, time_step=time_step, method=method, observe=observe).explain()
+
+
+def _only_particles(scene: Scene) -> bool:
+    """Whether all is in the reach of the particle pipeline: wires and functions of time are not."""
+    return (
+        all(isinstance(body, Particle) for body in scene.bodies)
+        and all(isinstance(constraint, Distance) for constraint in scene.constraints)
+        and not any(
+            isinstance(f, Fluid) or (isinstance(f, Load) and f.factor is not None) for f in scene.forces
+        )
+    )
 
 
 def _forces_rigid_stages(method: Method) -> bool:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from spook_tracker.engine import check
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.time_functions import TimeFunction
 
 End = str | Vector  # a body's name, or a fixed point of the world [m]
 
@@ -62,12 +64,13 @@ class CentralGravity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """A constant force and torque on one body, in world axes, at its centre of mass."""
+    """A force and torque on one body, in world axes, at its centre of mass; constant, or times `factor`."""
 
     name: str
     body: str
     force: Vector = (0.0, 0.0, 0.0)  # N
     torque: Vector = (0.0, 0.0, 0.0)  # N m
+    factor: TimeFunction | None = None
 
     def __post_init__(self) -> None:
         check.name("load", self.name)
@@ -75,6 +78,35 @@ class Load:
         object.__setattr__(self, "body", check.name("load's body", self.body))
         object.__setattr__(self, "force", check.vector(owner, "force", self.force))
         object.__setattr__(self, "torque", check.vector(owner, "torque", self.torque))
+        if self.factor is not None and not isinstance(self.factor, TimeFunction):
+            raise SceneError(f"{owner}: factor must be a Sinusoid, Ramp or Table, not {self.factor!r}")
 
 
-Force = Spring | CentralGravity | Load
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fluid:
+    """A fluid below the horizontal surface at `level`, still or in steady motion; gravity says where up is.
+
+    Every dynamic body with a surface is pushed up by ρ g times its submerged volume V, at the centre of V (closed
+    forms of sphere and box, to rounding of the capsule; parts of a compound each for itself). Drag is −½ ρ C A |u| u
+    at the same point, u its speed through the fluid, A the shadow of the whole part along u times the submerged share
+    of its volume. There is no added mass and no drag of a pure turn. Neither counts in Energy.
+    """
+
+    name: str
+    density: float  # kg/m³
+    level: float = math.inf  # m, along up from the world's origin; infinite: everything is under it
+    velocity: Vector = (0.0, 0.0, 0.0)  # m/s
+    drag_coefficient: float = 0.0  # C, 1
+
+    def __post_init__(self) -> None:
+        check.name("fluid", self.name)
+        owner = f"fluid {self.name!r}"
+        object.__setattr__(self, "density", check.positive(owner, "density", self.density))
+        if self.level != math.inf:
+            object.__setattr__(self, "level", check.number(owner, "level", self.level))
+        object.__setattr__(self, "velocity", check.vector(owner, "velocity", self.velocity))
+        drag = check.not_negative(owner, "drag_coefficient", self.drag_coefficient)
+        object.__setattr__(self, "drag_coefficient", drag)
+
+
+Force = Spring | CentralGravity | Load | Fluid

@@ -18,12 +18,13 @@ from typing import ClassVar
 
 from spook_tracker.engine import check
 from spook_tracker.engine.check import Vector
+from spook_tracker.engine.couplings import COMPLIANCE, Relation, Wire
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.forces import End, check_ends
+from spook_tracker.engine.time_functions import TimeFunction, number_or_function
 
 PerDegree = float | tuple[float, ...]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
-COMPLIANCE = 1e-8  # m/N and rad/(N m), where none is given
 
 
 def _per_degree(owner: str, field: str, value: object, count: int) -> PerDegree:
@@ -67,13 +68,16 @@ class Distance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motor:
-    """Drives a joint's free coordinate at a speed, with at most `max_force` [N or N m]; None is unbounded."""
+    """Drives a joint's free coordinate at a speed, with at most `max_force` [N or N m]; None is unbounded.
 
-    speed: float  # m/s or rad/s
+    A speed of 0 with a bound is dry friction in the joint.
+    """
+
+    speed: float | TimeFunction  # m/s or rad/s
     max_force: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "speed", check.number("motor", "speed", self.speed))
+        object.__setattr__(self, "speed", number_or_function("motor", "speed", self.speed))
         if self.max_force is not None:
             object.__setattr__(self, "max_force", check.not_negative("motor", "max_force", self.max_force))
 
@@ -107,12 +111,12 @@ class JointSpring:
     """Pulls a joint's free coordinate to `rest` as a compliant row of compliance 1/stiffness."""
 
     stiffness: float  # N/m or N m/rad
-    rest: float = 0.0  # m or rad
+    rest: float | TimeFunction = 0.0  # m or rad
     damping: float | None = None  # s
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stiffness", check.positive("joint spring", "stiffness", self.stiffness))
-        object.__setattr__(self, "rest", check.number("joint spring", "rest", self.rest))
+        object.__setattr__(self, "rest", number_or_function("joint spring", "rest", self.rest))
         if self.damping is not None:
             object.__setattr__(self, "damping", check.not_negative("joint spring", "damping", self.damping))
 
@@ -226,4 +230,45 @@ class Universal(Joint):
         object.__setattr__(self, "cross_axis", cross_axis)
 
 
-Constraint = Distance | Lock | Ball | Hinge | Prismatic | Universal
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuidedJoint(Joint):
+    """A joint that holds less than a hinge; `axis` is a world direction at the start."""
+
+    axis: Vector = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        Joint.__post_init__(self)
+        object.__setattr__(self, "axis", check.direction(f"{self.kind} {self.name!r}", "axis", self.axis))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointOnLine(GuidedJoint):
+    """Keeps the second body's point on the line along `axis` of the first: two translations along its normals."""
+
+    rows: ClassVar[int] = 2
+    kind: ClassVar[str] = "point on line"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cylindrical(GuidedJoint):
+    """Leaves rotation about `axis` and translation along it free.
+
+    Rows: translations along two normals, then rotations about the normals.
+    """
+
+    rows: ClassVar[int] = 4
+    kind: ClassVar[str] = "cylindrical"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planar(GuidedJoint):
+    """Leaves translations across `axis` and rotation about it free.
+
+    Rows: translation along the axis, then rotations about two normals.
+    """
+
+    rows: ClassVar[int] = 3
+    kind: ClassVar[str] = "planar"
+
+
+Constraint = Distance | Lock | Ball | Hinge | Prismatic | Universal | GuidedJoint | Relation | Wire

@@ -8,9 +8,11 @@ Quantities (per sample)                         shape            unit
   KineticEnergy, PotentialEnergy, Energy        ()               J; gravity −m g·x, central −m k/r,
                                                                  springs, those of joints too, ½ k d²; compliant
                                                                  rows count nothing
-  Violation (constraint or all distances)       (), (n,), (rows,)  m or rad; of a distance |d| − rest_length
-  ConstraintForce (constraint or all distances) (), (n,) or (6,) N, positive where the rod pulls (tension);
-                                                                 joints: force [N], torque [N m] on the second
+  Violation (constraint or all distances)       (), (n,), (rows,)  m or rad; of a distance |d| − rest_length, of
+                                                                 a wire its length beyond, of a relation its sum
+  ConstraintForce (constraint or all distances) (), (n,) or (6,) N, positive where the rod or wire pulls (tension);
+                                                                 joints: force [N], torque [N m] on the second;
+                                                                 relations: what a coordinate of coefficient 1 feels
   Momentum, AngularMomentum(about)              (3,)             N s, kg m²/s
   ContactForce (body, other or all)             (3,)             N, on `body`, sum over the contact points
   ContactCount, Penetration                     ()               1; largest penetration depth, m

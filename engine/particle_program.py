@@ -23,9 +23,9 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 def compile_particles(
-    scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable]
+    scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable], held: bool = False
 ) -> Program:
-    """The Program of a scene that has only particles, distances and forces."""
+    """The Program of a scene that has only particles, distances and forces; `held`: its loads may be set."""
     if method.string_stiffness and method.solver == "iterative":
         raise MethodError("method: string_stiffness needs the direct solver")
     if method.composition != "none":
@@ -33,7 +33,10 @@ def compile_particles(
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     quantities, shapes = requests(scene, observe)
     native = _core.ParticleProgram(
-        **_pack(scene, time_step, method, bodies), quantities=quantities, observations=observations(observe)
+        **_pack(scene, time_step, method, bodies),
+        loads_change=held and any(isinstance(force, Load) for force in scene.forces),
+        quantities=quantities,
+        observations=observations(observe),
     )
     return Program(native, time_step=time_step, bodies=tuple(bodies), observe=observe, shapes=shapes)
 

@@ -131,6 +131,15 @@ class Program:
                 raise MethodError(f"observe {name!r}: its samples end beyond the last step, {steps}")
         with self._running:
             report = self._native.run(steps, time_limit or 0.0, time_stages)
+        return self.result(report, time_limit)
+
+    @property
+    def native(self) -> Any:
+        """The native program, for a run one holds."""
+        return self._native
+
+    def result(self, report: Mapping[str, Any], time_limit: float | None) -> Result:
+        """A native report in the names of the scene."""
         observables: dict[str, Array] = {}
         sample_times: dict[str, Array] = {}
         for (name, what), shape, recording in zip(

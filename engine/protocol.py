@@ -20,7 +20,7 @@ from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.compiler import NOTHING
 from spook_tracker.engine.errors import EngineError, MethodError
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.forces import Force
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import (
@@ -52,7 +52,7 @@ class Capabilities:
 
     shapes: frozenset[type[Shape]] = frozenset()  # that can touch
     joints: frozenset[type[Constraint]] = frozenset()
-    forces: frozenset[type[CentralGravity | Load | Spring]] = frozenset()
+    forces: frozenset[type[Force]] = frozenset()
     shows: frozenset[type[Quantity]] = (
         frozenset()
     )  # of ConstraintForce, ContactForce, ContactCount, Penetration
@@ -137,6 +137,8 @@ def _of_scene(can: Capabilities, scene: Scene) -> Iterator[str]:
             yield from _of_surface(can, body)
     for constraint in scene.constraints:
         yield from _of_constraint(can, constraint)
+    if scene.follows_time():
+        yield "functions of time"
     if not can.loops and _has_loop(scene):
         yield "closed loops of joints"
     for force in scene.forces:

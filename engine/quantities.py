@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from spook_tracker.engine import _core
 from spook_tracker.engine.bodies import Particle
 from spook_tracker.engine.check import Vector
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.joints import AxialJoint, Distance
 from spook_tracker.engine.observe import (
@@ -111,7 +112,7 @@ def _of_constraint(
         return _ask(name), (count,)
     index = _constraint(scene, quantity.constraint)
     constraint = scene.constraints[index]
-    if isinstance(constraint, Distance):
+    if isinstance(constraint, Distance | Relation | Wire):
         return _ask(name, index), ()
     return _ask(name, index), (6 if force else constraint.rows,)
 

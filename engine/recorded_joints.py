@@ -7,15 +7,20 @@ import math
 import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.joints import (
     AxialJoint,
     Ball,
     Constraint,
+    Cylindrical,
     Distance,
+    GuidedJoint,
     Hinge,
     Joint,
     Lock,
+    Planar,
+    PointOnLine,
     Prismatic,
     Universal,
 )
@@ -83,6 +88,8 @@ class _End:
 
 def violation(scene: Scene, constraint: Constraint, positions: Array, orientations: Array) -> Array:
     """(s,) m of a distance, (s, rows) m and rad of a joint."""
+    if isinstance(constraint, Relation | Wire):
+        raise MethodError(f"observe: {constraint.kind} {constraint.name!r} is not found in a recording")
     if isinstance(constraint, Distance):
         ends = [
             np.asarray(scene.anchor(constraint, k))
@@ -97,13 +104,15 @@ def violation(scene: Scene, constraint: Constraint, positions: Array, orientatio
     gap = second.point(at) - first.point(at)
     axes = _axes(constraint)
     rows = [(first.direction(axis) * gap).sum(axis=1) for axis in axes]
-    if isinstance(constraint, Prismatic):
+    if isinstance(constraint, Prismatic | PointOnLine | Cylindrical):
         rows = rows[1:]
+    elif isinstance(constraint, Planar):
+        rows = rows[:1]
     relative = _relative(first, second)
     part = relative[:, 1:]
     if isinstance(constraint, Lock | Prismatic):
         rows += [2.0 * part @ axis for axis in axes]
-    elif isinstance(constraint, Hinge):
+    elif isinstance(constraint, Hinge | Cylindrical | Planar):
         moved = turned(relative, np.broadcast_to(axes[0], part.shape)) - axes[0]
         rows += [-moved @ axes[2], moved @ axes[1]]
     elif isinstance(constraint, Universal):
@@ -133,7 +142,7 @@ def _relative(first: _End, second: _End) -> Array:
 
 def _axes(joint: Joint) -> tuple[Array, Array, Array]:
     """The directions in which a joint's rows are counted, at the start."""
-    if isinstance(joint, AxialJoint):
+    if isinstance(joint, AxialJoint | GuidedJoint):
         one, two = normals(joint.axis)
         return np.array(joint.axis), np.array(one), np.array(two)
     if isinstance(joint, Universal):

@@ -223,6 +223,7 @@ def _potential(scene: Scene, recording: Recording) -> Array:
     for joint in scene.constraints:
         if isinstance(joint, AxialJoint) and joint.spring is not None:
             place = recorded_joints.coordinate(scene, joint, where, recording.orientations)
+            assert isinstance(joint.spring.rest, float)  # the protocol refuses what follows the time
             energy = energy + 0.5 * joint.spring.stiffness * (place - joint.spring.rest) ** 2
     return np.asarray(energy)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +17,7 @@ Status = Literal["completed", "unsettled", "diverged", "not_finite", "timed_out"
 Array = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Result:
     """One run of a scene.
 
@@ -64,6 +66,39 @@ class Result:
     def completed(self) -> bool:
         """Whether every step was done with finite, bounded values."""
         return self.status == "completed"
+
+    def __repr__(self) -> str:
+        seen = ", ".join(f"{name} {value.shape}" for name, value in self.observables.items())
+        rows = [self.failure or self.status, f"{self.steps} steps of {self.time_step:.4g} s"]
+        return f"<Result: {'; '.join([*rows, seen or 'nothing observed'])}>"
+
+    def to_dataframe(self) -> Any:
+        """The traces as a pandas DataFrame: a row per sample time [s], a column per component.
+
+        A scalar's column has the observable's name; those of more numbers are "name.x", "name.y", "name.z" (three),
+        "name.w" … (four), else "name.0", … in the order of the flattened sample. Traces taken at different times
+        leave gaps (NaN). Reductions are no rows: read them as result["name"].
+        """
+        if not self.sample_times:
+            raise EngineError("to_dataframe: nothing was traced; observe a Trace")
+        pandas = import_module("pandas")  # the engine itself needs NumPy at most
+        frames = [
+            pandas.DataFrame(
+                self[name].reshape(len(times), -1),
+                index=pandas.Index(times, name="time"),
+                columns=_columns(name, self[name].shape[1:]),
+            )
+            for name, times in self.sample_times.items()
+        ]
+        return pandas.concat(frames, axis=1).sort_index()
+
+
+def _columns(name: str, shape: tuple[int, ...]) -> list[str]:
+    if shape == ():
+        return [name]
+    named: dict[tuple[int, ...], str] = {(3,): "xyz", (4,): "wxyz"}
+    parts = named.get(shape) or range(math.prod(shape))
+    return [f"{name}.{part}" for part in parts]
 
 
 class SimulationFailed(EngineError):

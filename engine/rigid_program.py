@@ -20,15 +20,20 @@ import numpy as np
 from spook_tracker.engine import _core
 from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.check import Vector
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.couplings import Relation, Wire
+from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
 from spook_tracker.engine.joints import (
     AxialJoint,
     Ball,
     Constraint,
+    Cylindrical,
     Distance,
+    GuidedJoint,
     Hinge,
     Joint,
     Lock,
+    Planar,
+    PointOnLine,
     Prismatic,
     Universal,
 )
@@ -37,18 +42,24 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.particle_program import ends
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
-from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.scene import Scene, wire_length
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
-from spook_tracker.engine.smooth import ORDERS, check_rigid
+from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
+from spook_tracker.engine.time_functions import Ramp, Sinusoid, at_start
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
-_JOINTS: dict[type[Constraint], str] = {
+_JOINTS: dict[type[Any], str] = {
     Distance: "distance",
     Lock: "lock",
     Ball: "ball",
     Hinge: "hinge",
     Prismatic: "prismatic",
     Universal: "universal",
+    PointOnLine: "point_on_line",
+    Cylindrical: "cylindrical",
+    Planar: "planar",
+    Relation: "relation",
+    Wire: "wire",
 }
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -56,12 +67,15 @@ _WORLD_AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def compile_rigid(
-    scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable]
+    scene: Scene, time_step: float, method: Method, observe: Mapping[str, Observable], held: bool = False
 ) -> Program:
-    """The Program of a scene with at least one rigid body."""
+    """The Program of a scene with at least one rigid body; `held`: its loads may be set."""
+    check_wide_rows(scene, method)
     quantities, shapes = requests(scene, observe)
     native = _core.RigidProgram(
-        **pack(scene, time_step, method), quantities=quantities, observations=observations(observe)
+        **pack(scene, time_step, method, held),
+        quantities=quantities,
+        observations=observations(observe),
     )
     names = [body.name for body in scene.bodies]
     program = Program(native, time_step=time_step, bodies=names, observe=observe, shapes=shapes)
@@ -83,14 +97,14 @@ def normals(axis: Vector) -> tuple[Vector, Vector]:
     return (x, y, z), (b * z - c * y, c * x - a * z, a * y - b * x)
 
 
-def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
+def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> dict[str, Any]:
     """The arguments of the native program, except what is observed: indices for names, no defaults left."""
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     step = time_step / method.substeps
     pushes = np.zeros((len(bodies), 6))
     fields, springs = [], []
     for force in scene.forces:
-        if isinstance(force, Load):
+        if isinstance(force, Load) and force.factor is None:
             pushes[bodies[force.body]] += (*force.force, *force.torque)
         elif isinstance(force, CentralGravity):
             fields.append({"strength": force.strength, "centre": force.centre})
@@ -108,18 +122,22 @@ def pack(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
     apart += [
         {"first": joint["first"], "second": joint["second"]}
         for joint in joints
-        if min(joint["first"], joint["second"]) >= 0
+        if min(joint["first"], joint["second"]) >= 0 and joint["kind"] not in ("relation", "wire")
     ]
     return {
         "bodies": table([_body(body, push, step) for body, push in zip(scene.bodies, pushes, strict=True)]),
         "joints": table(joints),
         **_drives(scene, step),
+        **_couplings(scene, bodies),
+        **_fluids(scene),
+        **_in_time(scene, bodies),
         "springs": table(springs),
         "fields": table(fields),
-        "colliders": table(_colliders(scene)),
+        "colliders": table(_surfaces(scene) if scene.contacts else []),
         "no_contact": table(apart),
         "contacts": scene.contacts,
         "gravity": scene.gravity,
+        "loads_change": held and any(isinstance(force, Load) for force in scene.forces),
         "method": {
             "time_step": time_step,
             "substeps": method.substeps,
@@ -188,7 +206,15 @@ def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step
         },
         "compliance": _six(constraint.compliance),
         "damping": _six(2.0 * step if constraint.damping is None else constraint.damping),
+        "one_sided": False,
+        "restitution": 0.0,
     }
+    if isinstance(constraint, Relation | Wire):
+        columns |= {"first_point": _ORIGIN, "second_point": _ORIGIN, "axes": _WORLD_AXES, "rest_length": 0.0}
+        if isinstance(constraint, Wire):
+            columns |= {"one_sided": constraint.slack, "restitution": constraint.restitution}
+            columns["rest_length"] = wire_length(constraint)
+        return columns
     if isinstance(constraint, Distance):
         length = constraint.rest_length
         return columns | {
@@ -212,7 +238,7 @@ def _drives(scene: Scene, step: float) -> dict[str, Any]:
             continue
         if (motor := joint.motor) is not None:
             force = _or(motor.max_force, math.inf)
-            motors.append({"joint": index, "speed": motor.speed, "max_force": force})
+            motors.append({"joint": index, "speed": at_start(motor.speed), "max_force": force})
         if (limit := joint.limit) is not None:
             limits.append(
                 {
@@ -229,11 +255,93 @@ def _drives(scene: Scene, step: float) -> dict[str, Any]:
                 {
                     "joint": index,
                     "stiffness": spring.stiffness,
-                    "rest": spring.rest,
+                    "rest": at_start(spring.rest),
                     "damping": _or(spring.damping, 2.0 * step),
                 }
             )
     return {"motors": table(motors), "limits": table(limits), "joint_springs": table(springs)}
+
+
+def _couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
+    """The joints of relations and the points of wires, each with the index of its constraint."""
+    index = {constraint.name: k for k, constraint in enumerate(scene.constraints)}
+    terms = [
+        {"relation": index[row.name], "joint": index[joint], "coefficient": factor}
+        for row in scene.constraints
+        if isinstance(row, Relation)
+        for joint, factor in row.terms
+    ]
+    points = [
+        {"wire": index[row.name], "body": bodies.get(end, -1), "point": point}
+        for row in scene.constraints
+        if isinstance(row, Wire)
+        for end, point in row.through
+    ]
+    return {"terms": table(terms), "wire_points": table(points)}
+
+
+def _fluids(scene: Scene) -> dict[str, Any]:
+    """Fluids, and the surfaces of dynamic bodies that displace them."""
+    down = math.hypot(*scene.gravity)
+    fluids = [
+        {
+            "density": fluid.density,
+            "level": fluid.level,
+            "up": tuple(-g / down for g in scene.gravity),
+            "velocity": fluid.velocity,
+            "drag": fluid.drag_coefficient,
+        }
+        for fluid in scene.forces
+        if isinstance(fluid, Fluid)
+    ]
+    floaters = [part for part in _surfaces(scene) if _moves(scene.bodies[part["body"]])] if fluids else []
+    return {"fluids": table(fluids), "floaters": table(floaters)}
+
+
+def _moves(body: Particle | RigidBody) -> bool:
+    return isinstance(body, Particle) or body.motion == "dynamic"
+
+
+def _in_time(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
+    """What follows the time, and the knots of tables."""
+    drives: list[dict[str, Any]] = []
+    knots: list[dict[str, Any]] = []
+
+    def add(
+        kind: str, index: int, function: Any, linear: Vector = _ORIGIN, angular: Vector = _ORIGIN
+    ) -> None:
+        wave = isinstance(function, Sinusoid)
+        if not wave:
+            points = function.table() if isinstance(function, Ramp) else function
+            for time, value in zip(points.times, points.values, strict=True):
+                knots.append({"drive": len(drives), "time": time, "value": value})
+        drives.append(
+            {
+                "kind": kind,
+                "function": "sinusoid" if wave else "table",
+                "index": index,
+                "linear": linear,
+                "angular": angular,
+                "offset": function.offset if wave else 0.0,
+                "amplitude": function.amplitude if wave else 0.0,
+                "rate": 2.0 * math.pi * function.frequency if wave else 0.0,
+                "phase": function.phase if wave else 0.0,
+            }
+        )
+
+    for force in scene.forces:
+        if isinstance(force, Load) and force.factor is not None:
+            add("load", bodies[force.body], force.factor, force.force, force.torque)
+    for index, joint in enumerate(scene.constraints):
+        if isinstance(joint, AxialJoint):
+            if joint.motor is not None and not isinstance(joint.motor.speed, float):
+                add("motor", index, joint.motor.speed)
+            if joint.spring is not None and not isinstance(joint.spring.rest, float):
+                add("rest", index, joint.spring.rest)
+    for body in scene.bodies:
+        if isinstance(body, RigidBody) and body.pace is not None:
+            add("pace", bodies[body.name], body.pace, body.velocity, body.angular_velocity)
+    return {"drives": table(drives), "knots": table(knots)}
 
 
 def _or(value: float | None, default: float) -> float:
@@ -247,7 +355,7 @@ def _six(value: float | tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _axes(joint: Joint) -> tuple[float, ...]:
-    if isinstance(joint, AxialJoint):
+    if isinstance(joint, AxialJoint | GuidedJoint):
         first, second = normals(joint.axis)
         return (*joint.axis, *first, *second)
     if isinstance(joint, Universal):
@@ -256,10 +364,8 @@ def _axes(joint: Joint) -> tuple[float, ...]:
     return _WORLD_AXES
 
 
-def _colliders(scene: Scene) -> list[dict[str, Any]]:
+def _surfaces(scene: Scene) -> list[dict[str, Any]]:
     colliders: list[dict[str, Any]] = []
-    if not scene.contacts:
-        return colliders
     for index, body in enumerate(scene.bodies):
         if not isinstance(body, RigidBody) or body.shape is None:
             continue

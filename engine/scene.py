@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,9 +10,10 @@ from dataclasses import dataclass
 from spook_tracker.engine import check
 from spook_tracker.engine.bodies import WORLD, Body, Particle, RigidBody
 from spook_tracker.engine.check import Vector
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.forces import CentralGravity, Force, Load, Spring
-from spook_tracker.engine.joints import Constraint, Distance, Joint
+from spook_tracker.engine.forces import CentralGravity, Fluid, Force, Load, Spring
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint
 
 
 def _unique(kind: str, names: Iterable[str]) -> None:
@@ -49,23 +51,53 @@ class Scene:
             if not isinstance(body, Particle | RigidBody):
                 raise SceneError(f"bodies: {body!r} is neither a Particle nor a RigidBody")
         for constraint in self.constraints:
-            if not isinstance(constraint, Distance | Joint):
+            if not isinstance(constraint, Distance | Joint | Relation | Wire):
                 raise SceneError(f"constraints: {constraint!r} is not a constraint")
         for force in self.forces:
-            if not isinstance(force, Spring | CentralGravity | Load):
+            if not isinstance(force, Spring | CentralGravity | Load | Fluid):
                 raise SceneError(f"forces: {force!r} is not a force")
         object.__setattr__(self, "gravity", check.vector("scene", "gravity", self.gravity))
         _unique("bodies", (body.name for body in self.bodies))
         _unique("constraints", (constraint.name for constraint in self.constraints))
         _unique("forces", (force.name for force in self.forces))
         known = {body.name: body for body in self.bodies}
+        joints = {constraint.name: constraint for constraint in self.constraints}
         for constraint in self.constraints:
-            self._check_constraint(constraint, known)
+            if isinstance(constraint, Relation):
+                self._check_relation(constraint, joints)
+            elif isinstance(constraint, Wire):
+                self._check_wire(constraint, known)
+            else:
+                self._check_constraint(constraint, known)
         for force in self.forces:
             self._check_force(force, known)
         object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
 
-    def _check_constraint(self, constraint: Constraint, known: dict[str, Body]) -> None:
+    @staticmethod
+    def _check_relation(relation: Relation, joints: Mapping[str, Constraint]) -> None:
+        for name, _ in relation.terms:
+            if not isinstance(joints.get(name), AxialJoint):
+                raise SceneError(
+                    f"relation {relation.name!r}: there is no hinge or prismatic joint named {name!r}, and only those "
+                    "have a coordinate"
+                )
+
+    @staticmethod
+    def _check_wire(wire: Wire, known: Mapping[str, Body]) -> None:
+        owner = f"wire {wire.name!r}"
+        for end, point in wire.through:
+            body = known.get(end)
+            if body is None and end != WORLD:
+                raise SceneError(f"{owner}: there is no body named {end!r}")
+            if isinstance(body, Particle) and point != body.position:
+                raise SceneError(
+                    f"{owner}: particle {end!r} has only its centre, {body.position}; run through that"
+                )
+        bodies = [known[end] for end, _ in wire.through if end != WORLD]
+        if not any(isinstance(body, Particle) or body.motion == "dynamic" for body in bodies):
+            raise SceneError(f"{owner}: nothing it runs through can move, so it constrains nothing")
+
+    def _check_constraint(self, constraint: Distance | Joint, known: dict[str, Body]) -> None:
         owner = f"constraint {constraint.name!r}"
         for end in constraint.between:
             if (
@@ -106,6 +138,8 @@ class Scene:
             first, second = (known[end].position if isinstance(end, str) else end for end in force.between)
             if first == second:
                 raise SceneError(f"{owner}: its ends coincide, so it has no direction; move one of them")
+        if isinstance(force, Fluid) and not any(self.gravity):
+            raise SceneError(f"{owner}: without gravity nothing floats or sinks; give the scene its gravity")
         if isinstance(force, CentralGravity):
             for body in known.values():
                 if body.position == force.centre:
@@ -119,6 +153,16 @@ class Scene:
             if name not in known:
                 raise SceneError(f"no_contact: there is no body named {name!r}")
         return (pair[0], pair[1])
+
+    def follows_time(self) -> bool:
+        """Whether a load, a drive or a kinematic body is given as a function of time."""
+        drives = [joint for joint in self.constraints if isinstance(joint, AxialJoint)]
+        return (
+            any(isinstance(force, Load) and force.factor is not None for force in self.forces)
+            or any(isinstance(body, RigidBody) and body.pace is not None for body in self.bodies)
+            or any(joint.motor is not None and not isinstance(joint.motor.speed, float) for joint in drives)
+            or any(joint.spring is not None and not isinstance(joint.spring.rest, float) for joint in drives)
+        )
 
     def body(self, name: str) -> Body:
         """The body of that name."""
@@ -158,6 +202,14 @@ class Scene:
     def _length(self, constraint: Distance, known: Mapping[str, Body]) -> float:
         # Looking names up one by one would make a scene of n rows cost n².
         return math.dist(self._anchor(constraint, 0, known), self._anchor(constraint, 1, known))
+
+
+def wire_length(wire: Wire) -> float:
+    """Length [m] of a wire at the start: what it is given, or that of its way."""
+    if wire.length is not None:
+        return wire.length
+    points = [point for _, point in wire.through]
+    return math.fsum(math.dist(a, b) for a, b in itertools.pairwise(points))
 
 
 def _placed(body: RigidBody, point: Vector) -> Vector:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.forces import Spring
+from spook_tracker.engine.forces import Fluid, Load, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
@@ -23,9 +25,53 @@ def check_smooth(scene: Scene, method: Method) -> None:
             raise MethodError(
                 f"method: a composition goes back in time, where the viscosity of spring {force.name!r} explodes"
             )
+        if isinstance(force, Fluid) or (isinstance(force, Load) and force.factor is not None):
+            raise MethodError(
+                f"method: a composition goes back and forth in time, and {force.name!r} does not follow it there; use "
+                "half_step_velocities"
+            )
+    for body in scene.bodies:
+        if isinstance(body, RigidBody) and body.pace is not None:
+            raise MethodError(
+                f"method: a composition goes back and forth in time, which the pace of {body.name!r} does not follow"
+            )
     known = {body.name: body for body in scene.bodies}
     for row in scene.constraints:
         _check_held(row, scene.length(row, known) if isinstance(row, Distance) else 0.0)
+
+
+def check_wide_rows(scene: Scene, method: Method) -> None:
+    """A relation or wire over more than two moving bodies is a row that only the plain direct solve carries."""
+    joints = {joint.name: joint for joint in scene.constraints}
+    fixed = {body.name for body in scene.bodies if isinstance(body, RigidBody) and body.motion == "static"}
+    for row in scene.constraints:
+        if isinstance(row, Relation):
+            held = {end for name, _ in row.terms for end in joints[name].between if isinstance(end, str)}
+        elif isinstance(row, Wire):
+            held = {end for end, _ in row.through}
+        else:
+            continue
+        if len(held - fixed - {WORLD}) <= 2:
+            continue
+        loose = next((f"{_bounded(j)} in {j.name!r}" for j in scene.constraints if _bounded(j)), None)
+        surfaces = [b for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None]
+        beyond = (
+            method.solver != "direct"
+            or method.corrections
+            or method.half_step_velocities
+            or method.string_stiffness
+            or method.composition != "none"
+        )
+        why = (
+            loose
+            or ("surfaces that may touch" if scene.contacts and len(surfaces) > 1 else None)
+            or ("a method beyond the plain direct one" if beyond else None)
+        )
+        if why is not None:
+            raise MethodError(
+                f"method: {row.kind} {row.name!r} ties more than two moving bodies, which only plain direct steps of "
+                f"rows that never let go can do, and here is {why}; leave that out"
+            )
 
 
 def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
@@ -69,6 +115,8 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
 
 
 def _bounded(joint: Constraint) -> str | None:
+    if isinstance(joint, Wire) and joint.slack:
+        return "a wire that may go slack"
     if not isinstance(joint, AxialJoint):
         return None
     if joint.limit is not None and joint.limit.lower < joint.limit.upper:

@@ -37,6 +37,11 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "spinning_top": "spinning_top",
     "motor": "motor",
     "double_pendulum": "double_pendulum",
+    "floating_box": "floating_box",
+    "sinking_sphere": "sinking_sphere",
+    "wires": "wires",
+    "scissor_lift": "scissor_lift",
+    "gears": "gears",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

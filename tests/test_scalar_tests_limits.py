@@ -13,7 +13,7 @@ import pytest
 
 from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import double_pendulum, motor
+from spook_tracker.scalar_tests import double_pendulum, floating_box, gears, motor, sinking_sphere, wires
 from spook_tracker.scalar_tests.beam import scene as beam
 from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Measurement, Simulate
@@ -288,6 +288,62 @@ def test_the_closed_forms_of_theory_are_the_limits_and_references_of_the_pendulu
     )
     assert swing == pytest.approx(9.76e-4, rel=1e-3)
     assert f"{9.76e-4:.2e} %".replace("e-04", "e-4") in OUR_SET_POINT
+
+
+def test_a_discrete_oscillation_is_shorter_by_the_cube_of_its_step() -> None:
+    """sin(θ/2) = h ω/2: the period of heave and swing, found by iterating the map of one step."""
+    for rate, test, configuration, metric in (
+        (floating_box.heave_rate(), "floating_box", "plain", "period_error"),
+        (sinking_sphere.SWING_RATE, "sinking_sphere", "pendulum", "swing_error"),
+    ):
+        (gate,) = (m for m in measurement(test, configuration).metrics if m.name == metric)
+        h, x, v, trace = 1.0 / 60.0, 1.0, 0.0, [1.0]
+        for _ in range(3600):
+            v -= h * rate**2 * x
+            x += h * v
+            trace.append(x)
+        found = floating_box.period(h * np.arange(3601), trace) * rate / (2.0 * math.pi) - 1.0
+
+        assert gate.passes(found)
+        assert found == pytest.approx(-((h * rate) ** 2) / 24.0, rel=0.03)
+
+
+def test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say() -> None:
+    """φ with sin φ = h ω: (h ω)²/6 of a speed, θ Σ z (h ω)³/6 of the meshes."""
+    spin = wires.TURNING * wires.DURATION / wires.RADIUS
+    share = wires.DRUM / wires.RADIUS**2 / (wires.HEAVY + wires.LIGHT + wires.DRUM / wires.RADIUS**2)
+    limits = {m.name: m.limit for m in measurement("wires", "plain").metrics}
+    assert limits["drum_error"] == pytest.approx((wires.TIME_STEP * spin) ** 2 / 6.0 * share, rel=0.01)
+    limits = {m.name: m.limit for m in measurement("gears", "plain").metrics}
+    assert limits["ratio_error"] == pytest.approx(gears.standing(), rel=0.01)
+
+
+def test_the_terminal_speed_is_the_fixed_point_of_a_step_and_is_reached() -> None:
+    v, h = 0.0, sinking_sphere.TIME_STEP
+    for _ in range(600):
+        v += h * (sinking_sphere.PULL - sinking_sphere.RESISTANCE * v * v)
+    assert measurement("sinking_sphere", "plain").metrics[0].passes(v / sinking_sphere.TERMINAL - 1.0)
+
+
+def test_a_square_log_falls_between_the_densities_of_its_metacentre() -> None:
+    for ratio in (0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0)):
+        assert floating_box.metacentric_height(ratio) == pytest.approx(0.0, abs=1e-15)
+    assert all(floating_box.metacentric_height(ratio) > 0.0 for ratio in floating_box.UPRIGHT)
+    assert all(floating_box.metacentric_height(ratio) < 0.0 for ratio in floating_box.TILTED)
+    # The righting arm by shoelace formula over the corners of the section below the surface.
+    for ratio, roll in ((0.15, 0.1), (0.5, 0.17), (0.85, 0.05)):
+        low, c, s = -0.5, math.cos(roll), math.sin(roll)
+        edge = ratio - 0.5  # where the surface meets the centre line, at the same displaced area
+        y = np.array([0.5, 0.5, low, low])
+        z = np.array([low, edge - 0.5 * math.tan(roll), edge + 0.5 * math.tan(roll), low])
+        cross = y * np.roll(z, -1) - np.roll(y, -1) * z
+        area = 0.5 * cross.sum()
+        centre_y = ((y + np.roll(y, -1)) * cross).sum() / (6.0 * area)
+        centre_z = ((z + np.roll(z, -1)) * cross).sum() / (6.0 * area)
+        assert area == pytest.approx(ratio, rel=1e-12)
+        assert -(centre_y * c - centre_z * s) == pytest.approx(
+            floating_box.righting_arm(ratio, roll), rel=1e-9
+        )
 
 
 def test_every_closed_form_of_theory_is_asked_by_a_scalar_test_or_a_test() -> None:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
+from click.testing import CliRunner
 
+from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.judge.rank import leads, standings
+from spook_tracker.tracker.library import record
 from tests.run_documents import definition as any_definition
+from tests.run_documents import engine, machine, run
 
 
 def rungs(
@@ -81,3 +87,69 @@ def test_an_engine_that_diverged_or_was_not_asked_says_so() -> None:
     assert (one.error, one.outcome) == (None, "diverged")
     assert (other.error, other.outcome) == (None, "not asked")
     assert leads([one, other], "a", "b") == []
+
+
+def recorded(folder: Path, versions: dict[tuple[str, str], dict[str, Any]], **machines: Any) -> str:
+    """A database with one run of each engine and version."""
+    database = f"sqlite:///{folder}/history.db"
+    for (name, version), found in versions.items():
+        record(
+            run(
+                engine=engine("", name=name, version=version, commit_time="", parents=()),
+                machine=machine(fingerprint=machines.get(name, "one")),
+                series=tuple(definition for definition, _ in found.values()),
+                samples=tuple(sample for _, sample in found.values()),
+            ),
+            database,
+        )
+    return database
+
+
+def test_comparing_two_engines_ranks_them_scene_by_scene_and_nobody_has_regressed(tmp_path: Path) -> None:
+    plain, fine = both().values()
+    database = recorded(tmp_path, {("spook", "1.0"): plain, ("mujoco", "3.4.0"): fine})
+
+    done = CliRunner().invoke(main, ["compare", "spook", "mujoco", "--db", database])
+
+    assert done.exit_code == 0
+    lines = [" ".join(line.split()) for line in done.output.splitlines()]
+    assert "scene path [m] spook 0.1 (euler) 1 ms - -" in lines
+    assert "mujoco 0.001 (rk4) 5 ms 8.9 ms 28 ms" in lines
+    assert "scene path [m] spook 5.0 × mujoco alone mujoco alone" in lines
+    assert lines[-1] == "ahead in 3 places (a scene at an error): spook 1, mujoco 2"
+
+
+def test_two_versions_of_one_engine_are_told_apart(tmp_path: Path) -> None:
+    plain, fine = both().values()
+    database = recorded(tmp_path, {("mujoco", "3.3.7"): plain, ("mujoco", "3.4.0"): fine})
+
+    done = CliRunner().invoke(main, ["rank", "mujoco@3.3.7", "mujoco@3.4.0", "--db", database])
+
+    assert done.exit_code == 0
+    assert "mujoco 3.4.0 alone" in done.output
+
+
+def test_run_times_of_two_machines_are_not_set_against_each_other(tmp_path: Path) -> None:
+    plain, fine = both().values()
+    database = recorded(tmp_path, {("spook", "1.0"): plain, ("mujoco", "3.4.0"): fine}, mujoco="other")
+
+    done = CliRunner().invoke(main, ["compare", "spook", "mujoco", "--db", database])
+
+    assert done.exit_code == 0
+    assert "not comparable" in done.output
+    assert "ahead" not in done.output
+
+
+def test_without_ladders_it_says_what_to_measure(tmp_path: Path) -> None:
+    database = recorded(tmp_path, {("spook", "1.0"): {}, ("mujoco", "3.4.0"): {}})
+
+    done = CliRunner().invoke(main, ["compare", "spook", "mujoco", "--db", database])
+
+    assert done.exit_code == 0
+    assert "tracker run --engine spook,mujoco --sweep" in done.output
+
+
+def test_a_ladder_without_a_rung_there_is_not_an_engine_that_failed() -> None:
+    (one,) = standings({"a": rungs("euler", {1 / 1000: (1e-3, 1.0)})})  # type: ignore[dict-item]
+
+    assert (one.error, one.outcome) == (None, "no such step")

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import Any
 
+import msgspec
 import pytest
+from click.testing import CliRunner
 
 import spook_tracker.tracker.cli.releases as command
 import spook_tracker.tracker.measure.releases as releases
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.judge.comparison_document import Change
+from spook_tracker.tracker.judge.release_notes import visible
 from spook_tracker.tracker.library import record
 from tests.run_documents import engine, run_of
 
@@ -45,6 +52,7 @@ def test_a_release_that_cannot_be_installed_or_started_is_named(
 
     def pip(*arguments: str) -> CompletedProcess[str]:
         asked.append(arguments)
+        (tmp_path / "mujoco-1.0").mkdir(exist_ok=True)
         return CompletedProcess([], 0, "", "")
 
     monkeypatch.setattr(releases, "_pip", pip)
@@ -54,18 +62,158 @@ def test_a_release_that_cannot_be_installed_or_started_is_named(
     with pytest.raises(releases.ReleaseError, match="does not start: ImportError: numpy"):
         releases.install("mujoco", "1.0", tmp_path)
     assert [arguments[-1] for arguments in asked] == ["mujoco==1.0", "numpy<2"]
+    assert not (tmp_path / "mujoco-1.0").exists(), "what does not start is not kept"
+
+
+def test_what_a_release_pins_comes_along_and_nothing_else(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """MuJoCo 4 is several packages of one version; NumPy and what is optional are no part of it."""
+    asked: list[str] = []
+
+    def pip(*arguments: str) -> CompletedProcess[str]:
+        asked.extend(arguments[arguments.index(":all:") + 1 :])
+        place = tmp_path / "mujoco-4.0" / "mujoco-4.0.dist-info"
+        place.mkdir(parents=True, exist_ok=True)
+        place.joinpath("METADATA").write_text(
+            "Name: mujoco\nRequires-Dist: numpy\nRequires-Dist: mujoco-core==4.0\n"
+            'Requires-Dist: mujoco-usd==4.0; extra == "usd"\n\nRequires-Dist: words==1.0 of the description\n'
+        )
+        return CompletedProcess([], 0, "", "")
+
+    monkeypatch.setattr(releases, "_pip", pip)
+    monkeypatch.setattr(releases, "_python", lambda *a, **o: CompletedProcess([], 0, "", ""))
+    place = releases.install("mujoco", "4.0", tmp_path)
+
+    assert asked == ["mujoco==4.0", "mujoco-core==4.0"]
+    assert releases.install("mujoco", "4.0", tmp_path) == place
+    assert len(asked) == 2, "what is there already is used again"
+    assert releases.size(place) > 100
+
+
+def release(version: str, day: int, values: dict[str, Any]) -> Any:
+    built = engine("", name="other", version=version, commit_time="", parents=())
+    started = f"2026-01-{day:02}T00:00:00+00:00"
+    return run_of(values, engine=built, started=started, finished=started)
+
+
+def test_the_rest_goes_on_when_a_release_fails_and_a_second_call_measures_only_what_is_missing(
+    tmp_path: Path,
+) -> None:
+    database = f"sqlite:///{tmp_path}/history.db"
+    measured: list[str] = []
+
+    def measure(version: str) -> Any:
+        measured.append(version)
+        if version == "1.1":
+            raise releases.ReleaseError("other==1.1 cannot be installed: no wheel")
+        return release("1.3" if version == "1.2" else version, len(measured), {KEY: 0.5})
+
+    lines = list(command.progress("other", ("1.0", "1.1", "1.2", "1.4"), measure, database, None))
+    assert [line.partition(": ")[2][:30] for line in lines] == [
+        "1 of 1 values in 0 s",
+        "other==1.1 cannot be installed",
+        "it says it is '1.3', so nothin",  # another release of it lies in the way
+        "1 of 1 values in 0 s",
+    ]
+
+    measured.clear()
+    again = list(command.progress("other", ("1.0", "1.4", "1.5"), measure, database, time.monotonic() - 1.0))
+    assert measured == []
+    assert "recorded already" in again[0] and "recorded already" in again[1]
+    assert "the time is up; the same command goes on from here" in again[2]
+
+
+def history(tmp_path: Path, *runs: Any) -> str:
+    database = f"sqlite:///{tmp_path}/history.db"
+    for one in runs:
+        record(one, database)
+    return database
 
 
 def test_every_change_is_told_with_its_release(tmp_path: Path) -> None:
-    database = f"sqlite:///{tmp_path}/history.db"
-    for day, (version, value) in enumerate([("1.0", 0.5), ("1.1", 0.5 + 1e-9), ("1.2", 0.25)], start=1):
-        built = engine("", name="other", version=version, commit_time="", parents=())
-        started = f"2026-01-0{day}T00:00:00+00:00"
-        record(run_of({KEY: value}, engine=built, started=started, finished=started), database)
+    """Measured in a wrong order, and with one that only rounding and one that a busy machine touched."""
+    late = "falling_object/rk4/late/h=0.0166667"
+    database = history(
+        tmp_path,
+        release("1.10", 1, {KEY: 0.25, late: 1.0}),
+        release("1.9", 2, {KEY: 0.5 + 1e-9, late: 1.0}),
+        release("1.8", 3, {KEY: 0.5, late: 1.0}),
+    )
+    told = CliRunner().invoke(main, ["releases", "other", "--db", database])
 
-    told = command.changes(database, "other", ["1.0", "1.1", "1.2"])
+    assert told.exit_code == 0
+    assert told.output.splitlines() == [
+        "other 1.9 after 1.8: no changes",
+        "other 1.10 after 1.9: 1 change",
+        f"  improved       {KEY}  0.5 → 0.25 %",
+    ]
 
-    assert told[0] == "other 1.1 after 1.0: no changes"
-    assert told[1] == "other 1.2 after 1.1: 1 changes"
-    assert KEY in told[2]
-    assert "0.5 -> 0.25" in told[2]
+
+def test_a_changelog_is_found_missed_or_says_nothing(tmp_path: Path) -> None:
+    other = "blow/rk4/change/h=0.0166667"
+    database = history(
+        tmp_path,
+        release("1.0", 1, {KEY: 0.5, other: 1.0}),
+        release("1.2", 2, {KEY: 0.25, other: 1.0}),
+        release("1.3", 3, {KEY: 0.25, other: 2.0}),
+        release("2.0", 4, {KEY: 0.125, other: 2.0}),
+    )
+    changelog = tmp_path / "changelog.toml"
+    changelog.write_text(
+        'source = "a list"\nreleases = ["1.0", "1.1", "1.2", "1.3"]\n'
+        '[[entry]]\nrelease = "1.1"\nitem = 4\nsays = "falls are better"\nshows = ["falling_object/*"]\n'
+        '[[entry]]\nrelease = "1.2"\nitem = 1\nsays = "blows are better"\nshows = ["blow/*"]\n'
+    )
+    asked = ["releases", "other", "--db", database, "--changelog", str(changelog)]
+
+    page = CliRunner().invoke(main, [*asked, "--markdown"]).output
+    assert (
+        f"**Found: 1**\n\n- 1.1, item 4: falls are better. Seen in pendulum:\n  `{KEY}` 0.5 → 0.25 %." in page
+    )
+    assert "**Missed: 1**\n\n- 1.2, item 1: blows are better." in page
+    assert f"**Not in the changelog: 1 release**\n\n- 1.3: pendulum; `{other}` 1 → 2" in page
+    assert "does not reach 2.0" in page
+    assert f"| `{KEY}` | 0.25 | 0.125 | % |" in page
+
+    text = CliRunner().invoke(main, asked).output
+    assert "found   1.1 falls are better\n  missed  1.2 blows are better\n  unsaid  1.3: pendulum" in text
+
+    changelog.write_text('releases = ["1.0"]\nsource = "x"\nentry = [{release = "9"}]\n')
+    refused = CliRunner().invoke(main, asked)
+    assert refused.exit_code == 2
+    assert "is no changelog: 'item'" in refused.output
+
+
+def test_one_release_alone_changes_nothing_and_says_how_to_go_on(tmp_path: Path) -> None:
+    database = history(tmp_path, release("1.0", 1, {KEY: 0.5}))
+    told = CliRunner().invoke(main, ["releases", "other", "--db", database])
+
+    assert told.output == (
+        "fewer than two releases of other are recorded; measure more: tracker backfill --engine other\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "seen"),
+    [
+        (1.0, 1.0 + 1e-7, False),
+        (1.0, 1.0 + 1e-5, True),
+        (1e-14, -3e-13, False),
+        (0.0, 1e-11, True),
+        ("nan", "nan", False),
+    ],
+)
+def test_rounding_is_no_change(before: Any, after: Any, seen: bool) -> None:
+    change = msgspec.convert(
+        {
+            "series": KEY, "test": "falling_object", "metric": "m", "configuration": "rk4", "role": "gate",
+            "kind": "scalar", "unit": "m", "word": "changed", "red": False, "stands": "none", "name": "",
+            "sentence": "", "before": before, "after": after, "before_outcome": "value",
+            "after_outcome": "value", "limit": None,
+        },
+        type=Change,
+    )  # fmt: skip
+    assert visible(change) == seen
+    assert not visible(msgspec.structs.replace(change, after_outcome="timed_out"))
+    assert visible(msgspec.structs.replace(change, after_outcome="diverged"))

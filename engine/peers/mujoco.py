@@ -218,6 +218,7 @@ class _Run:
         for constraint in scene.constraints:
             if type(constraint) not in MuJoCo.capabilities.shows_force_of:  # type: ignore[operator]
                 continue
+            assert isinstance(constraint, Distance | Joint)
             if not sample:
                 value: Any = 0.0 if isinstance(constraint, Distance) else np.zeros(6)
             elif constraint.name in self.made.tree:

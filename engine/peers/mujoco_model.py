@@ -209,6 +209,7 @@ class _Writer:
             anchor = np.array(self.scene.anchor(tie, 0 if second else 1))
             axes, kind, at = self._rod_axes(anchor - place), "hinge", anchor
         else:
+            assert isinstance(tie, Joint)
             at = joint_point(self.scene, tie)
             kind = "slide" if isinstance(tie, Prismatic) else "ball" if isinstance(tie, Ball) else "hinge"
             if isinstance(tie, Lock):
@@ -219,6 +220,7 @@ class _Writer:
                 axes = [np.array(tie.axis), np.array(tie.cross_axis)]
                 axes = axes if second else axes[::-1]
             else:
+                assert isinstance(tie, Hinge | Prismatic)
                 axes = [np.array(tie.axis)]
         where = numbers(turned_back(turn, at - place))
         return "".join(
@@ -276,6 +278,7 @@ class _Writer:
             line = f'<tendon tendon1={quoteattr(constraint.name)} polycoef="{longer!r} 0 0 0 0" {self.equality}/>'
             self._add(constraint, [line])
             return
+        assert isinstance(constraint, Joint)
         at = joint_point(self.scene, constraint)
         if isinstance(constraint, Lock):
             self._add(constraint, [self._weld(constraint, at)])

@@ -292,6 +292,7 @@ def serve(folder: Path, port: int) -> None:
 
 for command in (
     releases.backfill,
+    releases.releases_command,
     ranking.rank,
     compare,
     judge_command,

@@ -24,19 +24,29 @@ def rank(engines: tuple[str, ...], database: str) -> None:
 
     with history_of(database) as history:
         names = engines or tuple(dict.fromkeys(run.engine.name for run in history.runs()))
+        if not names:
+            raise click.UsageError(
+                "nothing is recorded yet; measure: tracker run --engine spook,mujoco --sweep"
+            )
         say("\n".join(table_lines(history, names)))
 
 
 def table_lines(history: Any, names: Sequence[str]) -> list[str]:
     """The table, and between two engines who is ahead where."""
     import spook_tracker.tracker.judge.rank as ranks
-    from spook_tracker.tracker.cli.console import Column, table, width
+    from spook_tracker.tracker.cli.console import Column, clean, table, width
 
     runs = {name: history.resolve(name if "@" in name else f"{name}@latest") for name in names}
-    titles = {name: f"{run.engine.name} {run.engine.version}" for name, run in runs.items()}
-    found = ranks.standings({titles[name]: history.samples(run.id) for name, run in runs.items()})
+    titles = _titles([run.engine for run in runs.values()])
+    found = ranks.standings(
+        {title: history.samples(run.id) for title, run in zip(titles, runs.values(), strict=True)}
+    )
     if not found:
-        return ["no error against run time is recorded of these engines; measure it: tracker run --sweep"]
+        again = f"tracker run --engine {','.join(names)} --sweep"
+        return [f"no error against run time is recorded of {' or '.join(names)}; measure it: {again}"]
+    heading = [
+        clean(f"{run.engine.name} {run.engine.version}, measured {run.started[:10]}") for run in runs.values()
+    ]
     columns = (
         Column("scene", flexible=True),
         Column("engine"),
@@ -47,18 +57,29 @@ def table_lines(history: Any, names: Sequence[str]) -> list[str]:
     previous = ""
     for one in found:
         scene = f"{one.test} {one.ladder} [{one.unit}]"
-        error = (
-            one.outcome.replace("_", " ") if one.error is None else f"{one.error:.2g} ({one.configuration})"
-        )
-        rows.append(("" if scene == previous else scene, one.engine, error, *(_time(t) for t in one.seconds)))
+        rows.append(("" if scene == previous else scene, one.engine, _error(one), *map(_time, one.seconds)))
         previous = scene
-    lines = [*table(columns, rows, width(), {}), ""]
+    lines = [*heading, "", *table(columns, rows, width(), {}), ""]
     machines = {run.machine.fingerprint for run in runs.values()}
     if len(machines) > 1:
         return [*lines, "measured on different machines: the run times are not comparable"]
     if len(titles) == 2:
-        lines += _ahead(ranks.leads(found, *titles.values()))
+        lines += _ahead(ranks.leads(found, *titles), ranks.ERRORS)
     return lines
+
+
+def _titles(engines: Sequence[Any]) -> list[str]:
+    """Names, with versions where one name stands for two engines."""
+    names = [engine.name for engine in engines]
+    alone = len(set(names)) == len(names)
+    return names if alone else [f"{engine.name} {engine.version}" for engine in engines]
+
+
+def _error(one: Any) -> str:
+    if one.error is not None:
+        return f"{one.error:.2g} ({one.configuration})"
+    words: str = one.outcome.replace("_", " ")
+    return words
 
 
 def _time(seconds: float | None) -> str:
@@ -67,9 +88,24 @@ def _time(seconds: float | None) -> str:
     return f"{seconds:.2g} s" if seconds >= 0.1 else f"{1e3 * seconds:.2g} ms"
 
 
-def _ahead(leads: Sequence[Any]) -> list[str]:
-    lines = ["at equal error"]
+def _ahead(leads: Sequence[Any], errors: Sequence[float]) -> list[str]:
+    """Scenes down, errors across: who gets there first, and by what factor."""
+    from spook_tracker.tracker.cli.console import Column, table, width
+
+    if not leads:
+        return ["neither reaches any of these errors"]
+    rows: dict[tuple[str, ...], dict[float, str]] = {}
+    won: dict[str, int] = {}
     for one in leads:
-        by = "alone reaches it" if math.isinf(one.factor) else f"ahead {one.factor:.1f} times"
-        lines.append(f"  {one.test} {one.ladder} at {one.error:g} {one.unit}: {one.ahead} {by}")
-    return lines if leads else ["neither reaches any of these errors"]
+        by = "alone" if math.isinf(one.factor) else f"{one.factor:.1f} ×"
+        rows.setdefault((f"{one.test} {one.ladder} [{one.unit}]",), {})[one.error] = f"{one.ahead} {by}"
+        won[one.ahead] = won.get(one.ahead, 0) + 1
+    columns = (
+        Column("ahead at equal error", flexible=True),
+        *(Column(f"at {e:g}", "right") for e in errors),
+    )
+    lines = table(
+        columns, [(*scene, *(at.get(e, "-") for e in errors)) for scene, at in rows.items()], width(), {}
+    )
+    score = ", ".join(f"{name} {count}" for name, count in won.items())
+    return [*lines, "", f"ahead in {len(leads)} places (a scene at an error): {score}"]

@@ -1,8 +1,9 @@
-"""`tracker backfill`: the history of another engine, release by release, from the first day."""
+"""`tracker backfill` and `tracker releases`: the history of another engine, release by release."""
 
 from __future__ import annotations
 
-import itertools
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +11,26 @@ import click
 
 from spook_tracker.tracker.cli.options import database_option, example, limit_option, workers_option
 
-SEEN = 1e-6  # relative: below it a value that changed is rounding to a reader of releases
+KEPT = ".tracker-releases"
+MEGABYTE = 1e6
 
 
-@click.command(epilog=example("tracker backfill --engine mujoco 3.3.7 3.4.0 --test friction"))
+@click.command(epilog=example("tracker backfill --engine mujoco --test resting_stack --budget 20"))
 @click.argument("versions", nargs=-1, metavar="[VERSION]...")
 @click.option("--engine", required=True, metavar="NAME", help="An engine that is released as a package.")
 @click.option("--test", "tests", multiple=True, metavar="TEST", help="Only this test; may be repeated.")
 @click.option("--newest", type=click.IntRange(min=1), metavar="N", help="Only the newest N of them.")
 @click.option(
+    "--budget",
+    type=click.FloatRange(min=0.0),
+    metavar="MINUTES",
+    help="Begin no release after that; the next call goes on.",
+)
+@click.option(
     "--keep",
     "folder",
     metavar="DIR",
-    default=".tracker-releases",
+    default=KEPT,
     show_default=True,
     type=click.Path(path_type=Path),
     help="Where releases are installed.",
@@ -36,6 +44,7 @@ def backfill(
     engine: str,
     tests: tuple[str, ...],
     newest: int | None,
+    budget: float | None,
     folder: Path,
     catalogue: str,
     limit: float | None,
@@ -45,35 +54,63 @@ def backfill(
 ) -> None:
     """Install released versions of an engine, measure each, and record them in release order.
 
-    A release that is recorded already is not measured again; one that cannot be installed or does not start
-    is named and passed over. In the end every change between two releases is named with its release.
+    A release that is recorded already is not measured again, so an interrupted backfill is gone on with by
+    calling it again. One that cannot be installed, does not start or gives no answers is named and passed
+    over. In the end every change between two releases is named with its release.
     """
     import spook_tracker.tracker.measure.releases as releases
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.library import record
 
     chosen = releases.choose(releases.released(engine), versions, newest)
+
+    def measure(version: str) -> Any:
+        where = releases.install(engine, version, folder.resolve())
+        return releases.measure_release(
+            engine, where, tests, limit=limit, time_limit=time_limit, catalogue=catalogue, workers=workers
+        )
+
+    ends = None if budget is None else time.monotonic() + 60.0 * budget
+    for line in progress(engine, chosen, measure, database, ends):
+        say(line)
+    if folder.exists():
+        taken = releases.size(folder) / MEGABYTE
+        say(
+            f"the releases in {folder} take {taken:.0f} MB; delete the folder when nothing is to be measured again"
+        )
+    _tell(engine, database, None, False)
+
+
+def progress(
+    engine: str,
+    chosen: Sequence[str],
+    measure: Callable[[str], Any],
+    database: str,
+    ends: float | None,
+) -> Iterator[str]:
+    """Measure and record each release; a line as each is done. `ends` is a reading of the monotonic clock."""
+    from spook_tracker.tracker.library import record
+    from spook_tracker.tracker.measure.releases import ReleaseError
+
     have = _recorded(database, engine)
-    measured: list[str] = []
     for place, version in enumerate(chosen, start=1):
         heading = f"[{place}/{len(chosen)}] {engine} {version}"
         if version in have:
-            say(f"{heading}: recorded already")
-            measured.append(version)
+            yield f"{heading}: recorded already"
             continue
+        began = time.monotonic()
+        if ends is not None and began >= ends:
+            yield f"{heading}: the time is up; the same command goes on from here"
+            return
         try:
-            where = releases.install(engine, version, folder.resolve())
-            document = releases.measure_release(
-                engine, where, tests, limit=limit, time_limit=time_limit, catalogue=catalogue, workers=workers
-            )
-        except releases.ReleaseError as error:
-            say(f"{heading}: {error}")
+            document = measure(version)
+            if document.engine.version != version:
+                raise ReleaseError(f"it says it is {document.engine.version!r}, so nothing is recorded")
+        except ReleaseError as error:
+            yield f"{heading}: {error}"
             continue
         record(document, database)
-        measured.append(version)
-        values = sum(sample.outcome == "value" for sample in document.samples)
-        say(f"{heading}: {values} of {len(document.samples)} values")
-    say("\n".join(changes(database, engine, measured)))
+        values = sum(sample.outcome in ("value", "unsettled") for sample in document.samples)
+        yield f"{heading}: {values} of {len(document.samples)} values in {time.monotonic() - began:.0f} s"
 
 
 def _recorded(database: str, engine: str) -> set[str]:
@@ -84,36 +121,31 @@ def _recorded(database: str, engine: str) -> set[str]:
         return {run.engine.version for run in History(session).runs() if run.engine.name == engine}
 
 
-def changes(database: str, engine: str, versions: list[str]) -> list[str]:
-    """What each release changed, worst first, as `tracker compare` judges it."""
+@click.command("releases", epilog=example("tracker releases mujoco --changelog docs/mujoco-changelog.toml"))
+@click.argument("engine")
+@click.option(
+    "--changelog",
+    metavar="FILE",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="What its makers say they changed (TOML): found, missed, and not in it.",
+)
+@click.option("--markdown", is_flag=True, help="Print a page, with every change.")
+@database_option
+def releases_command(engine: str, changelog: Path | None, markdown: bool, database: str) -> None:
+    """Say what each recorded release of an engine changed, without measuring anything."""
+    _tell(engine, database, changelog, markdown)
+
+
+def _tell(engine: str, database: str, changelog: Path | None, markdown: bool) -> None:
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import history_of
-    from spook_tracker.tracker.library import compare
+    from spook_tracker.tracker.cli.release_report import page, steps_between, text_lines
+    from spook_tracker.tracker.judge.release_notes import read_changelog
 
-    lines: list[str] = []
+    read = None if changelog is None else read_changelog(changelog)
     with history_of(database) as history:
-        for before, after in itertools.pairwise(versions):
-            found = compare(history, f"{engine}@{before}", f"{engine}@{after}")
-            told = [change for change in found.changes if _visible(change)]
-            lines.append(f"{engine} {after} after {before}: {len(told) or 'no'} changes")
-            lines += [f"  {change.word:<14} {change.series}  {_values(change)}" for change in told]
-    return lines
-
-
-def _visible(change: Any) -> bool:
-    """A change of class, or of value beyond rounding; run times of different nights say nothing here."""
-    if change.kind in ("time", "run_time") or change.before is None or change.after is None:
-        return False
-    if change.before_outcome != change.after_outcome:
-        return True
-    before, after = float(change.before), float(change.after)
-    return abs(after - before) > SEEN * max(abs(before), abs(after)) and abs(after - before) > 1e-12
-
-
-def _values(change: Any) -> str:
-    from spook_tracker.tracker.judge.standing import HAVE_VALUES
-
-    def word(value: Any, outcome: str) -> str:
-        return f"{float(value):.6g}" if outcome in HAVE_VALUES else outcome.replace("_", " ")
-
-    before = word(change.before, change.before_outcome)
-    return f"{before} -> {word(change.after, change.after_outcome)} {change.unit}"
+        runs, steps = steps_between(history, engine)
+        if markdown and steps:
+            say(page(engine, history, runs, steps, read).rstrip("\n"))
+        else:
+            say("\n".join(text_lines(engine, steps, read)))

@@ -30,7 +30,7 @@ class Standing:
     error: float | None  # magnitude at h = 1/60, the best configuration
     configuration: str
     seconds: tuple[float | None, ...]  # to reach each of ERRORS, the best configuration
-    outcome: str  # "value", or what became of the rung at h = 1/60 in every configuration
+    outcome: str  # "value", what became of the rung at h = 1/60 in every configuration, or that there is none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,8 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
             outcomes.append(sample.outcome)
             if sample.outcome == "value" and abs(sample.value) < best:
                 best, chosen = abs(sample.value), name
-    outcome = "value" if chosen else (outcomes[0] if outcomes else "not asked")
+    none = "no such step" if configurations else "not asked"
+    outcome = "value" if chosen else (outcomes[0] if outcomes else none)
     return Standing(
         test=test,
         ladder=ladder,

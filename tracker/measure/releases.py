@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from packaging.requirements import Requirement
 
 from spook_tracker.engine.find import EXTRAS
 from spook_tracker.tracker.document.errors import TrackerError
@@ -21,6 +24,7 @@ from spook_tracker.tracker.document.run_document import RunDocument
 
 OLD_NUMPY = "numpy<2"
 INSTALL_LIMIT, START_LIMIT = 600.0, 120.0  # s
+WORKS = "works"  # a file in a release's folder, once the release has started
 
 
 class ReleaseError(TrackerError):
@@ -47,30 +51,51 @@ def choose(known: Sequence[str], wanted: Sequence[str], newest: int | None) -> t
 
 
 def install(engine: str, version: str, folder: Path) -> Path:
-    """The folder that holds the release; what is there already is used again. Raises ReleaseError."""
+    """The folder that holds the release; what is there already is used again. Raises ReleaseError.
+
+    What a release pins to one version is a part of it and comes along; everything else is taken from here.
+    """
     place = folder / f"{engine}-{version}"
-    if (place / "works").exists():
+    if (place / WORKS).exists():
         return place
-    package = f"{_package(engine)}=={version}"
+    wanted = [f"{_package(engine)}=={version}"]
+    _put(place, wanted)
+    parts = _pinned(place)
+    if parts:
+        _put(place, parts)
     for extra in ((), (OLD_NUMPY,)):
-        done = _pip(
-            "install",
-            "--target",
-            str(place),
-            "--upgrade",
-            "--no-deps",
-            "--only-binary",
-            ":all:",
-            package,
-            *extra,
-        )
-        if done.returncode:
-            raise ReleaseError(f"{package} cannot be installed: {_last(done.stderr)}")
+        if extra:
+            _put(place, [*wanted, *parts, *extra])
         started = _python(place, "-c", f"from spook_tracker.engine.find import find; find({engine!r})")
         if started.returncode == 0:
-            (place / "works").touch()
+            (place / WORKS).touch()
             return place
-    raise ReleaseError(f"{package} is installed but does not start: {_last(started.stderr)}")
+    shutil.rmtree(place)
+    raise ReleaseError(f"{wanted[0]} is installed but does not start: {_last(started.stderr)}")
+
+
+def _put(place: Path, packages: Sequence[str]) -> None:
+    done = _pip(
+        "install", "--target", str(place), "--upgrade", "--no-deps", "--only-binary", ":all:", *packages
+    )
+    if done.returncode:
+        shutil.rmtree(place, ignore_errors=True)
+        raise ReleaseError(f"{packages[0]} cannot be installed: {_last(done.stderr)}")
+
+
+def _pinned(place: Path) -> list[str]:
+    """Requirements of what is installed here that name exactly one version: name==1.2.3."""
+    found = []
+    for file in sorted(place.glob("*.dist-info/METADATA")):
+        lines = file.read_text(encoding="utf-8").partition("\n\n")[0].splitlines()
+        needs = [Requirement(line.partition(":")[2]) for line in lines if line.startswith("Requires-Dist:")]
+        found += [str(one) for one in needs if str(one.specifier).startswith("==") and one.marker is None]
+    return found
+
+
+def size(place: Path) -> int:
+    """Bytes of all files in a folder."""
+    return sum(file.lstat().st_size for file in place.rglob("*") if not file.is_dir())
 
 
 def measure_release(

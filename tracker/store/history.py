@@ -27,6 +27,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.store import git, models, rows
 from spook_tracker.tracker.store.ancestry import commit_order
+from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
@@ -208,16 +209,11 @@ class History:
             commit: index for index, commit in enumerate(commit_order(age, parents, age.__getitem__, known))
         }
         last = len(place)
-        return tuple(
-            sorted(
-                runs,
-                key=lambda run: (
-                    place[run.engine.git_hash] if run.ordered else last,
-                    run.started_at,
-                    run.id,
-                ),
-            )
+        ordered = sorted(
+            runs,
+            key=lambda run: (place[run.engine.git_hash] if run.ordered else last, run.started_at, run.id),
         )
+        return tuple(in_release_order(ordered))
 
     def _read_names(self) -> dict[int, str]:
         """Series id to the key the series has today: renames followed to their end."""

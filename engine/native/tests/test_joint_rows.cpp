@@ -13,8 +13,9 @@ std::mt19937 generator(3);
 double random_number() { return std::uniform_real_distribution<double>(-1.0, 1.0)(generator); }
 Vec3 random_vector() { return {random_number(), random_number(), random_number()}; }
 
-const JointKind kKinds[] = {JointKind::distance, JointKind::lock,      JointKind::ball,
-                            JointKind::hinge,    JointKind::prismatic, JointKind::universal};
+const JointKind kKinds[] = {JointKind::distance,      JointKind::lock,        JointKind::ball,
+                            JointKind::hinge,         JointKind::prismatic,   JointKind::universal,
+                            JointKind::point_on_line, JointKind::cylindrical, JointKind::planar};
 
 struct Pair {
     RigidBodySpec specs[2];

@@ -53,12 +53,79 @@ private:
     std::size_t read_ = 0;
 };
 
+/// A run one holds, for bind_program().
+template <class System>
+void bind_held(nb::module_& m, nb::class_<Program<System>>& program, const char* snapshot) {
+    using Compiled = Program<System>;
+    nb::class_<typename Compiled::Snapshot>(m, snapshot, "Where a held run is; only a run can make one.")
+        .def_ro("steps", &Compiled::Snapshot::steps, "steps from the start");
+    program
+        .def(
+            "start",
+            [](Compiled& held, const std::vector<double>& state) {
+                nb::gil_scoped_release release;
+                held.start(state);
+            },
+            nb::arg("state"), "Back to the start, or to a flat (bodies, 13) state; empty: the scene's own.")
+        .def(
+            "advance",
+            [](Compiled& held, std::int64_t steps, double time_limit) {
+                RunReport report;
+                {
+                    nb::gil_scoped_release release;
+                    report = held.advance(steps, time_limit);
+                }
+                return to_dict(report);
+            },
+            nb::arg("steps"), nb::arg("time_limit"),
+            "So many steps on, the GIL released; a dict as of run().")
+        .def(
+            "read",
+            [](Compiled& held) {
+                RunReport report;
+                held.read(report);
+                return to_dict(report);
+            },
+            "The observables, final_state and counters as they are now; changes nothing.")
+        .def("keep", &Compiled::keep, "Where the run is, to go back to.")
+        .def("go_back", &Compiled::go_back, nb::arg("snapshot"), "Go on from there, with the same bits.")
+        .def(
+            "set_load",
+            [](Compiled& held, int body, const Point& force, const Point& torque) {
+                if constexpr (requires { held.system().set_motor(0, 0.0, 0.0); })
+                    held.system().set_load(body, to_vec(force), to_vec(torque));
+                else held.system().set_load(body, to_vec(force));
+            },
+            nb::arg("body"), nb::arg("force"), nb::arg("torque"), "The whole load on a body from now on.");
+    if constexpr (requires(Compiled& held) { held.system().set_motor(0, 0.0, 0.0); })
+        program
+            .def(
+                "set_motor",
+                [](Compiled& held, int joint, double speed, double max_force) {
+                    held.system().set_motor(joint, speed, max_force);
+                },
+                nb::arg("joint"), nb::arg("speed"), nb::arg("max_force"), "What a motor does from now on.")
+            .def(
+                "set_rest",
+                [](Compiled& held, int joint, double rest) { held.system().set_rest(joint, rest); },
+                nb::arg("joint"), nb::arg("rest"), "Where a joint's spring pulls from now on.")
+            .def(
+                "set_velocity",
+                [](Compiled& held, int body, const Point& velocity, const Point& angular_velocity) {
+                    held.system().set_velocity(body, to_vec(velocity), to_vec(angular_velocity));
+                },
+                nb::arg("body"), nb::arg("velocity"), nb::arg("angular_velocity"),
+                "How a kinematic body moves from now on.");
+}
+
 /// A pipeline's program as a Python class; `make` is its __init__.
 template <class System, class Make, class... Extra>
-void bind_program(nb::module_& m, const char* name, const char* doc, Make make, const Extra&... extra) {
+void bind_program(nb::module_& m, const char* name, const char* snapshot, const char* doc, Make make,
+                  const Extra&... extra) {
     using Compiled = Program<System>;
-    nb::class_<Compiled>(m, name, doc)
-        .def("__init__", make, extra...)
+    nb::class_<Compiled> program(m, name, doc);
+    bind_held<System>(m, program, snapshot);
+    program.def("__init__", make, extra...)
         .def(
             "run",
             [](Compiled& program, std::int64_t steps, double time_limit, bool timed) {

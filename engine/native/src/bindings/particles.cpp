@@ -46,10 +46,11 @@ void read_rows(const nb::dict& rows, ParticleScene& scene) {
 }
 
 void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, const nb::dict& springs,
-          const nb::dict& fields, const Point& gravity, const nb::dict& method,
+          const nb::dict& fields, const Point& gravity, const nb::dict& method, bool loads_change,
           const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
     ParticleScene scene;
     scene.gravity = to_vec(gravity);
+    scene.loads_change = loads_change;
     scene.method = to_method(method);
     read_bodies(bodies, scene);
     read_rows(rows, scene);
@@ -62,9 +63,9 @@ void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, c
 
 void bind_particles(nb::module_& m) {
     bind_program<ParticleSystem>(
-        m, "ParticleProgram", "A compiled scene of particles.", &make, nb::arg("bodies"), nb::arg("rows"),
-        nb::arg("springs"), nb::arg("fields"), nb::arg("gravity"), nb::arg("method"), nb::arg("quantities"),
-        nb::arg("observations"),
+        m, "ParticleProgram", "ParticleSnapshot", "A compiled scene of particles.", &make, nb::arg("bodies"),
+        nb::arg("rows"), nb::arg("springs"), nb::arg("fields"), nb::arg("gravity"), nb::arg("method"),
+        nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
         "Tables are dicts of columns, a row each. bodies: mass, position, velocity, load. rows and springs:\n"
         "first, second (body or -1), first_point, second_point (of ends that are no body), rest_length, and\n"
         "compliance, damping, or stiffness, viscosity. fields: strength, centre.");

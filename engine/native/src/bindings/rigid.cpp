@@ -40,7 +40,8 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
                   first_point = table.numbers("first_point", 3),
                   second_point = table.numbers("second_point", 3), axes = table.numbers("axes", 9),
                   length = table.numbers("rest_length"), compliance = table.numbers("compliance", 6),
-                  damping = table.numbers("damping", 6);
+                  damping = table.numbers("damping", 6), one_sided = table.numbers("one_sided"),
+                  restitution = table.numbers("restitution");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& joint = scene.joints.emplace_back();
         joint.kind = kind[i];
@@ -50,6 +51,8 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
         joint.second_point = second_point.vec(i);
         for (std::size_t k = 0; k < 3; ++k) joint.axes[k] = axes.vec(i, k);
         joint.rest_length = length[i];
+        joint.one_sided = one_sided.flag(i);
+        joint.restitution = restitution[i];
         std::copy_n(compliance.at(i), 6, joint.compliance.begin());
         std::copy_n(damping.at(i), 6, joint.damping.begin());
     }
@@ -100,15 +103,16 @@ void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_colliders(const nb::dict& colliders, RigidScene& scene) {
-    Columns table(colliders, "colliders");
+std::vector<Collider> read_colliders(const nb::dict& colliders, const char* name) {
+    std::vector<Collider> read;
+    Columns table(colliders, name);
     const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
     const Numbers body = table.numbers("body"), position = table.numbers("position", 3),
                   orientation = table.numbers("orientation", 4), radius = table.numbers("radius"),
                   length = table.numbers("length"), size = table.numbers("size", 3),
                   normal = table.numbers("normal", 3);
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        Collider& collider = scene.colliders.emplace_back();
+        Collider& collider = read.emplace_back();
         collider.body = body.index(i);
         collider.part = {position.vec(i), rotation(orientation.quat(i))};
         switch (kind[i]) {
@@ -119,6 +123,61 @@ void read_colliders(const nb::dict& colliders, RigidScene& scene) {
         }
     }
     table.expect_all_read();
+    return read;
+}
+
+void read_terms(const nb::dict& terms, RigidScene& scene) {
+    Columns table(terms, "terms");
+    const Numbers relation = table.numbers("relation"), joint = table.numbers("joint"),
+                  coefficient = table.numbers("coefficient");
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.joints.at(relation.index(i)).terms.push_back({joint.index(i), coefficient[i]});
+    table.expect_all_read();
+}
+
+void read_wire_points(const nb::dict& points, RigidScene& scene) {
+    Columns table(points, "wire_points");
+    const Numbers wire = table.numbers("wire"), body = table.numbers("body"),
+                  point = table.numbers("point", 3);
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.joints.at(wire.index(i)).points.push_back({body.index(i), point.vec(i)});
+    table.expect_all_read();
+}
+
+void read_fluids(const nb::dict& fluids, RigidScene& scene) {
+    Columns table(fluids, "fluids");
+    const Numbers density = table.numbers("density"), level = table.numbers("level"),
+                  up = table.numbers("up", 3), velocity = table.numbers("velocity", 3),
+                  drag = table.numbers("drag");
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.fluids.push_back({density[i], level[i], up.vec(i), velocity.vec(i), drag[i]});
+    table.expect_all_read();
+}
+
+/// Functions of time, and the knots of those that are tables.
+void read_drives(const nb::dict& drives, const nb::dict& knots, RigidScene& scene) {
+    Columns table(drives, "drives");
+    const std::vector<DriveKind> kind = table.kinds<DriveKind>("kind", "drive");
+    const std::vector<TimeKind> function = table.kinds<TimeKind>("function", "function of time");
+    const Numbers index = table.numbers("index"), linear = table.numbers("linear", 3),
+                  angular = table.numbers("angular", 3), offset = table.numbers("offset"),
+                  amplitude = table.numbers("amplitude"), rate = table.numbers("rate"),
+                  phase = table.numbers("phase");
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.drives.push_back({kind[i],
+                                index.index(i),
+                                linear.vec(i),
+                                angular.vec(i),
+                                {function[i], offset[i], amplitude[i], rate[i], phase[i], {}, {}}});
+    table.expect_all_read();
+    Columns rows(knots, "knots");
+    const Numbers drive = rows.numbers("drive"), time = rows.numbers("time"), value = rows.numbers("value");
+    for (std::size_t i = 0; i < rows.rows(); ++i) {
+        TimeFunction& of = scene.drives.at(drive.index(i)).function;
+        of.times.push_back(time[i]);
+        of.values.push_back(value[i]);
+    }
+    rows.expect_all_read();
 }
 
 void read_no_contact(const nb::dict& no_contact, RigidScene& scene) {
@@ -155,11 +214,14 @@ RigidMethod to_method(const nb::dict& method) {
 
 void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, const nb::dict& motors,
           const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& springs,
-          const nb::dict& fields, const nb::dict& colliders, const nb::dict& no_contact, bool contacts,
-          const Point& gravity, const nb::dict& method, const std::vector<QuantityRequest>& quantities,
+          const nb::dict& terms, const nb::dict& wire_points, const nb::dict& fields, const nb::dict& fluids,
+          const nb::dict& floaters, const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
+          const nb::dict& no_contact, bool contacts, const Point& gravity, const nb::dict& method,
+          bool loads_change, const std::vector<QuantityRequest>& quantities,
           const std::vector<Observation>& observations) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
+    scene.loads_change = loads_change;
     scene.contacts = contacts;
     scene.method = to_method(method);
     read_bodies(bodies, scene);
@@ -169,7 +231,12 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_joint_springs(joint_springs, scene);
     scene.springs = read_springs(springs);
     scene.fields = read_fields(fields);
-    read_colliders(colliders, scene);
+    read_terms(terms, scene);
+    read_wire_points(wire_points, scene);
+    read_fluids(fluids, scene);
+    read_drives(drives, knots, scene);
+    scene.floaters = read_colliders(floaters, "floaters");
+    scene.colliders = read_colliders(colliders, "colliders");
     read_no_contact(no_contact, scene);
     new (self) RigidProgram(scene, quantities, observations);
 }
@@ -178,10 +245,12 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
 
 void bind_rigid(nb::module_& m) {
     bind_program<RigidSystem>(
-        m, "RigidProgram", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"), nb::arg("joints"),
-        nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"), nb::arg("springs"), nb::arg("fields"),
-        nb::arg("colliders"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
-        nb::arg("method"), nb::arg("quantities"), nb::arg("observations"),
+        m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"),
+        nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"), nb::arg("springs"),
+        nb::arg("terms"), nb::arg("wire_points"), nb::arg("fields"), nb::arg("fluids"), nb::arg("floaters"),
+        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("no_contact"), nb::arg("contacts"),
+        nb::arg("gravity"), nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"),
+        nb::arg("observations"),
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits and\n"
         "joint_springs name the joint they drive.");

@@ -25,10 +25,8 @@ public:
     std::int64_t newton_iterations() const noexcept { return state_.newton_iterations; }
     std::int64_t halved_steps() const noexcept { return state_.halved_steps; }
     std::int64_t stages() const noexcept { return static_cast<std::int64_t>(gammas_.size()); }
-    void save() { saved_ = state_; }
-    void restore() { state_ = saved_; }
 
-private:
+    /// What a later step depends on, besides the nodes.
     struct State {
         double pending = 0.0;          // s: half a stage still to be kicked (with rows) or drifted (without)
         std::int64_t stage_steps = 0;  // steps the history has seen
@@ -37,6 +35,10 @@ private:
         std::vector<double> history;  // stages × three steps × rows, N
     };
 
+    const State& state() const noexcept { return state_; }
+    void go_back(const State& state) { state_ = state; }
+
+private:
     void drift_kick(double tau) noexcept;
     void find_kicks() noexcept;
     void constrained_step(double length, int depth);
@@ -56,7 +58,7 @@ private:
     const ParticleSolver solver_;
     const double h_;                  // s, of a step
     std::span<const double> gammas_;  // lengths of the stages, in steps
-    State state_, saved_;
+    State state_;
     static constexpr int MOST_HALVINGS = 12;
     std::vector<Vec3> step_x_[MOST_HALVINGS], step_v_[MOST_HALVINGS];  // where each step began
     std::vector<double> upper_;    // super-diagonal of the Newton matrix of paths, per row

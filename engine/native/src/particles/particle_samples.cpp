@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace spook {
 
@@ -41,25 +42,41 @@ Health ParticleSystem::health() const noexcept {
     return health;
 }
 
-void ParticleSystem::save() {
-    saved_.x = nodes_.x;
-    saved_.v = nodes_.v;
-    saved_.lambda.resize(rows_.size());
-    for (std::size_t k = 0; k < rows_.size(); ++k) saved_.lambda[k] = rows_.link[k].lambda;
-    saved_.velocity_ready = velocity_ready_;
-    saved_.sweeps = parts_.sweeps.work;
-    saved_.redundancy = parts_.saddle.memory();
-    if (composition_) composition_->save();
+void ParticleSystem::keep(Memory& memory) const {
+    memory.x = nodes_.x;
+    memory.v = nodes_.v;
+    memory.lambda.resize(rows_.size());
+    for (std::size_t k = 0; k < rows_.size(); ++k) memory.lambda[k] = rows_.link[k].lambda;
+    memory.velocity_ready = velocity_ready_;
+    memory.sweeps = parts_.sweeps.work;
+    memory.redundancy = parts_.saddle.memory();
+    if (composition_) memory.composition = composition_->state();
 }
 
-void ParticleSystem::restore() {
-    nodes_.x = saved_.x;
-    nodes_.v = saved_.v;
-    for (std::size_t k = 0; k < rows_.size(); ++k) rows_.link[k].lambda = saved_.lambda[k];
-    velocity_ready_ = saved_.velocity_ready;
-    parts_.sweeps.work = saved_.sweeps;
-    parts_.saddle.restore(saved_.redundancy);
-    if (composition_) composition_->restore();
+void ParticleSystem::go_back(const Memory& memory) {
+    nodes_.x = memory.x;
+    nodes_.v = memory.v;
+    for (std::size_t k = 0; k < rows_.size(); ++k) rows_.link[k].lambda = memory.lambda[k];
+    velocity_ready_ = memory.velocity_ready;
+    parts_.sweeps.work = memory.sweeps;
+    parts_.saddle.restore(memory.redundancy);
+    if (composition_) composition_->go_back(memory.composition);
+}
+
+void ParticleSystem::place(std::span<const double> state) {
+    for (std::size_t body = 0; body < scene_.bodies.size(); ++body) {
+        const double* s = state.data() + 13 * body;
+        scene_.bodies[body].position = {s[0], s[1], s[2]};
+        scene_.bodies[body].velocity = {s[7], s[8], s[9]};
+    }
+}
+
+void ParticleSystem::set_load(int body, Vec3 force) {
+    if (!stages_.runs(Stage::apply_loads)) throw std::invalid_argument("loads need the stage apply_loads");
+    const int node = nodes_.of_body[body];
+    const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? scene_.gravity : Vec3{};
+    nodes_.steady_kick[node] = parts_.h * (gravity + nodes_.w[node] * force);
+    if (!parts_.forces.any()) nodes_.kick = nodes_.steady_kick;
 }
 
 void ParticleSystem::count(RunReport& report, std::int64_t steps) const {

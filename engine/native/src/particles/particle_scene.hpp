@@ -44,7 +44,8 @@ struct ParticleScene {
     std::vector<DistanceRow> rows;
     std::vector<SpringForce> springs;
     std::vector<CentralField> fields;
-    Vec3 gravity;  // m/s²
+    Vec3 gravity;               // m/s²
+    bool loads_change = false;  // loads are set while it runs, whatever they are at the start
     ParticleMethod method;
 };
 

@@ -26,8 +26,9 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
     const std::vector<Path> paths = find_paths(scene);
     const bool held_twice = std::any_of(paths.begin(), paths.end(),
                                         [&](const Path& path) { return rigid_between_anchors(scene, path); });
-    const bool loaded = std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                                    [](const ParticleBody& body) { return !is_zero(body.load); });
+    const bool loaded =
+        scene.loads_change || std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                                          [](const ParticleBody& body) { return !is_zero(body.load); });
     const bool composed = method.composition > 2;
     const std::string no_rows = "no constraints, so nothing to solve";
     const std::string no_contacts = "particles have no surface, so no contact is possible";
@@ -57,8 +58,13 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
                                  "there are no springs");
             case Stage::apply_loads:
                 return choose_if(
-                    loaded, "constant loads act; with gravity they are one kick, found before the first step",
+                    loaded,
+                    scene.loads_change
+                        ? "loads may be set while it runs; with gravity they are one kick"
+                        : "constant loads act; with gravity they are one kick, found before the first step",
                     "there are no loads");
+            case Stage::follow_time: return leave_out("nothing is given as a function of time");
+            case Stage::apply_fluids: return leave_out("particles displace no fluid");
             case Stage::string_stiffness:
                 return choose_if(method.string_stiffness && block,
                                  "the method treats the transverse stiffness of taut distances implicitly",

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "particles/particle_composition.hpp"
@@ -36,8 +37,17 @@ public:
     void advance(std::int64_t steps);
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const noexcept;
-    void save();
-    void restore();
+    void save() { keep(saved_); }
+    void restore() { go_back(saved_); }
+    class Memory;
+    /// All that the coming steps depend on, loads apart; going back to it gives the bits of going on from it.
+    void keep(Memory& memory) const;
+    void go_back(const Memory& memory);
+
+    // What may be set between steps, from outside; reset() takes nothing of it back.
+    /// Where the next reset() begins: 13 numbers per body, as final_state() gives them.
+    void place(std::span<const double> state);
+    void set_load(int body, Vec3 force);
     std::int64_t block() const noexcept { return block_; }
 
     /// Back to the start state; `clock` null means stages are not timed.
@@ -55,6 +65,16 @@ public:
     double tension(int row) const noexcept { return -seen_.lambda[rows_.slot[row]] / parts_.h; }
     double kinetic_energy() const noexcept;
     double potential_energy() const noexcept;
+
+    class Memory {
+        friend class ParticleSystem;
+        std::vector<Vec3> x, v;
+        std::vector<double> lambda;
+        bool velocity_ready = false;
+        RowSweeps::Work sweeps;
+        RedundantRows::Memory redundancy;
+        ParticleComposition::State composition;
+    };
 
 private:
     void lay_out_paths(const std::vector<Path>& paths);
@@ -95,13 +115,7 @@ private:
     bool velocity_ready_ = false;  // the velocity stage of the coming step is already done
     std::int64_t block_ = 1024;
     Seen seen_;
-    struct Snapshot {
-        std::vector<Vec3> x, v;
-        std::vector<double> lambda;
-        bool velocity_ready = false;
-        RowSweeps::Work sweeps;
-        RedundantRows::Memory redundancy;
-    } saved_;
+    Memory saved_;
     StageClock* clock_ = nullptr;
 };
 

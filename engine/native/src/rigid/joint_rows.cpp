@@ -102,19 +102,19 @@ void assemble_joint(const JointConstants& joint, const BodyState& first, const B
                  second.angular_velocity - first.angular_velocity};
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
-    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
-        write.linear(axes[k], dot(axes[k], ends.gap));
-    if (joint.kind == JointKind::ball) return;
+    const JointHolds holds = holds_of(joint.kind);
+    for (int k = holds.linear_first; k < holds.linear_end; ++k) write.linear(axes[k], dot(axes[k], ends.gap));
+    if (holds.turning == Turning::free) return;
     const Quat q = relative_turn(first, second);
     const Vec3 e{q.x, q.y, q.z};
-    if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
+    if (holds.turning == Turning::held) {
         const Vec3 world = carried(first, e);
         for (int k = 0; k < 3; ++k)
             write.angular(q.w * axes[k] + cross(world, axes[k]), 2.0 * dot(joint.axes[k], e));
         return;
     }
     const Mat3 tilt = rotation_less_one(q);
-    if (joint.kind == JointKind::hinge) {
+    if (holds.turning == Turning::swing) {
         const Vec3 moved = tilt * joint.axes[0];  // how far the second body's axis has left the first's
         const Vec3 axis = carried(second, joint.axes[0]);
         // n × axis for the two normals: n1 × a = −n2 and n2 × a = n1.
@@ -133,16 +133,17 @@ void joint_violation(const JointConstants& joint, const BodyState& first, const 
         *out = stretch(joint, ends.gap, length);
         return;
     }
-    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
+    const JointHolds holds = holds_of(joint.kind);
+    for (int k = holds.linear_first; k < holds.linear_end; ++k)
         *out++ = dot(carried(first, joint.axes[k]), ends.gap);
-    if (joint.kind == JointKind::ball) return;
+    if (holds.turning == Turning::free) return;
     const Quat q = relative_turn(first, second);
-    if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
+    if (holds.turning == Turning::held) {
         for (int k = 0; k < 3; ++k) *out++ = 2.0 * dot(joint.axes[k], Vec3{q.x, q.y, q.z});
         return;
     }
     const Mat3 tilt = rotation_less_one(q);
-    if (joint.kind == JointKind::hinge) {
+    if (holds.turning == Turning::swing) {
         const Vec3 moved = tilt * joint.axes[0];
         *out++ = -dot(joint.axes[2], moved);
         *out++ = dot(joint.axes[1], moved);
@@ -167,11 +168,12 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
     }
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
-    for (int k = joint.kind == JointKind::prismatic ? 1 : 0; k < 3; ++k)
+    const JointHolds holds = holds_of(joint.kind);
+    for (int k = holds.linear_first; k < holds.linear_end; ++k)
         *bias++ =
             dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), parting) + dot(spun(w1, axes[k]), ends.gap);
-    if (joint.kind == JointKind::ball) return;
-    if (joint.kind == JointKind::lock || joint.kind == JointKind::prismatic) {
+    if (holds.turning == Turning::free) return;
+    if (holds.turning == Turning::held) {
         // q = t₁* t₂ with t' = ½ w t gives q'' = ¼ t₁* (d w₂ − w₁ d) t₂, d = w₂ − w₁.
         const Vec3 d = w2 - w1;
         const Quat inner = {dot(w1, d) - dot(d, w2), 0, 0, 0};
@@ -185,7 +187,7 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
     const auto angle_bias = [&](Vec3 a, Vec3 b) {  // of a · b, a carried by the first body, b by the second
         return dot(spun(w1, a), b) + 2.0 * dot(cross(w1, a), cross(w2, b)) + dot(a, spun(w2, b));
     };
-    if (joint.kind == JointKind::hinge) {
+    if (holds.turning == Turning::swing) {
         const Vec3 axis = carried(second, joint.axes[0]);
         *bias++ = -angle_bias(axes[2], axis);
         *bias++ = angle_bias(axes[1], axis);

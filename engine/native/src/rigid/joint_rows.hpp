@@ -32,7 +32,7 @@ JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
 /// - translation: the second end's point minus the first's, along the joint's axes;
 /// - lock and prismatic rotation: 2 × the vector part of the relative quaternion, along the joint's axes, with
 ///   its exact derivative, so that a compliant row is a linear spring to O(angle³) and does no work on its own;
-/// - hinge: axis × (axis as the second body carries it), along both normals;
+/// - hinge, cylindrical and planar: axis × (axis as the second body carries it), along both normals;
 /// - universal: axis · (cross axis as the second body carries it);
 /// - distance: |d| − rest length, free of cancellation.
 /// The reaction acts at the second body's point on both bodies, so momenta are conserved for any violation.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 namespace spook {
 
@@ -17,10 +18,18 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         joint.constants = constants_of(spec, start(spec.first), start(spec.second));
         joint.first = spec.first;
         joint.second = spec.second;
+        if (spec.kind == JointKind::relation || spec.kind == JointKind::wire) {
+            General general = general_of(scene, spec);
+            joint.first = general.bodies.empty() ? -1 : general.bodies[0];
+            joint.second = general.bodies.size() < 2 ? -1 : general.bodies[1];
+            joint.general = static_cast<int>(generals_.size());
+            gradient_.resize(std::max<std::size_t>({gradient_.size(), 12, 6 * general.bodies.size()}));
+            generals_.push_back(std::move(general));
+        }
         JointBlock block;
         block.joint = static_cast<int>(joints_.size());
-        block.first = spec.first;
-        block.second = spec.second;
+        block.first = joint.first;
+        block.second = joint.second;
         block.size = joint.constants.rows;
         for (int k = 0; k < block.size; ++k) {
             const Regularisation row = regularise(spec.compliance[k], spec.damping[k], time_step);
@@ -63,6 +72,8 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         joints_.push_back(joint);
     }
     states.resize(joints_.size());
+    for (const General& general : generals_)
+        for (const RelationTerm& term : general.terms) track(term.joint);
 }
 
 void JointSet::assemble(int index, std::span<const BodyState> bodies, double* first, double* second,
@@ -73,6 +84,7 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
     right.lower.fill(-kUnbounded);
     right.upper.fill(kUnbounded);
     if (block.axial) return assemble_axial(joint, state, bodies, first, second, right);
+    if (joint.general >= 0) return assemble_general(joint, state, bodies, first, second, right);
     JointRows rows{first, second, {}, {}};
     assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows,
                    state.first_reach, state.second_reach);
@@ -114,22 +126,30 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         if (axial.lower == axial.upper) {
             next(held);
         } else {
-            const double inwards = low ? 1.0 : -1.0, gap = inwards * violation,
-                         approach = -inwards * row.rate;
-            const bool open = gap > 0.0, hit = approach > 0.0 && !state.at_limit;
-            double value = open ? -violation / time_step_ : held;
-            if (axial.restitution > 0.0 && (open ? time_step_ * approach > gap : hit))
-                value = inwards * axial.restitution * approach;
-            else if (!open &&
-                     hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
-                value = -r.violation_gain * violation;
-            state.at_limit = !open;
+            const double inwards = low ? 1.0 : -1.0;
+            const double value = one_sided(inwards, violation, row.rate, r, axial.restitution, state);
             (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
-    if (axial.has_spring)
-        next(axial.spring.upsilon * row.rate -
-             axial.spring.violation_gain * (state.angle - axial.spring_rest));
+    if (!axial.has_spring) return;
+    const double rest = axial.spring.violation_gain * (state.angle - axial.spring_rest);
+    // A rest r(t) in the averaged law: G v₊ − r'₊ in place of G v₊, G v − r'₋ in place of G v.
+    next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) - rest + axial.rest_ahead
+                          : axial.spring.upsilon * row.rate - rest);
+}
+
+/// The right side of a row that only pushes `inwards`.
+double JointSet::one_sided(double inwards, double violation, double rate, const Regularisation& row,
+                           double restitution, State& state) const noexcept {
+    const double gap = inwards * violation, approach = -inwards * rate;
+    const bool open = gap > 0.0, hit = approach > 0.0 && !state.at_limit;
+    double value = open ? -violation / time_step_ : row.upsilon * rate - row.violation_gain * violation;
+    if (restitution > 0.0 && (open ? time_step_ * approach > gap : hit))
+        value = inwards * restitution * approach;
+    else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
+        value = -row.violation_gain * violation;
+    state.at_limit = !open;
+    return value;
 }
 
 JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
@@ -139,8 +159,9 @@ JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
     const JointConstants& c = joint.constants;
     const auto& gain = joint.gain[row];
     const double relaxation = 0.25 * (1.0 / gain.upsilon - 1.0);
-    if (c.kind == JointKind::distance) return {gain.violation, relaxation, c.rest_length};
-    const bool linear = row < (c.kind == JointKind::prismatic ? 2 : 3);
+    if (c.kind == JointKind::distance || c.kind == JointKind::wire)
+        return {gain.violation, relaxation, c.rest_length};
+    const bool linear = row < holds_of(c.kind).linear();
     const double arms = norm(c.first_arm) + norm(c.second_arm);
     return {gain.violation, relaxation, linear && arms > 0.0 ? arms : 1.0};
 }
@@ -149,12 +170,20 @@ void JointSet::bias(int index, std::span<const BodyState> bodies, double* out) c
     const JointBlock& block = blocks_[index];
     const Joint& joint = joints_[block.joint];
     const BodyState &first = body(joint.first, bodies), &second = body(joint.second, bodies);
+    if (joint.general >= 0) {
+        *out = general_bias(generals_[joint.general], bodies);
+        return;
+    }
     if (!block.axial) return joint_bias(joint.constants, first, second, out);
     std::fill_n(out, block.size, axial_bias(joint.constants, first, second));
 }
 
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {
     const Joint& joint = joints_[index];
+    if (joint.general >= 0) {
+        *out = along(generals_[joint.general], bodies, nullptr).violation;
+        return;
+    }
     joint_violation(joint.constants, body(joint.first, bodies), body(joint.second, bodies), out);
 }
 
@@ -162,6 +191,29 @@ double JointSet::coordinate(int index, std::span<const BodyState> bodies) const 
     const Joint& joint = joints_[index];
     const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
     return joint.tracked ? unwrapped(joint, row.coordinate, states[index].angle) : row.coordinate;
+}
+
+void JointSet::set_motor(int joint, double speed, double max_force) {
+    Axial& axial = axials_.at(joints_.at(joint).axial);
+    if (!axial.has_motor || std::isfinite(axial.impulse) != std::isfinite(max_force))
+        throw std::invalid_argument("a motor keeps its kind: with a bound or without");
+    axial.speed = speed;
+    axial.impulse = time_step_ * max_force;
+}
+
+void JointSet::set_rest(int joint, double rest) {
+    Axial& axial = axials_.at(joints_.at(joint).axial);
+    if (!axial.has_spring) throw std::invalid_argument("the joint has no spring");
+    axial.spring_rest = rest;
+    axial.rest_moves = false;
+}
+
+void JointSet::set_moving_rest(int joint, double rest, double before, double ahead) {
+    set_rest(joint, rest);
+    Axial& axial = axials_[joints_[joint].axial];
+    axial.rest_moves = true;
+    axial.rest_before = before;
+    axial.rest_ahead = ahead;
 }
 
 double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept {

@@ -1,6 +1,7 @@
 // All joints of a scene: their blocks of rows, right sides and readable forces.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <span>
@@ -44,9 +45,12 @@ public:
     std::span<const JointBlock> blocks() const noexcept { return blocks_; }
     int count() const noexcept { return static_cast<int>(joints_.size()); }
     int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
-    bool is_distance(int joint) const noexcept {
-        return joints_[joint].constants.kind == JointKind::distance;
-    }
+    JointKind kind(int joint) const noexcept { return joints_[joint].constants.kind; }
+    bool is_distance(int joint) const noexcept { return kind(joint) == JointKind::distance; }
+    /// The bodies of a block beyond its first two: relations and wires may have more.
+    std::span<const int> others(int block) const noexcept;
+    /// Their Jacobians, a row of six each, as the last assemble() found them.
+    const double* other_rows() const noexcept { return gradient_.data() + 12; }
 
     /// Writes the Jacobians of a block (rows × 6 each; the memory holds zeros or an earlier call's values) and
     /// its right side without the share of bodies that move by themselves.
@@ -69,8 +73,10 @@ public:
     double coordinate(int joint, std::span<const BodyState> bodies) const noexcept;
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept {
+        if (joints_[joint].axial < 0 &&
+            std::find(followed_.begin(), followed_.end(), joint) == followed_.end())
+            followed_.push_back(joint);
         joints_[joint].tracked = true;
-        if (joints_[joint].axial < 0) followed_.push_back(joint);
     }
     /// Counts the turns of tracked hinges that no drive follows anyway; after every step.
     void follow(std::span<const BodyState> bodies) noexcept {
@@ -79,12 +85,21 @@ public:
     /// Energy of the springs of free coordinates [J].
     double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
+    void set_speed(int joint, double speed) noexcept { axials_[joints_[joint].axial].speed = speed; }
+    /// A new target of a motor whose force stays bounded or unbounded, as it was.
+    void set_motor(int joint, double speed, double max_force);
+    /// A new rest of a spring of a free coordinate; the second: one that moves with the time, with its speeds over
+    /// the step before and the coming one.
+    void set_rest(int joint, double rest);
+    void set_moving_rest(int joint, double rest, double before, double ahead);
+
     LargeArray<State> states;
 
 private:
     struct Joint {
         JointConstants constants;
         int first = -1, second = -1, axial = -1;  // axial: index into axials_
+        int general = -1;                         // of a relation or a wire: index into generals_
         bool tracked = false;
         struct {
             double upsilon, violation;
@@ -94,12 +109,37 @@ private:
         bool has_motor = false, has_limit = false, has_spring = false;
         double speed = 0.0, impulse = 0.0;
         double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0, spring_stiffness = 0.0;
+        bool rest_moves = false;  // then, over the step before and this one, m/s or rad/s:
+        double rest_before = 0.0, rest_ahead = 0.0;
         Regularisation limit, spring;
+    };
+    /// One row over any number of bodies: a relation between free coordinates, or the length of a wire.
+    struct General {
+        std::vector<RelationTerm> terms;
+        struct Point {
+            int body;
+            Vec3 start, arm;  // world place at the start, and seen from the body's centre
+        };
+        std::vector<Point> points;
+        std::vector<int> bodies;  // that are not fixed, in the order of first mention
+        double length = 0.0, restitution = 0.0;
+        bool one_sided = false;
+        Regularisation row;
+    };
+    struct Along {
+        double violation = 0.0, rate = 0.0;
     };
 
     const BodyState& body(int index, std::span<const BodyState> bodies) const noexcept {
         return index < 0 ? world_ : bodies[index];
     }
+    General general_of(const RigidScene& scene, const JointSpec& spec) const;
+    Along along(const General& general, std::span<const BodyState> bodies, double* gradient) const noexcept;
+    double general_bias(const General& general, std::span<const BodyState> bodies) const noexcept;
+    void assemble_general(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
+                          double* second, BlockRight& right) noexcept;
+    double one_sided(double inwards, double violation, double rate, const Regularisation& row,
+                     double restitution, State& state) const noexcept;
     double unwrapped(const Joint& joint, double angle, double near) const noexcept;
     void assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                         double* second, BlockRight& right) noexcept;
@@ -108,6 +148,8 @@ private:
     BodyState world_;
     LargeArray<Joint> joints_;
     std::vector<Axial> axials_;
+    std::vector<General> generals_;
+    std::vector<double> gradient_;  // of one general row: six per body
     std::vector<int> followed_;
     LargeArray<JointBlock> blocks_;
 };

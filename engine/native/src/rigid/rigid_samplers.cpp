@@ -21,7 +21,11 @@ Sampler joint_sampler(const RigidSystem* s, int joint, bool force) {
                     for (int distance : all) read_distance(distance, out++);
                 }};
     }
-    if (s->joints().is_distance(joint)) return {1, [=](double* out) { read_distance(joint, out); }};
+    const JointKind kind = s->joints().kind(joint);
+    if (kind == JointKind::relation && force)  // what a coordinate of coefficient 1 feels
+        return {1, [=](double* out) { *out = -s->tension(joint); }};
+    if (kind == JointKind::distance || kind == JointKind::relation || kind == JointKind::wire)
+        return {1, [=](double* out) { read_distance(joint, out); }};
     if (force) return {6, [=](double* out) { s->wrench(joint, out); }};
     return {s->joints().rows(joint), [=](double* out) { s->violation(joint, out); }};
 }

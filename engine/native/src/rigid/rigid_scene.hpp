@@ -10,11 +10,46 @@
 #include "linear/vec.hpp"
 #include "run/forces.hpp"
 #include "run/named_enum.hpp"
+#include "run/time_function.hpp"
 
 namespace spook {
 
 SPOOK_NAMED_ENUM(Motion, dynamic, fixed, kinematic)
-SPOOK_NAMED_ENUM(JointKind, distance, lock, ball, hinge, prismatic, universal)
+SPOOK_NAMED_ENUM(JointKind, distance, lock, ball, hinge, prismatic, universal, point_on_line, cylindrical,
+                 planar, relation, wire)
+
+/// How a joint holds rotations: not; all three; the axis only; one axis normal to another.
+enum class Turning : unsigned char { free, held, swing, cross };
+
+/// What a joint between two frames holds: translations along its axes linear_first … linear_end − 1, then rotations.
+struct JointHolds {
+    int linear_first, linear_end;
+    Turning turning;
+    constexpr int linear() const noexcept { return linear_end - linear_first; }
+    constexpr int rows() const noexcept {
+        return linear() + (turning == Turning::held    ? 3
+                           : turning == Turning::swing ? 2
+                           : turning == Turning::cross ? 1
+                                                       : 0);
+    }
+};
+
+constexpr JointHolds holds_of(JointKind kind) noexcept {
+    switch (kind) {
+        case JointKind::lock: return {0, 3, Turning::held};
+        case JointKind::ball: return {0, 3, Turning::free};
+        case JointKind::hinge: return {0, 3, Turning::swing};
+        case JointKind::prismatic: return {1, 3, Turning::held};
+        case JointKind::universal: return {0, 3, Turning::cross};
+        case JointKind::point_on_line: return {1, 3, Turning::free};
+        case JointKind::cylindrical: return {1, 3, Turning::swing};
+        case JointKind::planar: return {0, 1, Turning::swing};
+        case JointKind::distance:
+        case JointKind::relation:
+        case JointKind::wire: return {0, 0, Turning::free};
+    }
+    return {0, 0, Turning::free};
+}
 
 struct RigidBodySpec {
     Motion motion = Motion::dynamic;
@@ -28,6 +63,12 @@ struct RigidBodySpec {
     SurfaceMaterial material;
 };
 
+/// One joint's free coordinate in a relation.
+struct RelationTerm {
+    int joint = 0;
+    double coefficient = 0.0;
+};
+
 /// Rows of a joint in the order of engine/joints.py, then those of its free coordinate: motor, limit, spring.
 struct JointSpec {
     JointKind kind = JointKind::lock;
@@ -35,8 +76,13 @@ struct JointSpec {
     Vec3 first_point, second_point;  // where the joint holds each end at the start, world
     std::array<Vec3, 3> axes;        // unit, right-handed, at the start; the first is the joint's axis.
                                      // universal: axis, cross axis, their product
-    double rest_length = 0.0;        // distance
+    double rest_length = 0.0;        // distance, wire
     std::array<double, 6> compliance{}, damping{};
+
+    std::vector<RelationTerm> terms;  // relation: Σ coefficient × coordinate is kept at zero
+    std::vector<End> points;          // wire: where it runs through, world places at the start
+    bool one_sided = false;           // wire: it may go slack
+    double restitution = 0.0;         // wire: of the speed at which it snaps taut
 
     bool has_motor = false, has_limit = false, has_spring = false;
     double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
@@ -45,21 +91,15 @@ struct JointSpec {
     double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
 };
 
+/// Distances, relations and wires have one row.
 constexpr int row_count(JointKind kind) noexcept {
-    switch (kind) {
-        case JointKind::distance: return 1;
-        case JointKind::lock: return 6;
-        case JointKind::ball: return 3;
-        case JointKind::universal: return 4;
-        case JointKind::hinge:
-        case JointKind::prismatic: return 5;
-    }
-    return 0;
+    const int rows = holds_of(kind).rows();
+    return rows > 0 ? rows : 1;
 }
 
 /// Whether some row of the joint has a finite bound.
 inline bool can_let_go(const JointSpec& joint) noexcept {
-    return (joint.has_motor && std::isfinite(joint.motor_force)) ||
+    return joint.one_sided || (joint.has_motor && std::isfinite(joint.motor_force)) ||
            (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }
 
@@ -83,14 +123,25 @@ struct RigidMethod {
     bool force_rotation = false;   // give particles a rotation nobody sees, to measure what it costs
 };
 
+/// A fluid at rest or in steady motion below the plane up · x = level.
+struct Fluid {
+    double density = 0.0, level = 0.0;  // kg/m³, m
+    Vec3 up, velocity;                  // unit; m/s
+    double drag = 0.0;                  // quadratic drag coefficient
+};
+
 struct RigidScene {
     std::vector<RigidBodySpec> bodies;
     std::vector<JointSpec> joints;
     std::vector<SpringForce> springs;
     std::vector<CentralField> fields;
+    std::vector<Fluid> fluids;
+    std::vector<Collider> floaters;     // surfaces that displace fluid
+    std::vector<TimeDrive> drives;      // what follows the time
     std::vector<Collider> colliders;    // of all bodies that can touch
     std::vector<IndexPair> no_contact;  // pairs of bodies that never touch
     bool contacts = true;               // false: the scene switches them off
+    bool loads_change = false;          // loads are set while it runs, whatever they are at the start
     Vec3 gravity;
     RigidMethod method;
 };

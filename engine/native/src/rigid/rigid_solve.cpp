@@ -25,6 +25,11 @@ void RigidSystem::analyse_block() {
         };
         tie(blocks[k].first, places_[k].first_edge, places_[k].first_particle);
         tie(blocks[k].second, places_[k].second_edge, places_[k].second_particle);
+        for (int body : joints_.others(k)) {
+            bool particle = false;
+            places_[k].other_edges.push_back(-1);
+            tie(body, places_[k].other_edges.back(), particle);
+        }
     }
     for (int body : tied_) sizes.push_back(constants_[body].particle ? 3 : 6);
     matrix_.analyse(sizes, edges, is_constraint, true);
@@ -74,6 +79,15 @@ void RigidSystem::assemble_blocks() {
         const auto narrow = [&](int edge, const double* rows) {
             for (int i = 0; i < block.size; ++i) std::copy_n(rows + 6 * i, 3, matrix_.coupling(edge) + 3 * i);
         };
+        const double* other = joints_.other_rows();
+        for (std::size_t i = 0; i < place.other_edges.size(); ++i, other += 6) {
+            const int edge = place.other_edges[i];
+            if (edge < 0) {
+                given(joints_.others(k)[i], other);
+                continue;
+            }
+            std::copy_n(other, constants_[joints_.others(k)[i]].particle ? 3 : 6, matrix_.coupling(edge));
+        }
         if (place.first_particle) narrow(place.first_edge, first);
         if (place.second_particle) narrow(place.second_edge, second);
         std::copy_n(numbers.right.data(), block.size, right);

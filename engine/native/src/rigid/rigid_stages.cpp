@@ -27,6 +27,7 @@ Facts facts_of(const RigidScene& scene) {
         facts.turning = facts.turning || (!body.particle && body.motion != Motion::fixed);
         facts.loaded = facts.loaded || !is_zero(body.force) || !is_zero(body.torque);
     }
+    facts.loaded = facts.loaded || scene.loads_change;
     facts.joints = !scene.joints.empty();
     facts.bounded = std::any_of(scene.joints.begin(), scene.joints.end(),
                                 [](const JointSpec& joint) { return can_let_go(joint); });
@@ -66,8 +67,17 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                 return choose_if(!scene.springs.empty(), "springs pull as plain forces",
                                  "there are no springs");
             case Stage::apply_loads:
-                return choose_if(is.loaded, "constant loads act, one kick with gravity",
+                return choose_if(is.loaded,
+                                 scene.loads_change ? "loads may be set while it runs, one kick with gravity"
+                                                    : "constant loads act, one kick with gravity",
                                  "there are no loads");
+            case Stage::follow_time:
+                return choose_if(!scene.drives.empty(), "loads or drives are functions of time",
+                                 "nothing is given as a function of time");
+            case Stage::apply_fluids:
+                return choose_if(!scene.fluids.empty() && !scene.floaters.empty(),
+                                 "bodies displace fluid: buoyancy and drag of what is submerged",
+                                 scene.fluids.empty() ? "there is no fluid" : "no moving body has a surface");
             case Stage::impact:
                 return choose_if(is.contacts, "surfaces that meet exchange impulses first", no_contact);
             case Stage::assemble_rows:

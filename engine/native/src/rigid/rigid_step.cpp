@@ -36,6 +36,7 @@ void RigidSystem::step() {
     live_.velocity_ready = false;
     if (replaying_ && early_joints_.empty()) early_joints_ = joints_.states;
     integrate_all();
+    ++live_.moved;
     joints_.follow(live_.bodies);
 }
 
@@ -43,6 +44,7 @@ void RigidSystem::velocity_stage() {
     if (half_step_)
         for (int i = 0; i < bodies(); ++i)
             live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
+    if (!load_follows_.empty() || !drives_.empty()) follow_time();
     if (!force_.empty()) apply_forces();
     kick_free_bodies();
     if (contacts_ && find_contacts()) {

@@ -38,6 +38,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
                                       : Vec3{});
     }
     if (!springs_.empty() || !fields_.empty()) force_.resize(constants_.size());
+    take_loads(scene);
 
     slot_.assign(constants_.size(), -1);
     const bool touching = stages_.runs(Stage::collision);
@@ -48,6 +49,12 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         spare += static_cast<std::size_t>(12 * block.size);
         for (int body : {block.first, block.second})
             if (body >= 0 && constants_[body].moves()) slot_[body] = 0;
+        for (int body : joints_.others(static_cast<int>(spare_at_.size()) - 1)) {
+            if (solver_ != RigidSolver::block || touching)
+                throw std::invalid_argument(
+                    "a row over more than two bodies needs the stage solve_block alone");
+            if (constants_[body].moves()) slot_[body] = 0;
+        }
     }
     spare_.assign(spare, 0.0);
     for (int body = 0; body < bodies(); ++body)
@@ -105,6 +112,8 @@ void RigidSystem::take_stages(const RigidScene& scene) {
         throw std::invalid_argument("joints need the stage assemble_rows and one that solves them");
     stages_.take(Stage::apply_gravity);
     stages_.take(Stage::apply_loads);
+    stages_.take(Stage::follow_time);
+    stages_.take(Stage::apply_fluids);
     if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
     if (stages_.take(Stage::apply_springs)) springs_ = scene.springs;
     stages_.take(Stage::string_stiffness);
@@ -122,6 +131,7 @@ void RigidSystem::reset(StageClock* clock) {
     replaying_ = false;
     early_joints_.clear();
     live_.bodies = start_;
+    if (!load_follows_.empty() || !drives_.empty()) follow_time();
     redundant_.reset(matrix_);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
     clock_ = clock;

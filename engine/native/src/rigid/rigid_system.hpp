@@ -44,20 +44,27 @@ public:
     void advance(std::int64_t steps);
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const;
-    void save() {
-        saved_redundancy_ = redundant_.memory();
-        saved_ = live_, saved_joints_ = joints_.states, saved_mixed_ = mixed_;
-        if (contacts_) saved_contacts_ = contacts_->memory();
-    }
+    void save() { keep(saved_); }
     void restore() {
-        redundant_.restore(matrix_, saved_redundancy_);
-        live_ = saved_, joints_.states = saved_joints_, mixed_ = saved_mixed_;
-        if (contacts_) contacts_->remember(saved_contacts_);
+        go_back(saved_);
         replaying_ = true;
         early_joints_.clear();
     }
     /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
     std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
+
+    class Memory;
+    /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it.
+    void keep(Memory& memory) const;
+    void go_back(const Memory& memory);
+
+    // What may be set between steps, from outside; reset() takes nothing of it back.
+    /// Where the next reset() begins: 13 numbers per body, as final_state() gives them.
+    void place(std::span<const double> state);
+    void set_load(int body, Vec3 force, Vec3 torque);
+    void set_velocity(int body, Vec3 velocity, Vec3 angular_velocity);
+    void set_motor(int joint, double speed, double max_force) { joints_.set_motor(joint, speed, max_force); }
+    void set_rest(int joint, double rest) { joints_.set_rest(joint, rest); }
 
     void reset(StageClock* clock);
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
@@ -101,10 +108,11 @@ public:
 private:
     struct Live {
         LargeArray<BodyState> bodies;
-        int too_fast = -1;      // the first body that turned too fast
-        int not_solved = -1;    // a body of a system that could not be factored
-        int contradicted = -1;  // a body held by rows that cannot hold together
-        std::int64_t step = 0;  // steps of h done
+        int too_fast = -1;       // the first body that turned too fast
+        int not_solved = -1;     // a body of a system that could not be factored
+        int contradicted = -1;   // a body held by rows that cannot hold together
+        std::int64_t step = 0;   // steps of h begun
+        std::int64_t moved = 0;  // steps of h after which positions are known
         Unsettled unsettled;
         // Velocities at mid-step:
         bool velocity_ready = false;         // the velocities of the coming step are found already
@@ -119,7 +127,24 @@ private:
         std::vector<int> guess_order;  // per stage: how many of them tell the next force
     };
 
+public:
+    class Memory {
+        friend class RigidSystem;
+        Live live;
+        LargeArray<JointSet::State> joints;
+        RedundantRows::Memory redundancy;
+        MixedSystem mixed;
+        ContactStage::Memory contacts;
+        std::vector<double> jacobians;  // of the last step, which the stiffness of the next is made of
+    };
+
+private:
     const char* cause() const noexcept;
+    // rigid_loads.cpp: what follows the time, and fluids
+    void take_loads(const RigidScene& scene);
+    void follow_time();
+    void find_loads(double time);
+    void add_fluid(const Fluid& fluid, int body, Vec3& force, Vec3& torque) const noexcept;
     void stiffen();
     void find_tensions();
     void find_islands();
@@ -204,18 +229,26 @@ private:
     StageList stages_;
     LargeArray<BodyConstants> constants_;
     LargeArray<BodyState> start_;
-    std::vector<Vec3> acceleration_;  // gravity and constant loads
+    std::vector<Vec3> acceleration_;  // gravity and loads
     std::vector<SpringForce> springs_;
     std::vector<CentralField> fields_;
+    std::vector<TimeDrive> drives_;
+    std::vector<Fluid> fluids_;
+    std::vector<std::vector<Collider>> floaters_;  // per body
+    std::vector<int> load_follows_;                // bodies whose load changes from step to step
+    struct Load {
+        Vec3 force, torque;
+    };
+    std::vector<Load> steady_;  // per body, if some follow: the part of its load that does not change
     Vec3 gravity_;
     RigidMethod method_;
     double h_ = 0.0;  // of one substep
     RigidSolver solver_ = RigidSolver::none;
 
     // The state.
-    Live live_, saved_;
+    Live live_;
+    Memory saved_;
     JointSet joints_;
-    LargeArray<JointSet::State> saved_joints_;
     bool replaying_ = false;                    // a block that ended unfit
     LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
 
@@ -227,20 +260,19 @@ private:
     std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     RedundantRows redundant_;
-    RedundantRows::Memory saved_redundancy_;
     LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
         bool first_particle = false, second_particle = false;
+        std::vector<int> other_edges;  // of a row over more than two bodies, −1: it does not move by itself
     };
     std::vector<BlockPlace> places_;
     LargeArray<double> spare_;  // Jacobians with nowhere else to go, per block 2 × rows × 6
     std::vector<std::size_t> spare_at_;
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
-    MixedSystem mixed_, saved_mixed_;
+    MixedSystem mixed_;
     PivotSolver pivot_;
     std::optional<ContactStage> contacts_, fresh_contacts_;
-    ContactStage::Memory saved_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;

@@ -1,6 +1,7 @@
 // A compiled scene with its observables: what Python, and a page, hold and run.
 #pragma once
 
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,7 @@ namespace spook {
 ///   void reset(StageClock*)                    back to the start; null: stages are not timed
 ///   void count(RunReport&, int64 steps) const  the work of so many steps
 ///   std::vector<double> final_state()
+///   Memory, void keep(Memory&) const, void go_back(const Memory&), void place(span)   for a run one holds
 /// and two functions beside it
 ///   StageChoices choose_stages(const Scene&, bool observing)   which stages the scene needs, and why
 ///   Sampler sampler_of(System&, const QuantityRequest&)        throws std::invalid_argument
@@ -57,6 +59,57 @@ public:
         return report;
     }
 
+    // A run one holds: start() once, then advance(), read(), keep() and go_back() as one likes.
+
+    /// Where a held run is.
+    struct Snapshot {
+        typename System::Memory memory;
+        std::int64_t steps = 0;
+    };
+
+    /// Back to the start, or to 13 numbers per body as a report's final_state gives them.
+    void start(std::span<const double> state) {
+        if (!state.empty()) system_.place(state);
+        system_.reset(nullptr);
+        steps_ = 0;
+    }
+    /// So many steps on. The report is of these steps; its counters are of all work since start(), work taken back
+    /// included, and failed_step counts from the start.
+    RunReport advance(std::int64_t steps, double time_limit) {
+        RunReport report;
+        Recorder nothing;
+        nothing.prepare(steps);
+        run_loop(system_, nothing, steps, time_limit, report);
+        if (report.failed_step >= 0) report.failed_step += steps_;
+        done_ += report.steps;
+        steps_ += report.steps;
+        return report;
+    }
+    /// Counters, final state and the observables as they are now, each as its last sample; changes nothing.
+    void read(RunReport& report) {
+        const Snapshot here = keep();
+        recorder_.prepare(steps_);
+        system_.observe(recorder_, steps_);
+        report.recordings = recorder_.recordings();
+        go_back(here);
+        report.final_state = system_.final_state();
+        go_back(here);
+        report.state_hash = state_hash(report.final_state);
+        system_.count(report, done_);
+        report.steps = steps_;
+    }
+    Snapshot keep() const {
+        Snapshot snapshot;
+        system_.keep(snapshot.memory);
+        snapshot.steps = steps_;
+        return snapshot;
+    }
+    void go_back(const Snapshot& snapshot) {
+        system_.go_back(snapshot.memory);
+        steps_ = snapshot.steps;
+    }
+    System& system() noexcept { return system_; }
+
 private:
     static bool reads_while_running(const std::vector<Observation>& observations) noexcept {
         return std::any_of(observations.begin(), observations.end(),
@@ -71,6 +124,7 @@ private:
     StageChoices choices_;
     System system_;
     Recorder recorder_;
+    std::int64_t steps_ = 0, done_ = 0;  // of a held run: where it is, and all that were done
 };
 
 }  // namespace spook

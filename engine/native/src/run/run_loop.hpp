@@ -22,7 +22,7 @@ struct Health {
 ///   void advance(int64 steps)             do that many steps, with no check inside
 ///   void observe(Recorder&, int64 sample)  recorder.sample(sample), looking ahead if velocities need it
 ///   Health health() const                  non-finite or runaway values
-///   void save(), void restore()            keep and take back everything advance() changes
+///   void save(), void restore()            keep and take back everything advance() changes, for a replay
 ///   int64 block() const                    steps between two checks
 /// The check costs nothing inside a step: a block that ends unfit is replayed step by step to find the step. Long
 /// steps look at the clock themselves (Watch); a block they leave unfinished is taken back.

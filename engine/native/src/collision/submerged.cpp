@@ -1,0 +1,176 @@
+#include "collision/submerged.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+#include "linear/elementary.hpp"
+
+namespace spook {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+Submerged sphere_below(double radius, Vec3 centre, Vec3 up, double height) noexcept {
+    const double depth = std::min(2.0 * radius, radius - height);  // of its lowest point
+    if (!(depth > 0.0)) return {0.0, centre};
+    const double volume = kPi * depth * depth * (3.0 * radius - depth) / 3.0;
+    const double left = 2.0 * radius - depth;
+    return {volume, centre - 0.75 * left * left / (3.0 * radius - depth) * up};
+}
+
+/// The corners of a box's face, in turn round the normal that points out.
+void face_corners(Vec3 half, int face, Vec3* corners) noexcept {
+    const int a = face / 2, b = (a + 1) % 3, c = (a + 2) % 3;
+    const double side = face % 2 == 0 ? 1.0 : -1.0;
+    static constexpr double TURN[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
+    for (int k = 0; k < 4; ++k) {
+        const double* turn = TURN[side > 0.0 ? k : 3 - k];
+        corners[k] = {};
+        corners[k][a] = side * half[a];
+        corners[k][b] = turn[0] * half[b];
+        corners[k][c] = turn[1] * half[c];
+    }
+}
+
+Submerged box_below(Vec3 half, const Pose& at, Vec3 up, double height) noexcept {
+    const Vec3 n = local(at.rotation, up);
+    const double reach =
+        std::abs(n.x) * half.x + std::abs(n.y) * half.y + std::abs(n.z) * half.z;  // of the highest corner
+    if (height >= reach) return {0.0, at.position};
+    if (height <= -reach) return {8.0 * half.x * half.y * half.z, at.position};
+    const Vec3 tip = -height * n;  // of the surface, below or above the centre
+    double volume = 0.0;
+    Vec3 moment;
+    for (int face = 0; face < 6; ++face) {
+        Vec3 corners[4], kept[5];
+        face_corners(half, face, corners);
+        int count = 0;
+        for (int k = 0; k < 4; ++k) {
+            const Vec3 p = corners[k], q = corners[(k + 1) % 4];
+            const double above = dot(n, p) + height, next = dot(n, q) + height;
+            if (above <= 0.0) kept[count++] = p;
+            if ((above < 0.0 && next > 0.0) || (above > 0.0 && next < 0.0))
+                kept[count++] = p + (above / (above - next)) * (q - p);
+        }
+        for (int k = 1; k + 1 < count; ++k) {
+            const Vec3 a = kept[0] - tip, b = kept[k] - tip, c = kept[k + 1] - tip;
+            const double cone = dot(a, cross(b, c)) / 6.0;
+            volume += cone;
+            moment += 0.25 * cone * (a + b + c);
+        }
+    }
+    if (!(volume > 0.0)) return {0.0, at.position};
+    return {volume, apply(at, tip + (1.0 / volume) * moment)};
+}
+
+constexpr double NODE[] = {0.09501250983763744, 0.2816035507792589, 0.45801677765722737, 0.6178762444026438,
+                           0.755404408355003,   0.8656312023878318, 0.9445750230732326,  0.9894009349916499};
+constexpr double WEIGHT[] = {0.18945061045506864,  0.18260341504492364, 0.16915651939500265,
+                             0.1495959888165767,   0.12462897125553407, 0.0951585116824926,
+                             0.062253523938647456, 0.027152459411754176};
+
+/// A capsule along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
+/// height + slope s above the slice's centre and rises across it with `tilt`.
+struct Capsule {
+    double radius, half_length, height, slope, tilt;
+
+    double rho2(double s) const noexcept {
+        const double beyond = std::max(0.0, std::abs(s) - half_length);
+        return std::max(0.0, radius * radius - beyond * beyond);
+    }
+    /// Area below the surface, and its moment across, towards up.
+    void slice(double s, double& area, double& moment) const noexcept {
+        const double r2 = rho2(s), r = std::sqrt(r2), over = height + slope * s;
+        const double edge = over <= -tilt * r ? r : over >= tilt * r ? -r : -over / tilt;
+        const double chord = std::sqrt(std::max(0.0, r2 - edge * edge));
+        area = r2 * (0.5 * kPi + arc_tangent(edge, chord)) + edge * chord;
+        moment = -2.0 / 3.0 * chord * chord * chord;
+    }
+};
+
+Submerged capsule_below(const Primitive& shape, const Pose& at, Vec3 up, double height) noexcept {
+    const Vec3 axis = column(at.rotation, 2);
+    const double slope = dot(axis, up), r = shape.radius, half = shape.half_length;
+    const double reach = r + half * std::abs(slope);
+    if (height >= reach) return {0.0, at.position};
+    if (height <= -reach) return {volume(shape), at.position};
+    const Vec3 across = up - slope * axis;
+    const double tilt = norm(across);
+    const Capsule capsule{r, half, height, slope, tilt};
+    // Where pieces end: the caps, and where the surface meets the side |over| = tilt ρ of cylinder and caps.
+    double ends[20] = {-half - r, -half, half, half + r};
+    int count = 4;
+    const auto add = [&](double s) {
+        if (s > -half - r && s < half + r) ends[count++] = s;
+    };
+    if (slope != 0.0)
+        for (const double side : {-1.0, 1.0}) add((side * tilt * r - height) / slope);
+    for (const double middle : {-half, half}) {  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
+        const double over = height + slope * middle, root = r * r - over * over;
+        if (root < 0.0) continue;
+        for (const double side : {-1.0, 1.0}) add(middle - slope * over + side * tilt * std::sqrt(root));
+    }
+    std::sort(ends, ends + count);
+    double volume = 0.0, along = 0.0, aside = 0.0;
+    for (int k = 0; k + 1 < count; ++k) {
+        const double middle = 0.5 * (ends[k] + ends[k + 1]), width = 0.5 * (ends[k + 1] - ends[k]);
+        if (!(width > 0.0)) continue;
+        for (int node = 0; node < 16; ++node) {
+            // s = middle − width cos φ: roots at the ends become smooth.
+            const double x = node < 8 ? -NODE[node] : NODE[node - 8];
+            const SineCosine turn = sine_cosine(0.5 * kPi * (1.0 + x));
+            const double s = middle - width * turn.cosine,
+                         weight = WEIGHT[node % 8] * 0.5 * kPi * width * turn.sine;
+            double area, moment;
+            capsule.slice(s, area, moment);
+            volume += weight * area;
+            along += weight * area * s;
+            aside += weight * moment;
+        }
+    }
+    if (!(volume > 0.0)) return {0.0, at.position};
+    const Vec3 up_across = tilt > 0.0 ? (1.0 / tilt) * across : Vec3{};
+    return {volume, at.position + (along / volume) * axis + (aside / volume) * up_across};
+}
+
+}  // namespace
+
+double volume(const Primitive& shape) noexcept {
+    const double r = shape.radius;
+    switch (shape.kind) {
+        case ShapeKind::sphere: return 4.0 / 3.0 * kPi * r * r * r;
+        case ShapeKind::capsule: return kPi * r * r * (2.0 * shape.half_length + 4.0 / 3.0 * r);
+        case ShapeKind::box: return 8.0 * shape.half.x * shape.half.y * shape.half.z;
+        case ShapeKind::plane: return 0.0;
+    }
+    return 0.0;
+}
+
+double shadow(const Primitive& shape, const Pose& at, Vec3 direction) noexcept {
+    const double r = shape.radius;
+    switch (shape.kind) {
+        case ShapeKind::sphere: return kPi * r * r;
+        case ShapeKind::capsule:
+            return kPi * r * r + 4.0 * r * shape.half_length * norm(cross(column(at.rotation, 2), direction));
+        case ShapeKind::box: {
+            const Vec3 d = local(at.rotation, direction), half = shape.half;
+            return 4.0 * (std::abs(d.x) * half.y * half.z + std::abs(d.y) * half.x * half.z +
+                          std::abs(d.z) * half.x * half.y);
+        }
+        case ShapeKind::plane: return 0.0;
+    }
+    return 0.0;
+}
+
+Submerged submerged(const Primitive& shape, const Pose& at, Vec3 up, double level) noexcept {
+    const double height = dot(up, at.position) - level;  // of the centre above the surface
+    switch (shape.kind) {
+        case ShapeKind::sphere: return sphere_below(shape.radius, at.position, up, height);
+        case ShapeKind::capsule: return capsule_below(shape, at, up, height);
+        case ShapeKind::box: return box_below(shape.half, at, up, height);
+        case ShapeKind::plane: break;
+    }
+    return {0.0, at.position};
+}
+
+}  // namespace spook

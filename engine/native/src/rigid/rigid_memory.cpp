@@ -1,0 +1,71 @@
+// Going back and going on: what a run keeps, and what is set from outside between its steps.
+#include <algorithm>
+#include <stdexcept>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+void RigidSystem::keep(Memory& memory) const {
+    memory.redundancy = redundant_.memory();
+    memory.live = live_, memory.joints = joints_.states, memory.mixed = mixed_;
+    if (contacts_) memory.contacts = contacts_->memory();
+    if (!stiff_) return;
+    memory.jacobians.clear();
+    const auto blocks = joints_.blocks();
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        const double* rows = jacobian(static_cast<int>(k), true);
+        memory.jacobians.insert(memory.jacobians.end(), rows, rows + 6 * blocks[k].size);
+    }
+}
+
+void RigidSystem::go_back(const Memory& memory) {
+    redundant_.restore(matrix_, memory.redundancy);
+    live_ = memory.live, joints_.states = memory.joints, mixed_ = memory.mixed;
+    if (contacts_) contacts_->remember(memory.contacts);
+    if (!stiff_) return;
+    const auto blocks = joints_.blocks();
+    const double* rows = memory.jacobians.data();
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        const int numbers = 6 * blocks[k].size;
+        std::copy_n(rows, numbers, jacobian(static_cast<int>(k), true));
+        rows += numbers;
+    }
+}
+
+void RigidSystem::place(std::span<const double> state) {
+    for (int i = 0; i < bodies(); ++i) {
+        const double* s = state.data() + 13 * static_cast<std::size_t>(i);
+        const BodyConstants& body = constants_[i];
+        BodyState& at = start_[i];
+        at.displacement = Vec3{s[0], s[1], s[2]} - body.start;
+        at.velocity = {s[7], s[8], s[9]};
+        at.angular_velocity = {s[10], s[11], s[12]};
+        if (body.particle) continue;
+        at.turn = unit(Quat{s[3], s[4], s[5], s[6]} * conjugate(body.start_turn));
+        const Vec3 w = at.angular_velocity;
+        refresh(body, at);  // for the inertia
+        if (body.moves()) at.angular_momentum = at.inertia * w;
+        at.angular_velocity = w;
+    }
+}
+
+void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
+    if (!stages_.runs(Stage::apply_loads)) throw std::invalid_argument("loads need the stage apply_loads");
+    BodyConstants& constants = constants_[body];
+    if (!constants.moves()) return;
+    const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
+    constants.force = force;
+    constants.torque = torque;
+    if (!steady_.empty()) steady_[body] = {force, torque};
+    acceleration_[body] = gravity + (1.0 / constants.mass) * force;
+}
+
+void RigidSystem::set_velocity(int body, Vec3 velocity, Vec3 angular_velocity) {
+    if (constants_[body].motion != Motion::kinematic)
+        throw std::invalid_argument("only a kinematic body moves as it is told");
+    live_.bodies[body].velocity = velocity;
+    live_.bodies[body].angular_velocity = angular_velocity;
+}
+
+}  // namespace spook

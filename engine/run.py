@@ -1,0 +1,358 @@
+"""A simulation one can hold: step it, read it, set what drives it, go back.
+
+>>> from spook_tracker.engine import Hinge, JointCoordinate, Motor, RigidBody, Scene, WORLD, start
+>>> wheel = RigidBody(name="wheel", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+>>> axle = Hinge(name="axle", between=(WORLD, "wheel"), motor=Motor(speed=0.0, max_force=2.0))
+>>> with start(Scene(bodies=(wheel,), constraints=(axle,)), time_step=0.1,
+...            observe={"angle": JointCoordinate("axle")}) as run:
+...     before = run.save()
+...     while run["angle"] < 0.45:
+...         run.set_motor("axle", speed=1.0)
+...         run.step()
+...     reached = run.time
+...     run.restore(before)
+>>> round(reached, 9), float(run["angle"])
+(0.7, 0.0)
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import MappingProxyType, TracebackType
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import check
+from spook_tracker.engine.bodies import RigidBody
+from spook_tracker.engine.check import Vector
+from spook_tracker.engine.compiler import compile
+from spook_tracker.engine.errors import MethodError, SceneError
+from spook_tracker.engine.forces import Load
+from spook_tracker.engine.joints import AxialJoint
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.observe import Final, Quantity
+from spook_tracker.engine.program import Program
+from spook_tracker.engine.result import Array, Result, SimulationFailed
+from spook_tracker.engine.scene import Scene
+
+NOTHING_READ: Mapping[str, Quantity] = MappingProxyType({})
+
+
+def start(
+    scene: Scene,
+    *,
+    time_step: float,
+    method: Method = PLAIN,
+    observe: Mapping[str, Quantity] = NOTHING_READ,
+    state: Mapping[str, Array] | None = None,
+) -> Run:
+    """Hold a scene at its start, or at `state`: bodies by name, (13,) each, as `Result.final_state` has them.
+
+    `observe` names quantities that `run["name"]` reads whenever asked. Stepping in pieces gives the bits of one
+    `simulate` over all steps. A run continued from a `state` gives them only where the state says it all: turns of
+    hinges count from the angle within ±π, contacts and iterative solvers start cold, and with mid-step velocities
+    the start is made anew; `Run.save` and `Run.restore` keep every bit.
+    """
+    if not isinstance(observe, Mapping):
+        raise MethodError(f"observe must map names to quantities, not {observe!r}")
+    for name, what in observe.items():
+        if not isinstance(what, Quantity):
+            raise MethodError(
+                f"observe {name!r}: a run one holds reads quantities as they are, not {what!r}; "
+                "give the quantity itself"
+            )
+    finals = {name: Final(quantity=what) for name, what in observe.items()}
+    program = compile(scene, time_step=time_step, method=method, observe=finals, held=True)
+    return Run(scene, program, method, tuple(observe.items()), _flat(scene, state))
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Where a run is, with what was set; any run of an equal scene, step, method and observation can go there."""
+
+    of: tuple[Any, ...]
+    native: Any
+    settings: Mapping[tuple[str, str], tuple[Any, ...]]
+    failure: Result | None
+
+
+class Run:
+    """A scene that is being simulated, made by `start`. One thread at a time steps or reads it."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        program: Program,
+        method: Method,
+        observe: tuple[tuple[str, Quantity], ...],
+        state: list[float],
+    ) -> None:
+        self.scene = scene
+        self._program = program
+        self._of = (scene, program.time_step, method, observe)
+        self._native = program.native
+        self._lock = threading.Lock()
+        self._open = True
+        self._steps = 0
+        self._residual = 0.0
+        self._seconds = self._cpu_seconds = 0.0
+        self._failure: Result | None = None
+        self._read: Result | None = None
+        self._settings: dict[tuple[str, str], tuple[Any, ...]] = {}
+        self._bodies = {body.name: index for index, body in enumerate(scene.bodies)}
+        self._native.start(state)
+
+    # --- going on -----------------------------------------------------------------------------------------
+
+    def step(self, steps: int = 1, *, time_limit: float | None = None) -> None:
+        """So many steps on, natively. Raises SimulationFailed, with the run so far in `.result`, when a value is
+        no longer finite or the time limit [s] is over; `restore` takes the run back to before."""
+        if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps < 2**53:
+            raise MethodError(f"steps must be a whole number, zero or above, not {steps!r}")
+        if time_limit is not None and not time_limit > 0.0:
+            raise MethodError(f"time_limit must be positive, not {time_limit!r}")
+        with self._held():
+            if self._failure is not None:
+                raise SimulationFailed(self._failure)
+            report = self._native.advance(steps, time_limit or 0.0)
+            self._read = None
+            self._steps += report["steps"]
+            self._seconds += report["seconds"]
+            self._cpu_seconds += report["cpu_seconds"]
+            if report["status"] != "completed":
+                failed = self._result(report, time_limit)
+                if report["status"] != "timed_out":
+                    self._failure = failed
+                raise SimulationFailed(failed)
+
+    @property
+    def steps(self) -> int:
+        """Steps done since the start."""
+        return self._steps
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the start, s."""
+        return self._steps * self._program.time_step
+
+    # --- reading ------------------------------------------------------------------------------------------
+
+    def result(self) -> Result:
+        """The run as it is: state, counters, residual, and every observed quantity at this moment."""
+        if self._failure is not None:
+            return self._failure
+        if self._read is None:
+            with self._held():
+                self._read = self._result(None, None)
+        return self._read
+
+    def __getitem__(self, name: str) -> Any:
+        """A quantity of `observe`, as it is now; forces are those of the step that ended here."""
+        return self.result()[name]
+
+    @property
+    def state(self) -> Mapping[str, Array]:
+        """(13,) per body: position, orientation, velocity, angular velocity."""
+        return self.result().final_state
+
+    def _result(self, report: Mapping[str, Any] | None, time_limit: float | None) -> Result:
+        now = self._native.read()
+        times = {"seconds": self._seconds, "cpu_seconds": self._cpu_seconds}
+        ending = {k: report[k] for k in ("status", "failed_step", "failed_body", "reason")} if report else {}
+        return self._program.result({**now, **times, **ending}, time_limit)
+
+    # --- setting ------------------------------------------------------------------------------------------
+
+    def set_load(self, name: str, *, force: Vector | None = None, torque: Vector | None = None) -> None:
+        """What a Load of the scene is from now on [N, N m]; what is not given stays."""
+        load = next((f for f in self.scene.forces if f.name == name), None)
+        if not isinstance(load, Load):
+            raise SceneError(
+                f"set_load: the scene has no Load named {name!r}; give it one, of zero if need be"
+            )
+        owner = f"set_load {name!r}"
+        _not_in_time(owner, load.factor)
+        before = self._settings.get(("load", name), (load.force, load.torque))
+        new = (
+            before[0] if force is None else check.vector(owner, "force", force),
+            before[1] if torque is None else check.vector(owner, "torque", torque),
+        )
+        if any(new[1]) and not isinstance(self.scene.body(load.body), RigidBody):
+            raise SceneError(f"{owner}: {load.body!r} is a particle and cannot take a torque")
+        self._set("load", name, new)
+
+    def set_motor(self, joint: str, *, speed: float | None = None, max_force: float | None = None) -> None:
+        """The speed [m/s or rad/s] and the bound [N or N m] of a joint's motor from now on."""
+        motor = getattr(self._joint(joint), "motor", None)
+        if motor is None:
+            raise SceneError(f"set_motor: {joint!r} has no motor")
+        owner = f"set_motor {joint!r}"
+        if max_force is not None and motor.max_force is None:
+            raise SceneError(f"{owner}: its force is unbounded in the scene; give it a max_force there")
+        _not_in_time(owner, motor.speed)
+        bound = math.inf if motor.max_force is None else motor.max_force
+        before = self._settings.get(("motor", joint), (motor.speed, bound))
+        new = (
+            before[0] if speed is None else check.number(owner, "speed", speed),
+            before[1] if max_force is None else check.not_negative(owner, "max_force", max_force),
+        )
+        self._set("motor", joint, new)
+
+    def set_rest(self, joint: str, rest: float) -> None:
+        """Where the spring of a joint pulls from now on [m or rad]: a drive with a position for its target."""
+        spring = getattr(self._joint(joint), "spring", None)
+        if spring is None:
+            raise SceneError(f"set_rest: {joint!r} has no spring")
+        _not_in_time(f"set_rest {joint!r}", spring.rest)
+        self._set("rest", joint, (check.number(f"set_rest {joint!r}", "rest", rest),))
+
+    def set_velocity(
+        self, body: str, *, velocity: Vector | None = None, angular_velocity: Vector | None = None
+    ) -> None:
+        """How a kinematic body moves from now on [m/s, rad/s]; what is not given stays."""
+        known = self.scene.body(body)
+        if not isinstance(known, RigidBody) or known.motion != "kinematic":
+            raise SceneError(f"set_velocity: {body!r} is not kinematic, so forces move it; use a Load")
+        owner = f"set_velocity {body!r}"
+        _not_in_time(owner, known.pace)
+        before = self._settings.get(("velocity", body), (known.velocity, known.angular_velocity))
+        new = (
+            before[0] if velocity is None else check.vector(owner, "velocity", velocity),
+            before[1]
+            if angular_velocity is None
+            else check.vector(owner, "angular_velocity", angular_velocity),
+        )
+        self._set("velocity", body, new)
+
+    def _joint(self, name: str) -> AxialJoint | None:
+        joint = self.scene.constraint(name)
+        return joint if isinstance(joint, AxialJoint) else None
+
+    def _set(self, kind: str, name: str, values: tuple[Any, ...]) -> None:
+        with self._held():
+            self._settings[kind, name] = values
+            self._read = None
+            self._apply(kind, name)
+
+    def _apply(self, kind: str, name: str) -> None:
+        if kind == "load":
+            body = next(f.body for f in self.scene.forces if f.name == name and isinstance(f, Load))
+            total = np.zeros(6)
+            for force in self.scene.forces:
+                if isinstance(force, Load) and force.body == body and force.factor is None:
+                    now = self._settings.get(("load", force.name), (force.force, force.torque))
+                    total += (*now[0], *now[1])
+            self._native.set_load(self._bodies[body], tuple(total[:3]), tuple(total[3:]))
+        elif kind == "velocity":
+            self._native.set_velocity(self._bodies[name], *self._settings[kind, name])
+        else:
+            index = [constraint.name for constraint in self.scene.constraints].index(name)
+            set_drive = self._native.set_motor if kind == "motor" else self._native.set_rest
+            set_drive(index, *self._settings[kind, name])
+
+    # --- going back ---------------------------------------------------------------------------------------
+
+    def save(self) -> Snapshot:
+        """All that the coming steps depend on; going on from it gives the same bits whenever it is restored."""
+        with self._held():
+            return Snapshot(self._of, self._native.keep(), dict(self._settings), self._failure)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back, or over, to where a run of an equal scene was. Counters go on counting all work."""
+        if not isinstance(snapshot, Snapshot):
+            raise MethodError(f"restore needs what save() gave, not {snapshot!r}")
+        if snapshot.of != self._of:
+            raise MethodError(
+                "restore: the snapshot is of another scene, time step, method or observation than this run"
+            )
+        with self._held():
+            set_since = {*self._settings, *snapshot.settings}
+            self._native.go_back(snapshot.native)
+            self._settings = {key: self._start_of(*key) for key in set_since} | dict(snapshot.settings)
+            for kind, name in sorted(set_since):
+                self._apply(kind, name)
+            self._steps = snapshot.native.steps
+            self._failure = snapshot.failure
+            self._read = None
+
+    def _start_of(self, kind: str, name: str) -> tuple[Any, ...]:
+        """What the scene says of something that was set."""
+        if kind == "load":
+            load = next(f for f in self.scene.forces if f.name == name and isinstance(f, Load))
+            return (load.force, load.torque)
+        if kind == "velocity":
+            body = self.scene.body(name)
+            assert isinstance(body, RigidBody)
+            return (body.velocity, body.angular_velocity)
+        joint = self._joint(name)
+        assert joint is not None
+        if kind == "motor":
+            assert joint.motor is not None
+            force = joint.motor.max_force
+            return (joint.motor.speed, math.inf if force is None else force)
+        assert joint.spring is not None
+        return (joint.spring.rest,)
+
+    # --- holding ------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Let go: what was read stays, nothing more can be asked of the run."""
+        if self._open and self._failure is None:
+            self.result()
+        self._open = False
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "failed" if self._failure else "open" if self._open else "closed"
+        return f"<Run: {state}, {len(self._bodies)} bodies at {self.time:.6g} s after {self._steps} steps>"
+
+    @contextmanager
+    def _held(self) -> Iterator[None]:
+        if not self._open:
+            raise MethodError("this run is closed; start another")
+        with self._lock:
+            yield
+
+
+def _not_in_time(owner: str, value: object) -> None:
+    if value is not None and not isinstance(value, float):
+        raise SceneError(
+            f"{owner}: it follows the time in the scene, so it cannot be set; give a number there"
+        )
+
+
+def _flat(scene: Scene, state: Mapping[str, Array] | None) -> list[float]:
+    """A state in the order of the scene's bodies; empty for the scene's own start."""
+    if state is None:
+        return []
+    if not isinstance(state, Mapping):
+        raise MethodError(f"state must map body names to 13 numbers, not {state!r}")
+    for name in state:
+        scene.body(name)
+    flat: list[float] = []
+    for body in scene.bodies:
+        if body.name not in state:
+            raise MethodError(f"state: body {body.name!r} is missing; give all bodies of the scene")
+        numbers = [check.number(f"state of {body.name!r}", "each entry", value) for value in state[body.name]]
+        if len(numbers) != 13:
+            raise MethodError(f"state of {body.name!r} needs 13 numbers, not {len(numbers)}")
+        check.rotation(f"state of {body.name!r}", "orientation", numbers[3:7])
+        if isinstance(body, RigidBody) and body.motion == "static":
+            own = [*body.position, *body.orientation, *[0.0] * 6]
+            if not np.allclose(numbers, own, rtol=1e-12, atol=1e-12):
+                raise MethodError(f"state: {body.name!r} is static and cannot be elsewhere")
+            numbers = own
+        flat += numbers
+    return flat

@@ -1,0 +1,367 @@
+"""Do wires over pulleys share their loads, and does a rope that snaps taut give the blow that mechanics says?"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    ConstraintForce,
+    Energy,
+    Final,
+    Hinge,
+    MaximumAbsolute,
+    Method,
+    Momentum,
+    Particle,
+    Prismatic,
+    Relation,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+    Velocity,
+    Violation,
+    Wire,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.sweep import line, told
+
+GRAVITY = 9.81  # m/s²
+HEAVY, LIGHT = 3.0, 2.0  # kg
+DRUM, RADIUS = 0.08, 0.2  # kg m², m
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 2.0  # s
+STRANDS = 4
+STONE, PULLER, FAST, SLACK = 5.0, 2.0, 3.0, 0.4  # kg, kg, m/s, m: one tows the other on a slack rope
+IDEAL = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT)  # m/s²
+TURNING = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT + DRUM / RADIUS**2)
+
+
+def atwood() -> Scene:
+    """Two weights on a wire over two eyes without friction."""
+    ends = {"heavy": (-RADIUS, 0.0, -1.0), "light": (RADIUS, 0.0, -1.0)}
+    return Scene(
+        bodies=(
+            Particle(name="heavy", mass=HEAVY, position=ends["heavy"]),
+            Particle(name="light", mass=LIGHT, position=ends["light"]),
+        ),
+        constraints=(
+            Wire(
+                name="wire",
+                through=(
+                    ("heavy", ends["heavy"]),
+                    (WORLD, (-RADIUS, 0.0, 9.0)),
+                    (WORLD, (RADIUS, 0.0, 9.0)),
+                    ("light", ends["light"]),
+                ),
+                compliance=0.0,
+            ),
+        ),
+        gravity=(0.0, 0.0, -GRAVITY),
+    )
+
+
+def drum() -> Scene:
+    """The same over a drum on which the wire does not slip: two racks on one pinion."""
+    bodies = [
+        RigidBody(name=name, mass=mass, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, -1.0))
+        for name, mass, x in (("heavy", HEAVY, -RADIUS), ("light", LIGHT, RADIUS))
+    ]
+    bodies.append(RigidBody(name="drum", mass=4.0, inertia=(DRUM, DRUM, DRUM), position=(0.0, 0.0, 0.0)))
+    rails = [
+        Prismatic(name=f"{name} rail", between=(WORLD, name), axis=(0.0, 0.0, 1.0), compliance=0.0)
+        for name in ("heavy", "light")
+    ]
+    axle = Hinge(name="axle", between=(WORLD, "drum"), axis=(0.0, 1.0, 0.0), compliance=0.0)
+    # A turn about y lifts what hangs at −x: z = r φ there, −r φ at +x.
+    wound = [
+        Relation(name=f"{name} wire", terms=((f"{name} rail", 1.0), ("axle", side * RADIUS)), compliance=0.0)
+        for name, side in (("heavy", -1.0), ("light", 1.0))
+    ]
+    return Scene(bodies=tuple(bodies), constraints=(*rails, axle, *wound), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def tackle(load: float) -> Scene:
+    """A block of `load` [kg] on four strands, one weight of 1 kg at the end of the wire."""
+    eyes = [(WORLD, (0.0, 0.0, 3.0 + k)) for k in range(STRANDS // 2)]
+    through: list[tuple[str, tuple[float, float, float]]] = []
+    for eye in eyes:
+        through += [eye, ("block", (0.0, 0.0, 0.0))]
+    through += [(WORLD, (0.0, 0.0, 9.0)), (WORLD, (4.0, 0.0, 9.0)), ("weight", (4.0, 0.0, 0.0))]
+    return Scene(
+        bodies=(
+            Particle(name="block", mass=load, position=(0.0, 0.0, 0.0)),
+            Particle(name="weight", mass=1.0, position=(4.0, 0.0, 0.0)),
+        ),
+        constraints=(Wire(name="wire", through=tuple(through), compliance=0.0),),
+        gravity=(0.0, 0.0, -GRAVITY),
+    )
+
+
+def tow(restitution: float = 0.0) -> Scene:
+    """A stone at rest, and a puller that runs away from it on a rope with slack."""
+    ends = {"stone": (0.0, 0.0, 0.0), "puller": (1.0, 0.0, 0.0)}
+    return Scene(
+        bodies=(
+            Particle(name="stone", mass=STONE, position=ends["stone"]),
+            Particle(name="puller", mass=PULLER, position=ends["puller"], velocity=(FAST, 0.0, 0.0)),
+        ),
+        constraints=(
+            Wire(
+                name="rope",
+                through=(("stone", ends["stone"]), ("puller", ends["puller"])),
+                length=1.0 + SLACK,
+                restitution=restitution,
+                compliance=0.0,
+            ),
+        ),
+    )
+
+
+def fall(simulate: Simulate) -> dict[str, float]:
+    """Speeds after two seconds, the wire's pull, and the tackle."""
+    speed: dict[str, Observable] = {"v": Final(quantity=Velocity("heavy"))}
+    pull: dict[str, Observable] = {"pull": Final(quantity=ConstraintForce("wire"))}
+    wire = simulate(atwood(), time_step=TIME_STEP, duration=1.0, observe=speed | pull)
+    wound = simulate(drum(), time_step=TIME_STEP, duration=DURATION, observe=speed)
+    still: dict[str, Observable] = {"v": MaximumAbsolute(quantity=Velocity())}
+    held = simulate(tackle(float(STRANDS)), time_step=TIME_STEP, duration=1.0, observe=still | pull)
+    lifted = simulate(
+        tackle(2.0 * STRANDS),
+        time_step=TIME_STEP,
+        duration=0.5,
+        observe={"v": Final(quantity=Velocity("block"))},
+    )
+    sinks = (2.0 * STRANDS - STRANDS) * GRAVITY / (2.0 * STRANDS + STRANDS**2)
+    return {
+        "wire_error": -float(wire["v"][2]) / IDEAL - 1.0,
+        "pull_error": float(wire["pull"]) * (HEAVY + LIGHT) / (2.0 * HEAVY * LIGHT * GRAVITY) - 1.0,
+        "drum_error": -float(wound["v"][2]) / (TURNING * DURATION) - 1.0,
+        "tackle_motion": float(held["v"].max()),
+        "tackle_pull": float(held["pull"]) / GRAVITY - 1.0,
+        "tackle_error": -float(lifted["v"][2]) / (0.5 * sinks) - 1.0,
+    }
+
+
+def snap(simulate: Simulate) -> dict[str, float]:
+    """What the rope leaves of speed and energy, plastic and with restitution ½, and how it gets there."""
+    observe = {
+        "v": Trace(quantity=Velocity()),
+        "p": Trace(quantity=Momentum()),
+        "E": Trace(quantity=Energy()),
+        "long": MaximumAbsolute(quantity=Violation("rope")),
+    }
+    reduced = STONE * PULLER / (STONE + PULLER)
+    worst = {"speed_error": 0.0, "momentum_error": 0.0, "loss_error": 0.0, "gain": 0.0}
+    for restitution in (0.0, 0.5):
+        result = simulate(tow(restitution), time_step=TIME_STEP, duration=0.5, observe=observe)
+        v, energy = result["v"][:, :, 0], result["E"]
+        parting = float(v[-1, 1] - v[-1, 0])
+        lost = 0.5 * reduced * FAST**2 * (1.0 - restitution**2)
+        worst["speed_error"] = max(worst["speed_error"], abs(parting + restitution * FAST))
+        worst["momentum_error"] = max(
+            worst["momentum_error"], float(np.abs(result["p"][:, 0] - PULLER * FAST).max())
+        )
+        worst["loss_error"] = max(worst["loss_error"], abs(float(energy[0] - energy[-1]) / lost - 1.0))
+        worst["gain"] = max(worst["gain"], float(np.diff(energy).max()))
+    return worst
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Place of the drum's heavy weight after a second against ½ a t² [m]."""
+    from_start = {"z": Trace(quantity=Velocity("heavy"))}
+    result = simulate(drum(), time_step=time_step, duration=1.0, method=method, observe=from_start)
+    return -time_step * math.fsum(result["z"][1:, 2]) - 0.5 * TURNING
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(drum(), time_step=time_step, duration=1.0, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Speeds of stone and puller."""
+    curves = []
+    for restitution in (0.0, 0.5):
+        observe = {"v": Trace(quantity=Velocity())}
+        result = simulate(tow(restitution), time_step=TIME_STEP, duration=0.5, observe=observe)
+        for k, name in enumerate(("stone", "puller")):
+            curves.append(
+                line(f"{name}, e = {restitution:g}", result.sample_times["v"], result["v"][:, k, 0])
+            )
+    together: Any = PULLER * FAST / (STONE + PULLER)
+    curves.append(line("m v/(m + M)", (0.0, 0.5), (together, together), "reference"))
+    return Drawing(
+        curves=tuple(curves),
+        x_label="time [s]",
+        y_label="speed [m/s]",
+        note=f"The rope is taut after {told(SLACK / FAST, 3)} s; then both go at {told(together, 3)} m/s if the blow is plastic.",
+    )
+
+
+def _error(name: str, description: str, unit: str, role: str, limit: float, source: str) -> Metric:
+    return Metric(
+        name=name,
+        description=description,
+        unit=unit,
+        role=role,  # type: ignore[arg-type]
+        limit=limit,
+        limit_source=source,
+        reference=0.0,
+        tolerance=0.1 * limit,
+    )
+
+
+STEADY = "a steady force is exact in the velocities of the discrete step; rounding remains"
+TURNS = (
+    "the drum turns by φ a step with sin φ = h ω, (h ω)³/6 more than h ω, so the weights go (h ω)²/6 faster than it: "
+    "of the weights' speed that is (h ω)²/6 (I/r²)/(m₁ + m₂ + I/r²) = 2.6e-3"
+)
+
+TEST = ScalarTest(
+    title="Wires and ropes",
+    question="Do wires over pulleys share their loads, and does a rope that snaps taut give the right blow?",
+    why="Cranes, lifts and winches hang on wires that only pull. A wire that pushes, loses load at a pulley or throws "
+    "energy in when it snaps taut drives machines that do not exist.",
+    model="Atwood's machine over eyes without friction, and over a drum on which the wire does not slip; a tackle of four "
+    "strands; a puller that runs off with a slack rope to a stone at rest, plastic and with restitution ½.",
+    parameters=(
+        ("time step", "1/60 s"),
+        ("Atwood", "3 kg and 2 kg; drum of 0.08 kg m² and 0.2 m"),
+        ("tackle", "four strands, 1 kg against 4 kg and 8 kg"),
+        ("tow", "5 kg and 2 kg, 3 m/s, 0.4 m of slack"),
+        ("gravity", "9.81 m/s²; none for the tow"),
+    ),
+    theory=(
+        "Atwood: a = (m₁ − m₂) g/(m₁ + m₂ + I/r²); pull 2 m₁ m₂ g/(m₁ + m₂) with I = 0.",
+        "Tackle of n strands: M = n m balances; else a = (M − n m) g/(M + n² m) of the block.",
+        "Snap: the parting speed u becomes −e u, momentum stays, ½ µ u² (1 − e²) is lost, µ = m M/(m + M).",
+        "The rope is one row with λ ≤ 0: an open gap may close and no more, then the blow acts.",
+    ),
+    reference="Mechanics in closed form.",
+    conclusion="Green: wires pull alike on both sides of every eye and ropes let go. Red: a wire pushes, or a blow "
+    "is no blow.",
+    source="ours; wires are asked for in the thesis, section 5.4",
+    measurements=(
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            metrics=(
+                _error(
+                    "wire_error",
+                    "relative error of the speed after 1 s over eyes",
+                    "1",
+                    "gate",
+                    1e-11,
+                    STEADY,
+                ),
+                _error("pull_error", "relative error of the wire's pull", "1", "companion", 1e-11, STEADY),
+                _error(
+                    "drum_error",
+                    "relative error of the speed after 2 s over the drum",
+                    "1",
+                    "gate",
+                    2.6e-3,
+                    TURNS,
+                ),
+                _error(
+                    "tackle_motion",
+                    "largest speed of a balanced tackle in 1 s",
+                    "m/s",
+                    "companion",
+                    1e-12,
+                    STEADY,
+                ),
+                _error("tackle_pull", "relative error of its pull", "1", "companion", 1e-11, STEADY),
+                _error(
+                    "tackle_error",
+                    "relative error of the block's speed, out of balance",
+                    "1",
+                    "companion",
+                    1e-11,
+                    STEADY,
+                ),
+            ),
+            measure=fall,
+            note="Atwood's machine and a tackle",
+        ),
+        Measurement(
+            configuration="snap",
+            time_step=TIME_STEP,
+            metrics=(
+                _error(
+                    "speed_error",
+                    "parting speed after the snap, plus e times that before",
+                    "m/s",
+                    "gate",
+                    1e-9,
+                    "the blow is a row of its own: exact",
+                ),
+                _error(
+                    "momentum_error",
+                    "largest change of momentum",
+                    "N s",
+                    "companion",
+                    1e-12,
+                    "equal and opposite",
+                ),
+                _error(
+                    "loss_error",
+                    "relative error of the energy lost",
+                    "1",
+                    "companion",
+                    1e-9,
+                    "½ µ u² (1 − e²)",
+                ),
+                _error(
+                    "gain",
+                    "largest gain of energy in a step",
+                    "J",
+                    "companion",
+                    1e-12,
+                    "no step of a rope gives energy",
+                ),
+            ),
+            measure=snap,
+            note="a slack rope, e = 0 and ½",
+        ),
+    ),
+    example=lambda: Example(scene=atwood(), time_step=TIME_STEP, duration=1.0),
+    figures=(Figure(name="snap", title="A rope snaps taut", draw=draw),),
+    ladders=(
+        Ladder(
+            name="fall",
+            description="sum of the heavy weight's velocities in 1 s over the drum against ½ a t²",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 480, 1 / 120)),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=None,
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-2,
+            target_seconds=0.01,
+        ),
+    ),
+)

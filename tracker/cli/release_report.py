@@ -1,0 +1,153 @@
+"""What the releases of an engine changed, in the terminal and as a page; beside its changelog, if one is given."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from spook_tracker.tracker.judge.comparison_document import Change
+from spook_tracker.tracker.judge.release_notes import Changelog, Checked, Step, by_test, check, visible
+
+SHOWN = 3  # changes of one test in a list; the database has them all
+
+
+def steps_between(history: Any, engine: str) -> tuple[list[Any], list[Step]]:
+    """The newest run of each measured release, oldest first, and what changed from each to the next."""
+    from spook_tracker.tracker.library import compare
+
+    newest = {run.engine.version: run for run in history.runs(engine)}
+    runs = list(newest.values())
+    steps = []
+    for before, after in itertools.pairwise(runs):
+        found = compare(history, before.id, after.id)
+        both = history.samples(before.id).keys() & history.samples(after.id).keys()
+        steps.append(
+            Step(
+                release=after.engine.version,
+                before=before.engine.version,
+                changes=tuple(change for change in found.changes if visible(change)),
+                asked=len(both),
+            )
+        )
+    return runs, steps
+
+
+def text_lines(engine: str, steps: Sequence[Step], changelog: Changelog | None) -> list[str]:
+    """A line for every release, and below it what changed, worst first."""
+    if not steps:
+        return [
+            f"fewer than two releases of {engine} are recorded; measure more: tracker backfill --engine {engine}"
+        ]
+    lines: list[str] = []
+    for step in steps:
+        lines.append(f"{engine} {step.release} after {step.before}: {_count(len(step.changes), 'change')}")
+        for found in by_test(step.changes).values():
+            lines += [f"  {change.word:<14} {change.series}  {values(change)}" for change in found[:SHOWN]]
+            if len(found) > SHOWN:
+                lines.append(f"  {'':<14} … and {len(found) - SHOWN} more of {found[0].test}")
+    if changelog is None:
+        return lines
+    checked = check(steps, changelog)
+    lines += ["", f"against {changelog.source}"]
+    lines += [f"  found   {entry.release} {entry.says}" for entry, _ in checked.found]
+    lines += [f"  missed  {entry.release} {entry.says}" for entry in checked.missed]
+    lines += [f"  unsaid  {release}: {_tests(changes)}" for release, changes in checked.unsaid]
+    return lines
+
+
+def page(
+    engine: str, history: Any, runs: Sequence[Any], steps: Sequence[Step], changelog: Changelog | None
+) -> str:
+    """The same as a page in Markdown. Every number in it comes from the recorded runs."""
+    names = sorted({series.partition("/")[0] for run in runs for series in history.samples(run.id)})
+    lines = [
+        f"# What {len(runs)} releases of {engine} changed",
+        "",
+        f"Each release from {runs[0].engine.version} to {runs[-1].engine.version} was installed from the package index",
+        f"into a folder of its own and asked {_count(max(step.asked for step in steps), 'question')} of these tests:",
+        f"{', '.join(names)}.",
+        "A change is a value that moved by more than 1e-6 of itself (and more than 1e-12), or another outcome.",
+        "Run times and what ran into a time limit are left out.",
+        "",
+        "| release | values of questions | changes | where |",
+        "|---|---|---|---|",
+        _row(history, runs[0], None),
+        *(_row(history, run, step) for run, step in zip(runs[1:], steps, strict=True)),
+        "",
+    ]
+    if changelog is not None:
+        lines += _against(check(steps, changelog), changelog)
+    lines += ["## Every change", ""]
+    for step in steps:
+        if step.changes:
+            lines += [f"### {step.release}, after {step.before}", ""]
+            lines += [*_change_table(step.changes), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _row(history: Any, run: Any, step: Step | None) -> str:
+    samples = [sample for _, sample in history.samples(run.id).values()]
+    good = sum(sample.outcome in ("value", "unsettled", "out_of_limit") for sample in samples)
+    changes = "" if step is None else str(len(step.changes))
+    return f"| {run.engine.version} | {good} of {len(samples)} | {changes} | {_tests(step.changes if step else ())} |"
+
+
+def _against(checked: Checked, changelog: Changelog) -> list[str]:
+    lines = [
+        "## Against the changelog",
+        "",
+        f"Read: {changelog.source}, which goes up to {changelog.last}. Its entries about behaviour that these scenes",
+        "could show are listed with the series that could show them; an entry is found if one of these changed.",
+        "",
+        f"**Found: {len(checked.found)}**",
+        "",
+    ]
+    for entry, changes in checked.found:
+        lines.append(f"- {entry.release}, item {entry.item}: {entry.says}. Seen in {_tests(changes)}:")
+        lines.append(f"  `{changes[0].series}` {values(changes[0])}.")
+    lines += ["", f"**Missed: {len(checked.missed)}**", ""]
+    lines += [f"- {entry.release}, item {entry.item}: {entry.says}." for entry in checked.missed]
+    lines += ["", f"**Not in the changelog: {_count(len(checked.unsaid), 'release')}**", ""]
+    for release, changes in checked.unsaid:
+        lines.append(f"- {release}: {_tests(changes)}; `{changes[0].series}` {values(changes[0])}.")
+    if checked.unread:
+        lines += [
+            "",
+            f"The changelog at hand does not reach {', '.join(checked.unread)}; their changes are below.",
+        ]
+    return [*lines, ""]
+
+
+def _change_table(changes: Sequence[Change]) -> list[str]:
+    lines = ["| series | before | after | unit | |", "|---|---|---|---|---|"]
+    for found in by_test(changes).values():
+        for change in found[:SHOWN]:
+            before, after = (
+                _word(change.before, change.before_outcome),
+                _word(change.after, change.after_outcome),
+            )
+            lines.append(f"| `{change.series}` | {before} | {after} | {change.unit} | {change.word} |")
+        if len(found) > SHOWN:
+            lines.append(f"| … and {len(found) - SHOWN} more of {found[0].test} | | | | |")
+    return lines
+
+
+def values(change: Change) -> str:
+    """Before and after, with the unit."""
+    before = _word(change.before, change.before_outcome)
+    return f"{before} → {_word(change.after, change.after_outcome)} {change.unit}".rstrip()
+
+
+def _word(value: Any, outcome: str | None) -> str:
+    if outcome in ("value", "unsettled", "out_of_limit"):
+        return f"{float(value):.6g}"
+    return (outcome or "not asked").replace("_", " ")
+
+
+def _tests(changes: Iterable[Change]) -> str:
+    return ", ".join(by_test(changes)) or "-"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number or 'no'} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,141 @@
+"""What each release of an engine changed, beside what its changelog says.
+
+An entry of a changelog names the series that could show it. It is *found* if one of them changed with that
+release, *missed* if none did; a change no entry speaks of is *not in the changelog*.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.judge.comparison_document import Change
+
+SEEN = 1e-6  # relative: below it a value that changed is rounding to a reader of releases
+NOTHING = 1e-12  # of any unit: below it a value is zero to a reader of releases
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """From one measured release to the next."""
+
+    release: str
+    before: str
+    changes: tuple[Change, ...]  # that a reader can see, the worst first
+    asked: int  # series measured in both
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """What a changelog says of one release, in our words."""
+
+    release: str
+    item: int  # its number in the changelog
+    says: str
+    shows: tuple[str, ...]  # patterns of series that could show it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changelog:
+    """Entries about behaviour that a scene could show. `last`: the newest release it speaks of."""
+
+    source: str
+    last: str
+    releases: tuple[str, ...]  # it speaks of
+    entries: tuple[Entry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """Both sides of the comparison."""
+
+    found: tuple[tuple[Entry, tuple[Change, ...]], ...]
+    missed: tuple[Entry, ...]
+    unsaid: tuple[tuple[str, tuple[Change, ...]], ...]  # release and changes no entry speaks of
+    unread: tuple[str, ...] = field(default=())  # releases with changes that the changelog does not reach
+
+
+def visible(change: Change) -> bool:
+    """A change of class, or of value beyond rounding; what a busy machine does says nothing here."""
+    if change.kind in ("time", "run_time", "work") or change.before is None or change.after is None:
+        return False
+    if "timed_out" in (change.before_outcome, change.after_outcome):
+        return False
+    if change.before_outcome != change.after_outcome:
+        return True
+    before, after = float(change.before), float(change.after)
+    if before == after or (before != before and after != after):
+        return False
+    return not abs(after - before) <= max(SEEN * max(abs(before), abs(after)), NOTHING)
+
+
+def read_changelog(file: Path) -> Changelog:
+    """From TOML: source, releases (oldest first) and a table [[entry]] each. DocumentError names what is wrong."""
+    try:
+        given: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
+        entries = tuple(
+            Entry(release=one["release"], item=one["item"], says=one["says"], shows=tuple(one["shows"]))
+            for one in given["entry"]
+        )
+        releases = tuple(given["releases"])
+        source = given["source"]
+    except (OSError, tomllib.TOMLDecodeError, KeyError) as error:
+        raise DocumentError(
+            f"{file} is no changelog: {error}; it has source, releases and [[entry]] with release, item, "
+            "says and shows"
+        ) from None
+    stray = [entry.release for entry in entries if entry.release not in releases]
+    if stray:
+        raise DocumentError(f"{file}: an entry speaks of {stray[0]!r}, which is not among its releases")
+    return Changelog(source=source, last=releases[-1], releases=releases, entries=entries)
+
+
+def check(steps: Sequence[Step], changelog: Changelog) -> Checked:
+    """Found, missed, and not in the changelog; releases that were not measured are left out.
+
+    An entry of a release that was passed over belongs to the next one that was measured.
+    """
+    found, missed, unsaid, unread = [], [], [], []
+    for step in steps:
+        if step.release not in changelog.releases:
+            if step.changes:
+                unread.append(step.release)
+            continue
+        since = _between(changelog.releases, step.before, step.release)
+        told: set[str] = set()
+        for entry in (entry for entry in changelog.entries if entry.release in since):
+            shown = tuple(change for change in step.changes if matches(change.series, entry.shows))
+            told.update(change.series for change in shown)
+            if shown:
+                found.append((entry, shown))
+            else:
+                missed.append(entry)
+        rest = tuple(change for change in step.changes if change.series not in told)
+        if rest:
+            unsaid.append((step.release, rest))
+    return Checked(found=tuple(found), missed=tuple(missed), unsaid=tuple(unsaid), unread=tuple(unread))
+
+
+def matches(series: str, patterns: Iterable[str]) -> bool:
+    """Whether one of the patterns, as a shell has them, fits the key of a series."""
+    return any(fnmatch(series, pattern) for pattern in patterns)
+
+
+def by_test(changes: Iterable[Change]) -> Mapping[str, list[Change]]:
+    """In the order of the first of each."""
+    found: dict[str, list[Change]] = {}
+    for change in changes:
+        found.setdefault(change.test, []).append(change)
+    return found
+
+
+def _between(releases: Sequence[str], before: str, last: str) -> tuple[str, ...]:
+    """After `before` up to and with `last`; an unknown `before` leaves `last` alone."""
+    end = releases.index(last)
+    start = releases.index(before) + 1 if before in releases else end
+    return tuple(releases[start : end + 1])
