@@ -32,7 +32,7 @@ nightly: install
 test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
-	$(BIN)/pytest -q -n auto --dist loadfile
+	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 check: develop
 	$(BIN)/ruff format --check .
