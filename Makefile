@@ -32,7 +32,7 @@ nightly: install
 test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
-	$(BIN)/pytest -q -n auto --dist loadfile
+	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 check: develop
 	$(BIN)/ruff format --check .
@@ -45,8 +45,8 @@ check: develop
 
 # Over the core; again only when something in it has changed since it passed.
 tidy: develop
-	$(BIN)/cmake -S engine/native -B build/native-tests $(NATIVE_TESTS) -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
-	sh .ci/tidy $(BIN)/clang-tidy build/native-tests
+	$(BIN)/cmake -S engine/native -B build/tidy $(NINJA) -DSPOOK_PYTHON=OFF -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
+	sh .ci/tidy $(BIN)/clang-tidy build/tidy
 
 # The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
 package: develop
@@ -80,7 +80,7 @@ bench-heaps: develop
 
 # Where clang-19 and its WebAssembly libraries are; .ci/install-system gets them on Debian.
 wasm: develop
-	$(BIN)/cmake -S engine/native -B build/wasm -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
+	$(BIN)/cmake -S engine/native -B build/wasm $(NINJA) \
 	    -DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/engine/native/wasm/toolchain.cmake -DCMAKE_BUILD_TYPE=Release \
 	    -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
 	$(BIN)/cmake --build build/wasm --target live
@@ -99,14 +99,16 @@ site: install
 serve: install
 	$(BIN)/tracker serve $(OUT)
 
-NATIVE_TESTS = -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja -DCMAKE_BUILD_TYPE=Release -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON
+NINJA = -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja
+# Against the library that the Python module was linked from: what is tested is what runs, and compiled once.
 native-tests: develop
-	$(BIN)/cmake -S engine/native -B build/native-tests $(NATIVE_TESTS)
+	$(BIN)/cmake -S engine/native/tests -B build/native-tests $(NINJA) -DCMAKE_BUILD_TYPE=Release \
+	    -DSPOOK_LIBRARY="$$(ls -t $(CURDIR)/build/cp*/libspook.a | head -n 1)"
 	$(BIN)/cmake --build build/native-tests
 	$(BIN)/ctest --test-dir build/native-tests --output-on-failure
 
 sanitize: develop
-	$(BIN)/cmake -S engine/native -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
+	$(BIN)/cmake -S engine/native -B build/sanitize $(NINJA) \
 	    -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=ON
 	$(BIN)/cmake --build build/sanitize
 	$(BIN)/ctest --test-dir build/sanitize --output-on-failure

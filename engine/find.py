@@ -1,7 +1,7 @@
 """An engine by its name: ours, one of `engine/peers/`, one a package announces, or module:attribute.
 
     spook                      ours (also "engine", the older name)
-    mujoco, exudyn, …          another engine behind an adapter of ours, an optional extra
+    mujoco, exudyn, cannon …   another engine behind an adapter of ours, an optional extra (from PyPI or npm)
     any other word             what an installed package announces as an entry point "spook_tracker.engines"
     my_engine, my_engine:NAME  a module with simulate and build_info, or an `Adapter` called ENGINE or NAME
 
@@ -27,7 +27,8 @@ from spook_tracker.engine.scene import Scene
 
 OURS = ("spook", "engine")
 GROUP = "spook_tracker.engines"
-EXTRAS: Mapping[str, str] = {"mujoco": "mujoco", "exudyn": "exudyn"}  # engine: the module its adapter needs
+EXTRAS: Mapping[str, str] = {"mujoco": "mujoco", "exudyn": "exudyn"}  # engine: its package, from PyPI
+NODE: Mapping[str, str] = {"cannon": "cannon-es"}  # engine: its package, from npm
 
 
 class EngineMissing(EngineError):
@@ -62,7 +63,7 @@ def find(name: str) -> Any:
     """The engine of that name: our package, a Peer, or a module. Raises EngineMissing."""
     if name in OURS:
         return importlib.import_module("spook_tracker.engine")
-    if name in EXTRAS:
+    if name in EXTRAS or name in NODE:
         return Peer(_peer(name).ENGINE)
     for point in entry_points(group=GROUP):
         if point.name == name:
@@ -79,7 +80,7 @@ def find(name: str) -> Any:
 
 def known() -> tuple[str, ...]:
     """Names of the engines that can be asked for, installed or not."""
-    return ("spook", *EXTRAS, *sorted(point.name for point in entry_points(group=GROUP)))
+    return ("spook", *EXTRAS, *NODE, *sorted(point.name for point in entry_points(group=GROUP)))
 
 
 def _faced(found: Any) -> Any:
@@ -93,9 +94,8 @@ def _peer(name: str) -> Any:
     try:
         return importlib.import_module(f"spook_tracker.engine.peers.{name}")
     except ImportError as error:
-        raise EngineMissing(
-            f"engine {name!r} is not installed ({error}); install it with: pip install 'spook-tracker[{name}]'"
-        ) from None
+        how = f"npm install {NODE[name]}" if name in NODE else f"pip install 'spook-tracker[{name}]'"
+        raise EngineMissing(f"engine {name!r} is not installed ({error}); install it with: {how}") from None
 
 
 def _loaded(name: str, load: Any) -> Any:

@@ -14,6 +14,15 @@ from tests import postgresql
 from tests.browser import MISSING, browser, programs
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
 
+# Minutes of work in few tests: they start first, so that all workers end at about the same time.
+LONG = ("tracker_publish", "scalar_tests_limits", "scalar_tests_answers", "tracker_durability", "tracker_history_machine",
+        "site_browser", "site_access", "release", "packaging", "tracker_publish_history", "judge_detection")  # fmt: skip
+FIRST = [Path(__file__).with_name(f"test_{name}.py") for name in LONG]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: FIRST.index(item.path) if item.path in FIRST else len(FIRST))
+
 
 @pytest.fixture(scope="session")
 def postgresql_server() -> Iterator[postgresql.Server]:

@@ -10,6 +10,7 @@ import pytest
 
 from spook_tracker.engine import (
     Ball,
+    Box,
     ConstraintForce,
     ContactForce,
     Distance,
@@ -178,3 +179,35 @@ def test_locked_bodies_are_one_body_in_joint_coordinates() -> None:
     assert list(merged["end"]) == [1.5, 0.0, 0.0]
     assert -0.1 < welded["end"][2] < -1e-6
     assert math.isfinite(welded.seconds)
+
+
+def test_default_friction_creeps_where_the_box_should_stand() -> None:
+    """At tan θ = 0.3, below µ = 0.5: centimetres in ten seconds with soft pyramids, a ten-thousandth with care."""
+
+    def crept(configuration: str) -> float:
+        path = {"path": Trace(quantity=Position("box"), first=60)}
+        run = simulate(inclined(0.3), configuration, time_step=1 / 60, duration=11.0, observe=path)
+        return float(np.abs(run["path"][-1] - run["path"][0]).max())
+
+    assert 0.01 < crept("defaults") < 0.04
+    assert crept("rk4") < 1e-6
+
+
+def test_welds_as_equalities_let_a_long_beam_fall_and_merged_bodies_do_not() -> None:
+    """Eighty boxes fixed at one end for a second: springs in a row, against one body."""
+    boxes = [
+        RigidBody(name=f"{k}", mass=2.5, shape=Box((0.125, 0.1, 0.1)), position=(0.125 * (k + 0.5), 0.0, 0.0))
+        for k in range(80)
+    ]
+    locks = [
+        Lock(name=f"lock {k}", between=("world" if k == 0 else f"{k - 1}", f"{k}"), at=(0.125 * k, 0.0, 0.0))
+        for k in range(80)
+    ]
+    scene = Scene(bodies=tuple(boxes), constraints=tuple(locks), gravity=GRAVITY, contacts=False)
+
+    def sag(configuration: str) -> float:
+        tip = {"tip": Final(quantity=Position("79"))}
+        return -float(simulate(scene, configuration, time_step=1 / 60, duration=1.0, observe=tip)["tip"][2])
+
+    assert sag("equalities") > 1.0
+    assert abs(sag("rk4")) < 1e-12

@@ -120,3 +120,10 @@ def test_help_is_quick_because_it_imports_nothing_heavy() -> None:
     assert done.returncode == 0
     for heavy in ("numpy", "pandas", "scipy", "sqlalchemy", "plotly", "rich", "jinja2", "engine"):
         assert not re.search(rf"\| +(spook_tracker\.)?{heavy}\b", done.stderr), heavy
+
+
+def test_files_of_long_tests_are_there() -> None:
+    """A file that was renamed would silently start last."""
+    from tests.conftest import FIRST
+
+    assert [path for path in FIRST if not path.exists()] == []

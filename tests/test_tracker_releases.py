@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -13,9 +14,10 @@ from click.testing import CliRunner
 
 import spook_tracker.tracker.cli.releases as command
 import spook_tracker.tracker.measure.releases as releases
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.judge.comparison_document import Change
-from spook_tracker.tracker.judge.release_notes import visible
+from spook_tracker.tracker.judge.release_notes import read_changelog, visible
 from spook_tracker.tracker.library import record
 from tests.run_documents import engine, run_of
 
@@ -172,12 +174,17 @@ def test_a_changelog_is_found_missed_or_says_nothing(tmp_path: Path) -> None:
         f"**Found: 1**\n\n- 1.1, item 4: falls are better. Seen in pendulum:\n  `{KEY}` 0.5 → 0.25 %." in page
     )
     assert "**Missed: 1**\n\n- 1.2, item 1: blows are better." in page
-    assert f"**Not in the changelog: 1 release**\n\n- 1.3: pendulum; `{other}` 1 → 2" in page
+    assert f"**Not in the changelog: 1 release**\n\n- 1.3: `{other}` 1 → 2" in page
     assert "does not reach 2.0" in page
     assert f"| `{KEY}` | 0.25 | 0.125 | % |" in page
 
     text = CliRunner().invoke(main, asked).output
     assert "found   1.1 falls are better\n  missed  1.2 blows are better\n  unsaid  1.3: pendulum" in text
+
+    changelog.write_text(f'blown_up = ["blow/*"]\n{changelog.read_text()}')
+    page = CliRunner().invoke(main, [*asked, "--markdown"]).output
+    assert "**Not in the changelog: no releases**" in page
+    assert "(`blow/*`):\ntheir changes in 1.3 count for nothing here" in page
 
     changelog.write_text('releases = ["1.0"]\nsource = "x"\nentry = [{release = "9"}]\n')
     refused = CliRunner().invoke(main, asked)
@@ -201,19 +208,27 @@ def test_one_release_alone_changes_nothing_and_says_how_to_go_on(tmp_path: Path)
         (1.0, 1.0 + 1e-5, True),
         (1e-14, -3e-13, False),
         (0.0, 1e-11, True),
-        ("nan", "nan", False),
+        (math.nan, math.nan, False),
     ],
 )
-def test_rounding_is_no_change(before: Any, after: Any, seen: bool) -> None:
-    change = msgspec.convert(
-        {
-            "series": KEY, "test": "falling_object", "metric": "m", "configuration": "rk4", "role": "gate",
-            "kind": "scalar", "unit": "m", "word": "changed", "red": False, "stands": "none", "name": "",
-            "sentence": "", "before": before, "after": after, "before_outcome": "value",
-            "after_outcome": "value", "limit": None,
-        },
-        type=Change,
+def test_rounding_is_no_change(before: float, after: float, seen: bool) -> None:
+    change = Change(
+        series=KEY, test="falling_object", metric="m", configuration="rk4", role="gate", kind="scalar",
+        unit="m", word="changed", red=False, stands="none", name="", sentence="", before=before, after=after,
+        before_outcome="value", after_outcome="value", limit=None,
     )  # fmt: skip
     assert visible(change) == seen
     assert not visible(msgspec.structs.replace(change, after_outcome="timed_out"))
     assert visible(msgspec.structs.replace(change, after_outcome="diverged"))
+
+
+def test_the_changelog_of_mujoco_speaks_of_series_that_are_asked() -> None:
+    changelog = read_changelog(Path(__file__).parent.parent / "docs" / "mujoco-changelog.toml")
+    configurations = {"*", "rk4", "defaults", "equalities"}
+
+    assert changelog.last == "3.12.0"
+    for entry in changelog.entries:
+        for pattern in entry.shows:
+            test, configuration, *_ = pattern.split("/")
+            assert test == "*" or test in CATALOGUE, pattern
+            assert configuration in configurations, pattern

@@ -110,7 +110,14 @@ def _against(checked: Checked, changelog: Changelog) -> list[str]:
     lines += [f"- {entry.release}, item {entry.item}: {entry.says}." for entry in checked.missed]
     lines += ["", f"**Not in the changelog: {_count(len(checked.unsaid), 'release')}**", ""]
     for release, changes in checked.unsaid:
-        lines.append(f"- {release}: {_tests(changes)}; `{changes[0].series}` {values(changes[0])}.")
+        told = [f"`{found[0].series}` {values(found[0])}" for found in by_test(changes).values()]
+        lines.append(f"- {release}: {'; '.join(told)}.")
+    if checked.blown_up:
+        lines += [
+            "",
+            f"Rounding decides the values of runs that blow up ({', '.join(f'`{one}`' for one in changelog.blown_up)}):",
+            f"their changes in {', '.join(checked.blown_up)} count for nothing here.",
+        ]
     if checked.unread:
         lines += [
             "",

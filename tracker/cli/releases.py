@@ -35,6 +35,9 @@ MEGABYTE = 1e6
     type=click.Path(path_type=Path),
     help="Where releases are installed.",
 )
+@click.option(
+    "--out", metavar="DIR", type=click.Path(path_type=Path), help="Publish the website there afterwards."
+)
 @click.option("--catalogue", default="spook_tracker.scalar_tests.catalogue:CATALOGUE", metavar="MODULE:NAME")
 @limit_option
 @workers_option
@@ -46,6 +49,7 @@ def backfill(
     newest: int | None,
     budget: float | None,
     folder: Path,
+    out: Path | None,
     catalogue: str,
     limit: float | None,
     workers: int,
@@ -78,6 +82,13 @@ def backfill(
             f"the releases in {folder} take {taken:.0f} MB; delete the folder when nothing is to be measured again"
         )
     _tell(engine, database, None, False)
+    if out is not None:
+        from spook_tracker.tracker.cli.history import accepted_levels
+        from spook_tracker.tracker.library import History, publish
+
+        with History.open(database) as history:
+            publish(history, out, accepted_levels(None), "")
+        say(f"published {out / 'index.html'}")
 
 
 def progress(

@@ -1,15 +1,16 @@
 """What each release of an engine changed, beside what its changelog says.
 
 An entry of a changelog names the series that could show it. It is *found* if one of them changed with that
-release, *missed* if none did; a change no entry speaks of is *not in the changelog*.
+release, *missed* if none did; a change no entry speaks of is *not in the changelog*. Where a run blows up, rounding
+decides its values: a change there is shown and is evidence of nothing.
 """
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from fnmatch import fnmatch
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,7 @@ class Changelog:
     last: str
     releases: tuple[str, ...]  # it speaks of
     entries: tuple[Entry, ...]
+    blown_up: tuple[str, ...] = ()  # patterns of series of runs that blow up
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +59,8 @@ class Checked:
     found: tuple[tuple[Entry, tuple[Change, ...]], ...]
     missed: tuple[Entry, ...]
     unsaid: tuple[tuple[str, tuple[Change, ...]], ...]  # release and changes no entry speaks of
-    unread: tuple[str, ...] = field(default=())  # releases with changes that the changelog does not reach
+    unread: tuple[str, ...] = ()  # releases with changes that the changelog does not reach
+    blown_up: tuple[str, ...] = ()  # releases with changes in runs that blow up
 
 
 def visible(change: Change) -> bool:
@@ -83,7 +86,7 @@ def read_changelog(file: Path) -> Changelog:
             for one in given["entry"]
         )
         releases = tuple(given["releases"])
-        source = given["source"]
+        source, blown_up = given["source"], tuple(given.get("blown_up", ()))
     except (OSError, tomllib.TOMLDecodeError, KeyError) as error:
         raise DocumentError(
             f"{file} is no changelog: {error}; it has source, releases and [[entry]] with release, item, "
@@ -92,7 +95,7 @@ def read_changelog(file: Path) -> Changelog:
     stray = [entry.release for entry in entries if entry.release not in releases]
     if stray:
         raise DocumentError(f"{file}: an entry speaks of {stray[0]!r}, which is not among its releases")
-    return Changelog(source=source, last=releases[-1], releases=releases, entries=entries)
+    return Changelog(source=source, last=releases[-1], releases=releases, entries=entries, blown_up=blown_up)
 
 
 def check(steps: Sequence[Step], changelog: Changelog) -> Checked:
@@ -100,30 +103,39 @@ def check(steps: Sequence[Step], changelog: Changelog) -> Checked:
 
     An entry of a release that was passed over belongs to the next one that was measured.
     """
-    found, missed, unsaid, unread = [], [], [], []
+    found, missed, unsaid, unread, blown_up = [], [], [], [], []
     for step in steps:
+        telling = tuple(change for change in step.changes if not matches(change.series, changelog.blown_up))
+        if len(telling) < len(step.changes):
+            blown_up.append(step.release)
         if step.release not in changelog.releases:
-            if step.changes:
+            if telling:
                 unread.append(step.release)
             continue
         since = _between(changelog.releases, step.before, step.release)
         told: set[str] = set()
         for entry in (entry for entry in changelog.entries if entry.release in since):
-            shown = tuple(change for change in step.changes if matches(change.series, entry.shows))
+            shown = tuple(change for change in telling if matches(change.series, entry.shows))
             told.update(change.series for change in shown)
             if shown:
                 found.append((entry, shown))
             else:
                 missed.append(entry)
-        rest = tuple(change for change in step.changes if change.series not in told)
+        rest = tuple(change for change in telling if change.series not in told)
         if rest:
             unsaid.append((step.release, rest))
-    return Checked(found=tuple(found), missed=tuple(missed), unsaid=tuple(unsaid), unread=tuple(unread))
+    return Checked(
+        found=tuple(found),
+        missed=tuple(missed),
+        unsaid=tuple(unsaid),
+        unread=tuple(unread),
+        blown_up=tuple(blown_up),
+    )
 
 
 def matches(series: str, patterns: Iterable[str]) -> bool:
     """Whether one of the patterns, as a shell has them, fits the key of a series."""
-    return any(fnmatch(series, pattern) for pattern in patterns)
+    return any(fnmatchcase(series, pattern) for pattern in patterns)
 
 
 def by_test(changes: Iterable[Change]) -> Mapping[str, list[Change]]:

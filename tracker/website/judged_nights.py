@@ -48,13 +48,22 @@ class Texts:
     def __init__(self) -> None:
         self.texts: dict[str, int] = {"": 0}
         self.definitions: dict[str, int] = {}
+        self.known: dict[tuple[Any, ...], int] = {}  # what a definition says, before it is written out
 
     def place(self, text: str) -> int:
         return self.texts.setdefault(text, len(self.texts))
 
     def definition(self, definition: SeriesDefinition) -> int:
-        told = json.dumps(definition_fields(definition), allow_nan=False)
-        return self.definitions.setdefault(told, len(self.definitions))
+        d = definition
+        said = (
+            d.test, d.role, d.kind, d.unit, d.better, d.limit, d.set_point, d.reference, d.tolerance,
+            d.relative_tolerance, d.test_version, d.configuration, d.metric,
+        )  # fmt: skip
+        place = self.known.get(said)
+        if place is None:
+            told = json.dumps(definition_fields(definition), allow_nan=False)
+            place = self.known[said] = self.definitions.setdefault(told, len(self.definitions))
+        return place
 
     def row(
         self,

@@ -1,0 +1,148 @@
+"""cannon-es, the JavaScript engine that steps by SPOOK, too: rows solved by Gauss-Seidel, in Node.
+
+An implementation of the method that shares no line with ours: with sweeps enough, the same answers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.forces import CentralGravity, Load
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock
+from spook_tracker.engine.observe import ConstraintForce
+from spook_tracker.engine.peers import node
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recorded_joints import joint_point
+from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.shapes import Box, Plane, Shape, Sphere
+
+PACKAGE = "cannon-es"
+SCRIPT = Path(__file__).with_suffix(".mjs")
+FORCE = 1e15  # N, more than any row needs: cannon bounds every row, by 1e6 N unless told
+FOUND = node.package(PACKAGE)
+
+
+class Cannon:
+    """The adapter."""
+
+    name = "cannon"
+    capabilities = Capabilities(
+        shapes=frozenset({Sphere, Box, Plane}),
+        joints=frozenset({Distance, Lock, Ball, Hinge}),
+        forces=frozenset({CentralGravity, Load}),
+        shows=frozenset({ConstraintForce}),
+        shows_force_of=frozenset({Distance}),
+        friction=True,
+    )
+    configurations = (
+        Configuration(
+            name="accurate",
+            reason="rigid rows (stiffness 1e15) relaxed over two steps, which is SPOOK with a damping of 2 h, and 500 "
+            "sweeps at every step: what the method gives where time is no matter",
+            expected_order=1.0,
+            options={"sweeps": 500, "tolerance": 0.0, "stiffness": 1e15, "relaxation": 2.0},
+        ),
+        Configuration(
+            name="defaults",
+            reason="10 sweeps, stiffness 1e7, relaxed over three steps: what one gets without asking",
+            expected_order=1.0,
+            options={"sweeps": 10, "tolerance": 1e-7, "stiffness": 1e7, "relaxation": 3.0},
+        ),
+    )
+
+    def build_info(self) -> BuildInfo:
+        installed = str(node.facts(FOUND)["version"])
+        return BuildInfo(self.name, installed, "", False, "", (), "npm package, run by Node", "")
+
+    def record(self, task: Task) -> Recording:
+        return node.run(SCRIPT, described(task), task.time_limit)
+
+
+def described(task: Task) -> dict[str, Any]:
+    """The task as JSON takes it. Raises NotSupported for rods that do not end in centres."""
+    scene = task.scene
+    places = {body.name: place for place, body in enumerate(scene.bodies)}
+    joined = [c.between for c in scene.constraints if isinstance(c, Joint) and WORLD not in c.between]
+    pairs = {tuple(sorted((places[a], places[b]))) for a, b in (*scene.no_contact, *joined)}
+    return {
+        "module": node.entry(FOUND),
+        "gravity": scene.gravity,
+        "time_step": task.time_step,
+        "steps": task.steps,
+        "every_step": task.every_step,
+        "time_limit": task.time_limit,
+        "options": dict(task.configuration.options),
+        "force": FORCE,
+        "contacts": scene.contacts,
+        "apart": sorted(pairs),
+        "bodies": [_body(body) for body in scene.bodies],
+        "forces_of": [c.name for c in scene.constraints if isinstance(c, Distance)]
+        if task.constraint_forces
+        else [],
+        "constraints": [_constraint(task, constraint, places) for constraint in scene.constraints],
+        "loads": [
+            {"body": places[f.body], "force": f.force, "torque": f.torque}
+            for f in scene.forces
+            if isinstance(f, Load)
+        ],
+        "fields": [
+            {"centre": f.centre, "strength": f.strength}
+            for f in scene.forces
+            if isinstance(f, CentralGravity)
+        ],
+    }
+
+
+def _body(body: Particle | RigidBody) -> dict[str, Any]:
+    moves = isinstance(body, Particle) or body.motion == "dynamic"
+    return {
+        "mass": body.mass if moves else 0.0,
+        "inertia": (0.0, 0.0, 0.0) if isinstance(body, Particle) or not moves else body.inertia,
+        "position": body.position,
+        "velocity": body.velocity,
+        "orientation": (1.0, 0.0, 0.0, 0.0) if isinstance(body, Particle) else body.orientation,
+        "spin": (0.0, 0.0, 0.0) if isinstance(body, Particle) else body.angular_velocity,
+        "friction": 0.0 if isinstance(body, Particle) else body.material.friction,
+        "shape": None if isinstance(body, Particle) or body.shape is None else _shape(body.shape),
+    }
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    upright = (1.0, 0.0, 0.0, 0.0)
+    if isinstance(shape, Sphere):
+        return {"kind": "sphere", "radius": shape.radius, "turn": upright}
+    if isinstance(shape, Box):
+        return {"kind": "box", "half": [0.5 * edge for edge in shape.size], "turn": upright}
+    assert isinstance(shape, Plane)
+    x, y, z = shape.normal
+    turn = np.array([1.0 + z, -y, x, 0.0]) if z > -1.0 + 1e-12 else np.array([0.0, 1.0, 0.0, 0.0])
+    return {"kind": "plane", "turn": list(turn / np.linalg.norm(turn))}
+
+
+def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str, Any]:
+    scene = task.scene
+    ends: list[Any] = [
+        places[end] if isinstance(end, str) and end != WORLD else end for end in constraint.between
+    ]
+    if isinstance(constraint, Distance):
+        if any(any(anchor) for anchor in constraint.anchors):
+            raise NotSupported("cannon does not support a rod that ends beside a centre of mass")
+        length = scene.length(constraint) if constraint.rest_length is None else constraint.rest_length
+        return {"kind": "distance", "name": constraint.name, "ends": ends, "length": length}
+    at = joint_point(scene, constraint)
+    ends = [list(at) if end == WORLD else end for end in ends]
+    kind = {Ball: "ball", Lock: "lock", Hinge: "hinge"}[type(constraint)]
+    return {
+        "kind": kind,
+        "ends": ends,
+        "at": list(at),
+        "axis": list(getattr(constraint, "axis", (0.0, 0.0, 1.0))),
+    }
+
+
+ENGINE = Cannon()
