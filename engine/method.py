@@ -28,8 +28,10 @@ class Method:
     iterations, residual_tolerance   when an iterative solve stops; sweeps over contacts go on, up to four times as
                        many, where rows are still off by more than unsettled_residual
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
-    impacts            simultaneous: touching bodies take part in a blow; successive: it passes through them one
-                       after the other, so that the last ball of a touching row leaves
+    impacts            simultaneous: all that touch take part in one blow (a ball on four gives −.6 and four times .4);
+                       a pair is struck once in a step, and stops without rebound where it approaches again;
+                       successive: one pair after the other until none approaches, as if there were small gaps (the
+                       last ball leaves, no energy is lost at restitution 1)
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled"
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal

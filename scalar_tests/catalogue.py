@@ -26,6 +26,12 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     # what it asks for next
     "bouncing_ball": "bouncing_ball",
     "blow": "blow",
+    "between_walls": "between_walls",
+    "billiards": "billiards",
+    "cradle": "cradle",
+    "near_miss": "near_miss",
+    "edge_roll": "edge_roll",
+    "overhang": "overhang",
     "rotating_box": "rotating_box",
     "swinging_door": "swinging_door",
     "lock_ring": "lock_ring",
@@ -42,6 +48,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "wires": "wires",
     "scissor_lift": "scissor_lift",
     "gears": "gears",
+    "robot_arm": "robot_arm",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

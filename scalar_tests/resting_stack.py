@@ -153,6 +153,13 @@ def heaviest_on_light(simulate: Simulate) -> BreakPoint:
     )
 
 
+def heaviest_neighbour(simulate: Simulate) -> BreakPoint:
+    """Largest mass ratio of neighbours in a stack of six, light and heavy in turn."""
+    return break_point(
+        lambda ratio: _stands(simulate, (MASS, ratio * MASS) * 3), 1.0, 1e12, resolution=0.1, walk=13
+    )
+
+
 def tallest_stack(simulate: Simulate) -> BreakPoint:
     """Most equal boxes that stand on each other."""
     return break_count(lambda count: _stands(simulate, (MASS,) * count), (2, 5, 10, 20, 40, 80))
@@ -257,6 +264,16 @@ TEST = ScalarTest(
             configuration="plain",
             definition="2 s with every load right to 1e-6 and nothing moved by more than 1e-6 of an edge",
             study=heaviest_on_light,
+            unit="1",
+            expected=(1e9, 1e12),
+            expected_source="the contact solve is refined against the true equations; the search ends at 1e12",
+        ),
+        StabilityStudy(
+            name="heavy-neighbours",
+            title="Largest mass ratio of neighbours in a stack of six",
+            configuration="plain",
+            definition="2 s with every load right to 1e-6 and nothing moved by more than 1e-6 of an edge",
+            study=heaviest_neighbour,
             unit="1",
             expected=(1e9, 1e12),
             expected_source="the contact solve is refined against the true equations; the search ends at 1e12",

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "collision/detection.hpp"
+#include "collision/sweep.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -123,6 +124,72 @@ void keys_last_while_the_touching_features_do() {
     }
 }
 
+/// Boxes and capsules that fly and turn past each other, on parts off their centres or not: nothing is missed that
+/// many small steps see, and nothing is found where they see nothing.
+void sweeps_find_what_small_steps_find() {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    const auto vector = [&](double size) { return size * Vec3{unit(random), unit(random), unit(random)}; };
+    const auto turned = [&] {
+        const Vec3 v = vector(1.0);
+        const double s = 1.0 / std::sqrt(1.0 + dot(v, v));
+        return rotation(Quat{s, s * v.x, s * v.y, s * v.z});
+    };
+    constexpr double slop = 1e-6;
+    constexpr int samples = 2000;
+    int hits = 0, misses = 0;
+    for (int trial = 0; trial < 600; ++trial) {
+        const Primitive shapes[] = {Primitive::box({0.4, 0.6, 0.8}), Primitive::capsule(0.2, 0.7),
+                                    Primitive::sphere(0.3)};
+        const Primitive &one = shapes[trial % 3], &two = shapes[trial / 3 % 3];
+        const Pose part{trial % 2 ? vector(0.3) : Vec3{}, turned()}, own{{}, turned()};
+        const Pose here{vector(0.1), turned()}, there{Vec3{1.6, 0, 0} + vector(0.3), turned()};
+        // Every third spins about its own axis only, every fourth about the line between both.
+        const Vec3 spin = trial % 3 == 1   ? 6.0 * (here.rotation * column(part.rotation, 2))
+                          : trial % 4 == 1 ? Vec3{6.0, 0, 0}
+                                           : vector(4.0);
+        const Mover first{one, part, here, Vec3{1.0, 0, 0} + vector(1.0), spin};
+        const Mover second{two, own, there, vector(0.5), vector(3.0)};
+        if (separation(one, first.at(0.0), two, second.at(0.0)).gap <= 0.0) continue;
+        double deepest = 0.0, seen = -1.0;
+        for (int k = 0; k <= samples; ++k) {
+            const double time = static_cast<double>(k) / samples;
+            const double gap = separation(one, first.at(time), two, second.at(time)).gap;
+            if (gap < -slop && seen < 0.0) seen = time;
+            deepest = std::min(deepest, gap);
+        }
+        const double found = first_touch(first, second, 1.0, slop);
+        if (seen >= 0.0) {
+            ++hits;
+            EXPECT(found >= 0.0 && found <= seen);
+        } else if (found < 0.0) {
+            ++misses;
+        }
+        if (found >= 0.0) EXPECT(separation(one, first.at(found), two, second.at(found)).gap < 1e-3);
+    }
+    EXPECT(hits > 100 && misses > 50);
+}
+
+/// A face on a level with its neighbour: what turns about the normal, or rolls, slides on and meets nothing.
+void what_turns_in_a_plane_meets_no_side_of_it() {
+    const Primitive tile = Primitive::box({1, 1, 1}), box = Primitive::box({0.1, 0.2, 0.1}),
+                    roller = Primitive::capsule(0.05, 0.1);
+    const Pose own, next{{1, 0, -0.5}, Mat3::identity()};
+    const Mover still{tile, own, next, {}, {}};
+    const Pose flat{{0.3, 0.1, 0.05}, Mat3::identity()};
+    const double half = std::sqrt(0.5);
+    const Pose lying{{0.3, 0.1, 0.05}, rotation(Quat{half, half, 0, 0})};  // axis along y
+    for (const double h : {1.0 / 60.0, 0.1}) {
+        EXPECT(first_touch({box, own, flat, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
+        EXPECT(first_touch({roller, own, lying, {5, 0, 0}, {0, 100, 0}}, still, h, 1e-10) < 0.0);
+        EXPECT(first_touch({roller, own, lying, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
+    }
+    // One that tips is met, and so is one that stands a little lower.
+    EXPECT(first_touch({box, own, flat, {5, 0, 0}, {0, 4, 0}}, still, 0.1, 1e-10) >= 0.0);
+    const Pose lower{{0.3, 0.1, 0.0499}, Mat3::identity()};
+    EXPECT(first_touch({box, own, lower, {5, 0, 0}, {0, 0, 4}}, still, 0.1, 1e-10) >= 0.0);
+}
+
 }  // namespace
 
 int main() {
@@ -131,5 +198,7 @@ int main() {
     not_a_number_touches_nothing();
     filters_and_order();
     keys_last_while_the_touching_features_do();
+    sweeps_find_what_small_steps_find();
+    what_turns_in_a_plane_meets_no_side_of_it();
     return report();
 }

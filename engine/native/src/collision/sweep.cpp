@@ -125,23 +125,43 @@ Pose Mover::body_at(double time) const noexcept {
 
 double turning_arm(const Primitive& shape, const Pose& part) noexcept {
     const double offset = norm(part.position);
-    return shape.kind == ShapeKind::sphere ? offset : offset + reach(shape);
+    switch (shape.kind) {
+        case ShapeKind::sphere: return offset;
+        case ShapeKind::capsule: return offset + shape.half_length;
+        default: return offset + reach(shape);
+    }
 }
+
+namespace {
+
+/// How fast a body's spin can move its shape along n, m/s, now and at any later time: a spin about n moves nothing
+/// along it, and neither does a capsule that rolls about its own axis. `far` bounds how far away it may act.
+double turning_speed(const Mover& mover, Vec3 n, double far) noexcept {
+    const double rate = norm(cross(mover.spin, n));
+    if (rate == 0.0) return 0.0;
+    if (mover.shape.kind == ShapeKind::plane) return rate * far;
+    if (mover.shape.kind == ShapeKind::capsule) {
+        const Vec3 axis = mover.body.rotation * column(mover.part.rotation, 2);
+        return rate * norm(mover.part.position) +
+               std::min(rate, norm(cross(mover.spin, axis))) * mover.shape.half_length;
+    }
+    return rate * turning_arm(mover.shape, mover.part);
+}
+
+}  // namespace
 
 double first_touch(const Mover& first, const Mover& second, double duration, double slop) noexcept {
     const double far =
         norm(first.body.position - second.body.position) + duration * norm(first.velocity - second.velocity);
-    const auto arm = [](const Mover& m) { return turning_arm(m.shape, m.part); };
-    const auto sweep = [&](const Mover& m, const Mover& other) {
-        const double rate = norm(m.spin);
-        return rate == 0.0 ? 0.0 : rate * (m.shape.kind == ShapeKind::plane ? far + arm(other) : arm(m));
-    };
-    const double turning = sweep(first, second) + sweep(second, first);
+    const double first_far = far + turning_arm(second.shape, second.part),
+                 second_far = far + turning_arm(first.shape, first.part);
     const Vec3 approach = second.velocity - first.velocity;
     double time = 0.0;
     constexpr int rounds = 200;  // a factor of two each where a round surface is met at a slant
     for (int round = 0; round < rounds; ++round) {
         const Separation apart = separation(first.shape, first.at(time), second.shape, second.at(time));
+        const double turning =
+            turning_speed(first, apart.normal, first_far) + turning_speed(second, apart.normal, second_far);
         const double closing = dot(apart.normal, approach), speed = std::max(0.0, closing) + turning;
         if (apart.gap <= -0.5 * slop) {
             const double back =

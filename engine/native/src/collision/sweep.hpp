@@ -26,7 +26,8 @@ struct Mover {
     Pose at(double time) const noexcept { return placed(body_at(time), part); }
 };
 
-/// How far from its body's centre a body's spin can move the shape's surface, m: a ball's own turning moves nothing.
+/// How far from its body's centre a body's spin can move the shape's surface, m: a ball's own turning moves nothing,
+/// a capsule's only its axis.
 double turning_arm(const Primitive& shape, const Pose& part) noexcept;
 
 /// The first time [s] in 0 … duration at which the shapes overlap by more than `slop` [m], carried back to where

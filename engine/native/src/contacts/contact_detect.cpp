@@ -132,9 +132,12 @@ void ContactStage::find_open() {
         for (const Contact& contact : scratch_) {
             if (!reachable(contact)) continue;
             add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
+            const double depth = std::max(0.0, -contact.point.gap);
+            const double sinking =
+                -options_.time_step * relative(points_.back(), contact.point.normal, velocity_, false);
             for (const int b : {contact.first, contact.second}) {
-                supported_[b] = 1;
-                depth_[b] = std::max(depth_[b], -contact.point.gap);
+                supported_[b] = 1;  // and as deep as it will be when it meets the next part of what holds it
+                depth_[b] = std::max(depth_[b], depth + std::clamp(sinking, 0.0, depth));
             }
         }
     }
@@ -171,7 +174,8 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
     const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
     double turning = 0.0;
     if (open.first_arm != 0.0 || open.second_arm != 0.0) {
-        const double first = norm(angular(velocity[a])), second = norm(angular(velocity[b]));
+        const double first = norm(cross(angular(velocity[a]), open.apart.normal)),
+                     second = norm(cross(angular(velocity[b]), open.apart.normal));
         if ((open.first_arm < 0.0 && first > 0.0) || (open.second_arm < 0.0 && second > 0.0)) return false;
         turning = first * open.first_arm + second * open.second_arm;
     }

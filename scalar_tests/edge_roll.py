@@ -1,0 +1,170 @@
+"""Does a ball leave the edge of a table where its contact force ends?"""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine import AngularVelocity, Box, Final, RigidBody, Scene, Sphere, Velocity
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.case import Curve, Drawing, Example, Figure, ScalarTest, Simulate
+from spook_tracker.scalar_tests.closed_form import ask, error
+
+TIME_STEP = 2.5e-4  # s
+RADIUS = 0.1  # m
+MASS = 1.0  # kg
+GRAVITY = 9.81  # m/s²
+RUN_UP = 0.123  # m
+SLOW, FAST = 0.3, 1.2  # m/s; the centre leaves in a straight line above √(g r) = 0.99
+ROUGH = 50.0  # coefficient of friction: no slip until the force has all but ended
+DURATION = 0.9  # s
+
+
+def scene(speed: float, rolling: bool) -> Scene:
+    """A ball near the edge of a table, rolling on a rough one or sliding on a smooth one."""
+    surface = Material(friction=ROUGH if rolling else 0.0)
+    table = RigidBody(
+        name="table",
+        motion="static",
+        shape=Box((1.0, 1.0, 1.0)),
+        position=(-0.5, 0.0, -0.5),
+        material=surface,
+    )
+    ball = RigidBody(
+        name="ball",
+        mass=MASS,
+        shape=Sphere(RADIUS),
+        position=(-RUN_UP, 0.0, RADIUS),
+        velocity=(speed, 0.0, 0.0),
+        angular_velocity=(0.0, speed / RADIUS if rolling else 0.0, 0.0),
+        material=surface,
+    )
+    return Scene(bodies=(table, ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def departure(speed: float, rolling: bool) -> tuple[float, float]:
+    """Angle [rad] from the vertical at which the edge lets go, and the speed of the centre there [m/s]."""
+    part = 1.0 / (1.4 if rolling else 1.0)  # of the potential energy that goes into the centre's motion
+    cosine = min(1.0, (2.0 * part + speed**2 / (GRAVITY * RADIUS)) / (1.0 + 2.0 * part))
+    return math.acos(cosine), math.sqrt(speed**2 + 2.0 * part * GRAVITY * RADIUS * (1.0 - cosine))
+
+
+def last_hop(speed: float, rolling: bool, time_step: float = TIME_STEP) -> float:
+    """How long before the departure the discrete ball touches last [s].
+
+    Each step goes straight on and leaves the edge by up to v²/r h of normal speed. The force N = m k t that is
+    left at t before the departure brings the ball back after 2 v²/r h/(k t): as long as t itself for
+    t = √(2 h v²/(r k)).
+    """
+    angle, leaving = departure(speed, rolling)
+    inward = leaving**2 / RADIUS  # m/s²
+    along = GRAVITY * math.sin(angle) * (5.0 / 7.0 if rolling else 1.0)
+    rate = 2.0 * leaving * along / RADIUS + GRAVITY * math.sin(angle) * leaving / RADIUS  # m/s³
+    return math.sqrt(2.0 * time_step * inward / rate)
+
+
+def errors(
+    simulate: Simulate, speed: float, rolling: bool, time_step: float = TIME_STEP
+) -> tuple[float, float]:
+    """Errors of the level speed [m/s] and of the spin [rad/s] in flight, which nothing changes any more."""
+    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    result = simulate(scene(speed, rolling), time_step=time_step, duration=DURATION, observe=observe)
+    angle, leaving = departure(speed, rolling)
+    spin = leaving / RADIUS if rolling else 0.0
+    return float(result["v"][0]) - leaving * math.cos(angle), float(result["w"][1]) - spin
+
+
+def _measure(simulate: Simulate) -> dict[str, float]:
+    sliding, _ = errors(simulate, SLOW, False)
+    _, rolling = errors(simulate, SLOW, True)
+    fast = [errors(simulate, FAST, rolling) for rolling in (False, True)]
+    return {
+        "sliding_error": sliding,
+        "rolling_spin_error": rolling,
+        "fast_speed_error": max((abs(speed) for speed, _ in fast)),
+        "fast_spin_error": max((abs(spin) for _, spin in fast)),
+    }
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    speeds = tuple(0.1 * k for k in range(1, 13))
+    step = 4.0 * TIME_STEP
+    found = tuple(
+        errors(simulate, speed, False, step)[0] + math.cos(angle) * leaving
+        for speed in speeds
+        for angle, leaving in (departure(speed, False),)
+    )
+    right = tuple(
+        math.cos(angle) * leaving for angle, leaving in (departure(speed, False) for speed in speeds)
+    )
+    return Drawing(
+        curves=(
+            Curve(name="smooth edge", x=speeds, y=found, style="points"),
+            Curve(name="closed form", x=speeds, y=right, style="reference"),
+        ),
+        x_label="speed on the table [m/s]",
+        y_label="level speed in flight [m/s]",
+        note="From √(g r) = 0.99 m/s on the ball leaves straight away.",
+    )
+
+
+TEST = ScalarTest(
+    title="Over the edge",
+    question="Does a ball leave the edge of a table where its contact force ends?",
+    why="An edge is the place where contacts change their normal in every step; engines catch on it, or let go early.",
+    model="A ball slides over the edge of a smooth table, or rolls over that of a rough one, and flies off.",
+    parameters=(
+        ("ball", "radius 0.1 m, 1 kg"),
+        ("speeds", "0.3 m/s and 1.2 m/s"),
+        ("friction coefficient", "0 and 50"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "2.5e-4 s"),
+    ),
+    theory=(
+        "The edge lets go where m v²/r = m g cos θ: cos θ = (2 + v₀²/(g r))/3 sliding, (10 + 7 v₀²/(g r))/17 rolling.",
+        "From v₀² = g r on it leaves at once, with speed and spin as they were.",
+        "The discrete ball hops along the edge; after its last hop no friction turns it: √(2 h v²/(r k)) early.",
+    ),
+    reference="Energy and the end of the contact force (closed form).",
+    conclusion="Green: the normal follows the edge and pushes only. Red: the edge holds, catches or throws.",
+    source="ours; a classic of mechanics",
+    measurements=(
+        ask(
+            _measure,
+            (
+                error(
+                    "sliding_error",
+                    "error of the level speed of a ball that slides off at 0.3 m/s",
+                    "m/s",
+                    GRAVITY * TIME_STEP,
+                    "the speed normal to the edge is off by up to v²/r h ≤ g h in the last hop, and it ends there",
+                ),
+                error(
+                    "rolling_spin_error",
+                    "error of the spin of a ball that rolls off at 0.3 m/s",
+                    "rad/s",
+                    5.0 / 7.0 * GRAVITY / RADIUS * math.sin(departure(SLOW, True)[0]) * last_hop(SLOW, True),
+                    "5/7 g sin θ/r of spin is gained per second until the last hop, √(2 h v²/(r k)) before the end",
+                ),
+                error(
+                    "fast_speed_error",
+                    "largest error of the level speed at 1.2 m/s, sliding and rolling",
+                    "m/s",
+                    1e-12,
+                    "the edge is not touched any more: rounding of the run-up",
+                ),
+                error(
+                    "fast_spin_error",
+                    "largest error of the spin at 1.2 m/s, sliding and rolling",
+                    "rad/s",
+                    1e-11,
+                    "the edge is not touched any more: rounding of the run-up",
+                    role="companion",
+                ),
+            ),
+            "Four balls.",
+            TIME_STEP,
+        ),
+    ),
+    example=lambda: Example(scene=scene(SLOW, True), time_step=4.0 * TIME_STEP, duration=DURATION),
+    figures=(Figure(name="speed", title="Level speed in flight against speed on the table", draw=_draw),),
+)

@@ -1,0 +1,221 @@
+"""Does a stack of plates hang over by half the harmonic series, and fall beyond?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    AngularVelocity,
+    Box,
+    Energy,
+    Final,
+    Maximum,
+    Method,
+    Penetration,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+)
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+
+TIME_STEP = 1.0 / 60.0  # s
+LENGTH, THICKNESS = 1.0, 0.1  # m
+MASS = 1.0  # kg
+GRAVITY = 9.81  # m/s²
+FRICTION = 0.5
+COUNT = 10
+FALLEN = 3  # plates of the heap
+INSIDE, OUTSIDE = 0.99, 1.01  # of the limit
+STANDING = 2.0  # s
+FALLING = 4.0  # s
+LADDER_DURATION = 2.0  # s
+
+
+def scene(count: int, share: float) -> Scene:
+    """`count` plates, the k-th from above reaching `share` L/(2 k) beyond the next, on a floor."""
+    rough = Material(friction=FRICTION)
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    plates, x = [], 0.0
+    for level in range(count):
+        if level:
+            x += share * LENGTH / (2.0 * (count - level))
+        plates.append(
+            RigidBody(
+                name=f"plate {level + 1}",
+                mass=MASS,
+                shape=Box((LENGTH, LENGTH, THICKNESS)),
+                position=(x, 0.0, THICKNESS * (level + 0.5)),
+                material=rough,
+            )
+        )
+    return Scene(bodies=(floor, *plates), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def tipping_rate(share: float = OUTSIDE) -> float:
+    """Angular acceleration [rad/s²] of one plate whose centre is beyond the edge below it."""
+    beyond = 0.5 * (share - 1.0) * LENGTH
+    inertia = (LENGTH**2 + THICKNESS**2) / 12.0 + beyond**2 + 0.25 * THICKNESS**2  # m², about the edge
+    return GRAVITY * beyond / inertia
+
+
+def _measure_standing(simulate: Simulate) -> dict[str, float]:
+    observe = {"moved": Final(quantity=Position(), from_start=True)}
+    result = simulate(scene(COUNT, INSIDE), time_step=TIME_STEP, duration=STANDING, observe=observe)
+    return {"standing_moved": float(np.abs(result["moved"]).max())}
+
+
+def _measure_tipping(simulate: Simulate) -> dict[str, float]:
+    observe = {"w": Final(quantity=AngularVelocity("plate 2"))}
+    result = simulate(scene(2, OUTSIDE), time_step=TIME_STEP, steps=1, observe=observe)
+    return {"tipping_error": float(result["w"][1]) / (TIME_STEP * tipping_rate()) - 1.0}
+
+
+def _measure_heap(simulate: Simulate) -> dict[str, float]:
+    observe = {"depth": Maximum(quantity=Penetration()), "energy": Trace(quantity=Energy())}
+    result = simulate(scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=FALLING, observe=observe)
+    energy = result["energy"]
+    return {
+        "heap_overlap": float(result["depth"]),
+        "heap_energy_rise": float(np.diff(energy).max() / energy[0]),
+    }
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    shares = tuple(0.97 + 0.005 * k for k in range(13))
+    rates = []
+    for share in shares:
+        observe = {"w": Final(quantity=AngularVelocity("plate 2"))}
+        result = simulate(scene(2, share), time_step=TIME_STEP, steps=1, observe=observe)
+        rates.append(float(result["w"][1]) / TIME_STEP)
+    return Drawing(
+        curves=(
+            Curve(name="simulation", x=shares, y=tuple(rates), style="points"),
+            Curve(
+                name="g d/i²", x=shares, y=tuple(max(0.0, tipping_rate(s)) for s in shares), style="reference"
+            ),
+        ),
+        x_label="overhang over its limit",
+        y_label="angular acceleration of the upper plate [rad/s²]",
+    )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Deepest overlap [m] while three plates fall and lie."""
+    observe = {"depth": Maximum(quantity=Penetration())}
+    result = simulate(
+        scene(FALLEN, OUTSIDE), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
+    )
+    return float(result["depth"])
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same fall with nothing observed."""
+    return simulate(scene(FALLEN, OUTSIDE), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
+def _followed(name: str, description: str, unit: str) -> Metric:
+    return Metric(name=name, description=description, unit=unit, role="reported", reference=0.0)
+
+
+TEST = ScalarTest(
+    title="Leaning plates",
+    question="Does a stack of plates hang over by half the harmonic series, and fall beyond?",
+    why="At its limit every interface is about to open: a solver that leaves a part of the load out, or softens it, "
+    "falls early or stands when it must not.",
+    model="Ten plates hang over each other at 0.99 of the limit; one plate tips at 1.01 of it; three plates at 1.01 "
+    "fall and lie in a heap.",
+    parameters=(
+        ("plates", "1 × 1 × 0.1 m, 1 kg"),
+        ("overhang", "0.99 and 1.01 of L/(2 k) over the k-th plate from above"),
+        ("friction coefficient", "0.5"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1/60 s"),
+    ),
+    theory=(
+        "The plates above an interface have their centre at its edge if the k-th reaches L/(2 k) further.",
+        "Inside, nothing moves. Outside, a plate starts to turn at g d/((L² + t²)/12 + d² + t²/4).",
+        "A fallen heap rests: no energy is gained.",
+    ),
+    reference="Statics, and the torque about an edge (closed form).",
+    conclusion="Green: loads are found where faces barely hold. Red: plates fall early, stick, or sink.",
+    source="ours; the harmonic stack is a classic of statics",
+    measurements=(
+        ask(
+            _measure_standing,
+            (
+                error(
+                    "standing_moved",
+                    "how far any of ten plates has moved in 2 s, at 0.99 of the limit",
+                    "m",
+                    1e-9,
+                    "statics: it stands; rounding and the solver's tolerance remain",
+                ),
+            ),
+            "Ten plates inside the limit.",
+            TIME_STEP,
+        ),
+        ask(
+            _measure_tipping,
+            (
+                error(
+                    "tipping_error",
+                    "relative error of the angular velocity after the first step, at 1.01 of the limit",
+                    "1",
+                    1e-9,
+                    "velocities of the first step are exact: h times the closed form",
+                ),
+            ),
+            "One plate outside the limit.",
+            TIME_STEP,
+        ),
+        Measurement(
+            configuration="plain",
+            time_step=TIME_STEP,
+            parameters={"N": FALLEN},
+            metrics=(
+                _followed("heap_overlap", "deepest overlap while three plates fall and lie, 4 s", "m"),
+                _followed(
+                    "heap_energy_rise",
+                    "largest rise of the energy in a step, over the energy at the start; plastic contacts give none",
+                    "1",
+                ),
+            ),
+            measure=_measure_heap,
+            note="Three plates fall. Followed for the work a heap at rest costs in a step.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=4.0),
+    figures=(Figure(name="tipping", title="Where the upper plate begins to tip", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="heap",
+            description="deepest overlap while three plates fall and lie",
+            unit="m",
+            time_steps=(1.0 / 30.0, 1.0 / 60.0),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+        ),
+    ),
+)
