@@ -85,6 +85,7 @@ class Wire:
     restitution: float = 0.0  # 0 … 1
     compliance: float = COMPLIANCE  # m/N
     damping: float | None = None  # s
+    strength: float | None = None  # N, of its tension: it breaks under more; None never does
 
     def __post_init__(self) -> None:
         check.name("wire", self.name)
@@ -115,6 +116,8 @@ class Wire:
         if restitution > 1.0:
             raise SceneError(f"{owner}: restitution must lie between 0 and 1, not {restitution:g}")
         object.__setattr__(self, "restitution", restitution)
+        if self.strength is not None:
+            object.__setattr__(self, "strength", check.positive(owner, "strength", self.strength))
         _check_row(self, owner)
 
     @property

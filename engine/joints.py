@@ -126,6 +126,9 @@ class Joint:
     """What all joints share. `between` names two bodies, or WORLD and a body; the joint frame is fixed to the
     first and coincides with the second at the start. `at` is a world point at the start (None: the second
     body's centre). Forces are read as those on the second body at the joint, in world axes.
+
+    A joint whose own rows carry more than `strength` or `torque_strength` in a step holds nothing from the next one on:
+    the last force it shows is the load it broke at. Its bodies do not touch each other after that either.
     """
 
     rows: ClassVar[int] = 0
@@ -135,6 +138,8 @@ class Joint:
     at: Vector | None = None  # m
     compliance: PerDegree = COMPLIANCE  # m/N, then rad/(N m)
     damping: PerDegree | None = None  # s
+    strength: float | None = None  # N; None never breaks
+    torque_strength: float | None = None  # N m
 
     def __post_init__(self) -> None:
         check.name(self.kind, self.name)
@@ -145,6 +150,9 @@ class Joint:
         object.__setattr__(self, "between", ends)
         if self.at is not None:
             object.__setattr__(self, "at", check.vector(owner, "at", self.at))
+        for field in ("strength", "torque_strength"):
+            if getattr(self, field) is not None:
+                object.__setattr__(self, field, check.positive(owner, field, getattr(self, field)))
         object.__setattr__(self, "compliance", _per_degree(owner, "compliance", self.compliance, self.rows))
         if self.damping is not None:
             object.__setattr__(self, "damping", _per_degree(owner, "damping", self.damping, self.rows))

@@ -21,7 +21,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.compiler import NOTHING
 from spook_tracker.engine.errors import EngineError, MethodError
 from spook_tracker.engine.forces import Force
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import (
     ConstraintForce,
@@ -173,6 +173,8 @@ def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
     soft = constraint.compliance
     if max(soft if isinstance(soft, tuple) else (soft,)) > RIGID and not can.compliance:
         yield "compliance of a joint"
+    if isinstance(constraint, Joint) and (constraint.strength or constraint.torque_strength) is not None:
+        yield "a joint that breaks"
     if isinstance(constraint, AxialJoint):
         for name in ("motor", "limit", "spring"):
             if getattr(constraint, name) is not None and not getattr(can, f"{name}s"):

@@ -208,6 +208,8 @@ def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step
         "damping": _six(2.0 * step if constraint.damping is None else constraint.damping),
         "one_sided": False,
         "restitution": 0.0,
+        "strength": _or(getattr(constraint, "strength", None), math.inf),
+        "torque_strength": _or(getattr(constraint, "torque_strength", None), math.inf),
     }
     if isinstance(constraint, Relation | Wire):
         columns |= {"first_point": _ORIGIN, "second_point": _ORIGIN, "axes": _WORLD_AXES, "rest_length": 0.0}

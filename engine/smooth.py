@@ -117,6 +117,8 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
 def _bounded(joint: Constraint) -> str | None:
     if isinstance(joint, Wire) and joint.slack:
         return "a wire that may go slack"
+    if (getattr(joint, "strength", None) or getattr(joint, "torque_strength", None)) is not None:
+        return "a strength at which it breaks"
     if not isinstance(joint, AxialJoint):
         return None
     if joint.limit is not None and joint.limit.lower < joint.limit.upper:

@@ -48,6 +48,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "wires": "wires",
     "scissor_lift": "scissor_lift",
     "gears": "gears",
+    "robot_arm": "robot_arm",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

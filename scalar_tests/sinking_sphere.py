@@ -22,7 +22,9 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -32,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.floating_box import period
 from spook_tracker.scalar_tests.sweep import line, told
@@ -116,6 +119,20 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same sinking with nothing observed."""
     return simulate(sinking(), time_step=time_step, duration=0.5, method=method)
+
+
+def stable(simulate: Simulate, time_step: float) -> bool:
+    """Whether a stone at its terminal speed, off by 1 %, comes nearer to it in 40 steps."""
+    observe = {"v": Final(quantity=Velocity("stone"))}
+    result = simulate(sinking(1.01 * TERMINAL), time_step=time_step, steps=40, observe=observe)
+    if not result.completed:
+        return False
+    return abs(-float(result["v"][2]) / TERMINAL - 1.0) < 0.01
+
+
+def largest_step(simulate: Simulate) -> BreakPoint:
+    """Where that ends, walking from a quarter of τ to four times τ."""
+    return break_point(lambda time_step: stable(simulate, time_step), 0.25 * RISE, 4.0 * RISE)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -222,6 +239,18 @@ TEST = ScalarTest(
         ),
     ),
     example=lambda: Example(scene=sinking(), time_step=TIME_STEP, duration=2.0),
+    stability=(
+        StabilityStudy(
+            name="time-step",
+            title="Largest time step of a stone that sinks",
+            configuration="plain",
+            definition="1 % off its terminal speed, the stone is nearer to it after 40 steps",
+            study=largest_step,
+            unit="s",
+            expected=(0.98 * RISE, 1.02 * RISE),
+            expected_source="the slope of the map of one step at v_t is 1 − 2 h/τ: stable for h < τ = 0.491 s",
+        ),
+    ),
     figures=(Figure(name="speed", title="Speed against time", draw=draw),),
     ladders=(
         Ladder(

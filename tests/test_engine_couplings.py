@@ -10,6 +10,7 @@ import pytest
 
 from spook_tracker.engine import (
     WORLD,
+    AngularVelocity,
     Ball,
     Box,
     ConstraintForce,
@@ -20,16 +21,19 @@ from spook_tracker.engine import (
     JointCoordinate,
     Limit,
     Load,
+    Lock,
     MaximumAbsolute,
     Method,
     MethodError,
     Momentum,
     Motor,
+    Orientation,
     Particle,
     Planar,
     PointOnLine,
     Position,
     Prismatic,
+    Ramp,
     Relation,
     RigidBody,
     Scene,
@@ -39,8 +43,11 @@ from spook_tracker.engine import (
     Velocity,
     Violation,
     Wire,
+    recorded_joints,
     simulate,
+    start,
 )
+from spook_tracker.engine.protocol import Capabilities, unsupported
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 H = 0.01
@@ -390,6 +397,130 @@ def test_energy_is_kept_while_they_move(kind: Any, method: Method) -> None:
     assert np.abs(result["E"] - rest).max() < 1e-4 * rest
 
 
+@pytest.mark.parametrize("kind", FREE)
+def test_a_recording_reads_the_same_violations(kind: Any) -> None:
+    """Two bodies on a soft joint, both moving: the rows of the engine and those found from places and turns."""
+    bodies = tuple(
+        RigidBody(
+            name=name,
+            mass=mass,
+            inertia=(1.0, 1.5, 2.0),
+            position=(x, 0.2, 0.0),
+            velocity=(0.1, x, -0.2),
+            angular_velocity=(0.3, -x, 0.4),
+        )
+        for name, mass, x in (("one", 1.0, 0.0), ("two", 2.0, 1.0))
+    )
+    joint = kind(
+        name="joint", between=("one", "two"), at=(0.4, 0.1, 0.3), axis=(1.0, 2.0, 2.0), compliance=0.1
+    )
+    scene = Scene(bodies=bodies, constraints=(joint,))
+    observe = {
+        "g": Trace(quantity=Violation("joint")),
+        "x": Trace(quantity=Position()),
+        "q": Trace(quantity=Orientation()),
+    }
+    result = simulate(scene, time_step=H, steps=100, observe=observe)
+
+    assert np.abs(result["g"][-1]).min() > 1e-4
+    np.testing.assert_allclose(
+        recorded_joints.violation(scene, joint, result["x"], result["q"]), result["g"], rtol=0, atol=1e-13
+    )
+
+
+def test_other_engines_are_not_asked_for_what_they_lack() -> None:
+    able = Capabilities(
+        particles=True,
+        rigid_bodies=True,
+        joints=frozenset({Lock, Hinge}),
+        forces=frozenset({Load}),
+        motors=True,
+        compliance=True,
+    )
+    assert unsupported(able, masses(), {}) == ("the joint wire",)
+    assert "the joint relation" in unsupported(able, pair(), {})
+    assert unsupported(able, hung(strength=1.0), {}) == ("a joint that breaks", "functions of time")
+
+
+# --- joints that break, and that rub ------------------------------------------------------------------------
+
+
+def hung(**strength: Any) -> Scene:
+    """2 kg on a lock, pulled down by a force that grows by 10 N a second."""
+    body = RigidBody(name="body", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+    lock = Lock(name="lock", between=(WORLD, "body"), compliance=0.0, **strength)
+    pull = Load(
+        name="pull",
+        body="body",
+        force=(0.0, 0.0, -1.0),
+        torque=(1.0, 0.0, 0.0),
+        factor=Ramp(end=10.0, end_value=100.0),
+    )
+    return Scene(bodies=(body,), constraints=(lock,), forces=(pull,), gravity=(0.0, 0.0, -10.0))
+
+
+@pytest.mark.parametrize(
+    ("strength", "breaks_at"), [({"strength": 30.0}, 1.0), ({"torque_strength": 5.0}, 0.5), ({}, None)]
+)
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_a_joint_breaks_under_more_than_its_strength_and_holds_nothing_then(
+    strength: Any, breaks_at: float | None, solver: Any
+) -> None:
+    observe = {"f": Trace(quantity=ConstraintForce("lock")), "v": Trace(quantity=Velocity("body"))}
+    method = Method(solver=solver, iterations=200, residual_tolerance=1e-14)
+    result = simulate(hung(**strength), time_step=H, steps=150, method=method, observe=observe)
+    held = 20.0 + 10.0 * H * np.arange(150)  # N, in each step: the load is taken at its beginning
+    if breaks_at is None:
+        np.testing.assert_allclose(result["f"][1:, 2], held, rtol=1e-9)
+        return
+    last = int(np.flatnonzero(result["f"][:, 2])[-1])  # the load it broke at is the last it shows
+    np.testing.assert_allclose(result["f"][1 : last + 1, 2], held[:last], rtol=1e-9)
+    assert (last - 1) * H == pytest.approx(breaks_at + H, abs=1e-9)
+    assert not result["f"][last + 1 :].any()
+    falls = np.diff(result["v"][last:, 2])
+    np.testing.assert_allclose(falls, -H * held[last:] / 2.0, rtol=1e-9)
+
+
+def test_a_wire_breaks_and_what_is_saved_before_is_whole_again() -> None:
+    stone = Particle(name="stone", mass=2.0, position=(0.0, 0.0, 0.0))
+    wire = Wire(name="wire", through=((WORLD, (0.0, 0.0, 1.0)), ("stone", (0.0, 0.0, 0.0))), strength=25.0)
+    more = Load(name="more", body="stone")
+    scene = Scene(bodies=(stone,), constraints=(wire,), forces=(more,), gravity=(0.0, 0.0, -10.0))
+    with start(scene, time_step=H, observe={"pull": ConstraintForce("wire")}) as run:
+        run.step(10)
+        saved = run.save()
+        run.set_load("more", force=(0.0, 0.0, -6.0))
+        run.step(2)
+        assert float(run["pull"]) == 0.0
+        run.restore(saved)
+        run.step(100)
+        assert float(run["pull"]) == pytest.approx(20.0, rel=1e-6)
+
+
+def test_a_motor_that_wants_to_stand_is_dry_friction() -> None:
+    """3 rad/s against 0.5 N m on 2 kg m²: 12 s of even slowing down, then rest; no more torque than what acts."""
+    wheel = RigidBody(
+        name="wheel",
+        mass=1.0,
+        inertia=(2.0, 2.0, 2.0),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 3.0),
+    )
+    rubbing = Hinge(name="axle", between=(WORLD, "wheel"), axis=Z, motor=Motor(speed=0.0, max_force=0.5))
+    push = Load(name="push", body="wheel", torque=(0.0, 0.0, 0.1))
+    observe = {"w": Trace(quantity=AngularVelocity("wheel")), "f": Final(quantity=ConstraintForce("axle"))}
+    result = simulate(
+        Scene(bodies=(wheel,), constraints=(rubbing,), forces=(push,)),
+        time_step=H,
+        steps=1600,
+        observe=observe,
+    )
+    times = H * np.arange(1601)
+
+    np.testing.assert_allclose(result["w"][:, 2], np.maximum(0.0, 3.0 - 0.2 * times), rtol=0, atol=1e-10)
+    assert result["f"][5] == pytest.approx(-0.1, rel=1e-9)
+
+
 def three() -> Scene:
     wheels = (rotor("a", 1.0), rotor("b", 1.0, 1.0), rotor("c", 1.0, 2.0))
     terms = tuple((f"{wheel.name} axle", 1.0) for wheel in wheels)
@@ -491,6 +622,21 @@ HOSTILE: dict[str, tuple[Any, type, str]] = {
         ),
         SceneError,
         "nothing it runs through can move",
+    ),
+    "strength": (
+        lambda: Lock(name="l", between=(WORLD, "a"), strength=0.0),
+        SceneError,
+        "strength must be positive",
+    ),
+    "strength of NaN": (
+        lambda: Wire(name="w", through=((WORLD, X), ("a", Y)), strength=math.nan),
+        SceneError,
+        "strength must be finite",
+    ),
+    "composition of what breaks": (
+        lambda: simulate(hung(strength=1.0), time_step=H, steps=1, method=Method(half_step_velocities=True)),
+        MethodError,
+        "a strength at which it breaks",
     ),
     "composition with a slack wire": (
         lambda: run(masses(), composition="order4"),

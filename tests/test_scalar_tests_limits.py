@@ -13,7 +13,15 @@ import pytest
 
 from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import double_pendulum, floating_box, gears, motor, sinking_sphere, wires
+from spook_tracker.scalar_tests import (
+    double_pendulum,
+    floating_box,
+    gears,
+    motor,
+    robot_arm,
+    sinking_sphere,
+    wires,
+)
 from spook_tracker.scalar_tests.beam import scene as beam
 from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Measurement, Simulate
@@ -316,6 +324,29 @@ def test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say() -> None:
     assert limits["drum_error"] == pytest.approx((wires.TIME_STEP * spin) ** 2 / 6.0 * share, rel=0.01)
     limits = {m.name: m.limit for m in measurement("gears", "plain").metrics}
     assert limits["ratio_error"] == pytest.approx(gears.standing(), rel=0.01)
+
+
+def test_the_torques_of_a_driven_arm_are_two_steps_late_at_most() -> None:
+    (gate,) = measurement("robot_arm", "driven").metrics
+    assert gate.limit == pytest.approx(robot_arm.lag_bound(), rel=0.01)
+    # The reference itself: torques times speeds are the rate of the energy of a driven arm.
+    pose, speeds, h = np.array(robot_arm.POSES[1]), np.array(robot_arm.SPEEDS), 1e-5
+
+    def energy(at: np.ndarray) -> float:
+        _, velocities, spins = robot_arm.inverse_dynamics(at, speeds, np.zeros(6))
+        arm = robot_arm.kinematics(at)
+        total = 0.0
+        for (_, _, centre, turn), (_, _, _, mass, inertia), v, w in zip(
+            arm, robot_arm.LINKS, velocities, spins, strict=True
+        ):
+            total += (
+                0.5 * mass * v @ v + 0.5 * w @ turn @ np.diag(inertia) @ turn.T @ w + mass * 9.81 * centre[2]
+            )
+        return total
+
+    torques, _, _ = robot_arm.inverse_dynamics(pose, speeds, np.zeros(6))
+    power = (energy(pose + h * speeds) - energy(pose - h * speeds)) / (2.0 * h)
+    assert torques @ speeds == pytest.approx(power, rel=1e-8)
 
 
 def test_the_terminal_speed_is_the_fixed_point_of_a_step_and_is_reached() -> None:

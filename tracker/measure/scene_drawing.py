@@ -5,11 +5,13 @@ Taken from the scene's definition, not from a simulation, so that it changes onl
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from itertools import pairwise
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.couplings import Wire
 from spook_tracker.engine.forces import CentralGravity, Spring
 from spook_tracker.engine.joints import Distance, Joint
 from spook_tracker.engine.scene import Scene
@@ -36,6 +38,9 @@ def drawing(scene: Scene) -> SceneDrawing:
             ]
             kind = "spring" if isinstance(tie, Spring) else "distance"
             links.append(DrawnLink(kind=kind, ends=(ends[0], ends[1])))  # type: ignore[arg-type]
+        elif isinstance(tie, Wire):
+            points = [point for _, point in tie.through]
+            links += [DrawnLink(kind="distance", ends=ends) for ends in itertools.pairwise(points)]
         elif isinstance(tie, Joint):
             links += _joint(tie, places)
     return SceneDrawing(

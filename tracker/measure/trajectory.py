@@ -6,6 +6,7 @@ step, and the page says which.
 
 from __future__ import annotations
 
+import itertools
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.couplings import Wire
 from spook_tracker.engine.forces import CentralGravity, Spring
 from spook_tracker.engine.joints import Distance, Joint
 from spook_tracker.engine.observe import (
@@ -231,6 +233,10 @@ def _links(scene: Scene) -> Sequence[TrackedLink]:
                 for end, anchor in zip(tie.between, anchors, strict=True)
             ]
             add("spring" if isinstance(tie, Spring) else "distance", ends, row)
+        elif isinstance(tie, Wire) and all(name in bodies for name, _ in tie.through):
+            at = [(bodies[name], _seen_from(scene, name, point)) for name, point in tie.through]
+            for piece in itertools.pairwise(at):
+                add("distance", piece, row)
         elif isinstance(tie, Joint) and all(name in bodies for name in tie.between):
             place = _inverse_of(scene, tie)
             add("joint", [(bodies[name], place(name)) for name in tie.between], row)
@@ -243,12 +249,14 @@ def _inverse_of(scene: Scene, joint: Joint) -> Callable[[str], Vector]:
     ends = [at[name].position for name in joint.between if name in at]
     middle = joint.at or tuple(sum(p[k] for p in ends) / len(ends) for k in range(3))
 
-    def place(name: str) -> Vector:
-        if name not in at:
-            return (middle[0], middle[1], middle[2])
-        body = at[name]
-        w, x, y, z = getattr(body, "orientation", UPRIGHT)
-        p = body.position
-        return turned((w, -x, -y, -z), (middle[0] - p[0], middle[1] - p[1], middle[2] - p[2]))
+    return lambda name: _seen_from(scene, name, (middle[0], middle[1], middle[2]))
 
-    return place
+
+def _seen_from(scene: Scene, name: str, point: Vector) -> Vector:
+    """A world point at the start in the axes of a body; of the world as it is."""
+    if name == WORLD:
+        return point
+    body = scene.body(name)
+    w, x, y, z = getattr(body, "orientation", UPRIGHT)
+    p = body.position
+    return turned((w, -x, -y, -z), (point[0] - p[0], point[1] - p[1], point[2] - p[2]))

@@ -41,7 +41,8 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
                   second_point = table.numbers("second_point", 3), axes = table.numbers("axes", 9),
                   length = table.numbers("rest_length"), compliance = table.numbers("compliance", 6),
                   damping = table.numbers("damping", 6), one_sided = table.numbers("one_sided"),
-                  restitution = table.numbers("restitution");
+                  restitution = table.numbers("restitution"), strength = table.numbers("strength"),
+                  torque_strength = table.numbers("torque_strength");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& joint = scene.joints.emplace_back();
         joint.kind = kind[i];
@@ -53,6 +54,8 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
         joint.rest_length = length[i];
         joint.one_sided = one_sided.flag(i);
         joint.restitution = restitution[i];
+        joint.strength = strength[i];
+        joint.torque_strength = torque_strength[i];
         std::copy_n(compliance.at(i), 6, joint.compliance.begin());
         std::copy_n(damping.at(i), 6, joint.damping.begin());
     }

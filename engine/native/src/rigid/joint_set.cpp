@@ -26,6 +26,9 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             gradient_.resize(std::max<std::size_t>({gradient_.size(), 12, 6 * general.bodies.size()}));
             generals_.push_back(std::move(general));
         }
+        joint.breakable = can_break(spec);
+        joint.strength = time_step * spec.strength;
+        joint.torque_strength = time_step * spec.torque_strength;
         JointBlock block;
         block.joint = static_cast<int>(joints_.size());
         block.first = joint.first;
@@ -83,6 +86,15 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
     State& state = states[block.joint];
     right.lower.fill(-kUnbounded);
     right.upper.fill(kUnbounded);
+    assemble_rows(block, joint, state, bodies, first, second, right);
+    if (!state.broken) return;
+    right.lower.fill(0.0);
+    right.upper.fill(0.0);
+}
+
+void JointSet::assemble_rows(const JointBlock& block, const Joint& joint, State& state,
+                             std::span<const BodyState> bodies, double* first, double* second,
+                             BlockRight& right) noexcept {
     if (block.axial) return assemble_axial(joint, state, bodies, first, second, right);
     if (joint.general >= 0) return assemble_general(joint, state, bodies, first, second, right);
     JointRows rows{first, second, {}, {}};
@@ -214,6 +226,19 @@ void JointSet::set_moving_rest(int joint, double rest, double before, double ahe
     axial.rest_moves = true;
     axial.rest_before = before;
     axial.rest_ahead = ahead;
+}
+
+void JointSet::break_overloaded(int index) noexcept {
+    const Joint& joint = joints_[index];
+    if (!joint.breakable) return;
+    State& state = states[index];
+    const JointHolds holds = holds_of(joint.constants.kind);
+    const int linear = holds.rows() > 0 ? holds.linear() : 1;  // distance, wire and relation: their row
+    double force = 0.0, torque = 0.0;
+    for (int i = 0; i < joint.constants.rows; ++i)
+        (i < linear ? force : torque) += state.multiplier[i] * state.multiplier[i];
+    state.broken =
+        state.broken || std::sqrt(force) > joint.strength || std::sqrt(torque) > joint.torque_strength;
 }
 
 double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept {

@@ -35,7 +35,8 @@ public:
         std::array<double, 6> multiplier{};
         std::array<double, 3> axial_multiplier{};
         Vec3 first_reach,
-            second_reach;       // from the centres to the point where forces are read, at the last step
+            second_reach;  // from the centres to the point where forces are read, at the last step
+        bool broken = false;
         bool at_limit = false;  // the free coordinate's limit was closed in the last step
         double angle = 0.0;     // unwrapped coordinate of a hinge that needs it
     };
@@ -82,6 +83,8 @@ public:
     void follow(std::span<const BodyState> bodies) noexcept {
         for (const int joint : followed_) states[joint].angle = coordinate(joint, bodies);
     }
+    /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
+    void break_overloaded(int joint) noexcept;
     /// Energy of the springs of free coordinates [J].
     double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
@@ -100,7 +103,8 @@ private:
         JointConstants constants;
         int first = -1, second = -1, axial = -1;  // axial: index into axials_
         int general = -1;                         // of a relation or a wire: index into generals_
-        bool tracked = false;
+        bool tracked = false, breakable = false;
+        double strength = 0.0, torque_strength = 0.0;  // N s, N m s
         struct {
             double upsilon, violation;
         } gain[6];
@@ -133,6 +137,9 @@ private:
     const BodyState& body(int index, std::span<const BodyState> bodies) const noexcept {
         return index < 0 ? world_ : bodies[index];
     }
+    void assemble_rows(const JointBlock& block, const Joint& joint, State& state,
+                       std::span<const BodyState> bodies, double* first, double* second,
+                       BlockRight& right) noexcept;
     General general_of(const RigidScene& scene, const JointSpec& spec) const;
     Along along(const General& general, std::span<const BodyState> bodies, double* gradient) const noexcept;
     double general_bias(const General& general, std::span<const BodyState> bodies) const noexcept;

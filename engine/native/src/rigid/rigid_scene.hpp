@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -84,6 +85,10 @@ struct JointSpec {
     bool one_sided = false;           // wire: it may go slack
     double restitution = 0.0;         // wire: of the speed at which it snaps taut
 
+    double strength = std::numeric_limits<double>::infinity();  // N: it breaks under more; of a relation,
+    double torque_strength =
+        std::numeric_limits<double>::infinity();  // N m    what one of coefficient 1 feels
+
     bool has_motor = false, has_limit = false, has_spring = false;
     double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
     double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
@@ -97,9 +102,13 @@ constexpr int row_count(JointKind kind) noexcept {
     return rows > 0 ? rows : 1;
 }
 
+inline bool can_break(const JointSpec& joint) noexcept {
+    return std::isfinite(joint.strength) || std::isfinite(joint.torque_strength);
+}
+
 /// Whether some row of the joint has a finite bound.
 inline bool can_let_go(const JointSpec& joint) noexcept {
-    return joint.one_sided || (joint.has_motor && std::isfinite(joint.motor_force)) ||
+    return joint.one_sided || can_break(joint) || (joint.has_motor && std::isfinite(joint.motor_force)) ||
            (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }
 

@@ -100,11 +100,13 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                 return choose_if(is.iterative, "the method asks for projected Gauss–Seidel",
                                  rows ? "the method asks for a direct solver" : no_rows);
             case Stage::pivot:
-                return choose_if(
-                    pivots, is.contacts ? "contacts can let go" : "a limit or a bounded motor can let go",
-                    is.iterative ? asks_iterative
-                    : is.joints  ? "all rows are bilateral: no row can let go"
-                                 : no_rows);
+                return choose_if(pivots,
+                                 is.contacts
+                                     ? "contacts can let go"
+                                     : "a limit, a bounded motor, a wire or a joint that breaks can let go",
+                                 is.iterative ? asks_iterative
+                                 : is.joints  ? "all rows are bilateral: no row can let go"
+                                              : no_rows);
             case Stage::friction:
                 return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
             case Stage::string_stiffness:
