@@ -89,9 +89,10 @@ def tiles(
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
     friction: float = 0.0,
+    compliance: float = 0.0,
 ) -> Scene:
-    """A body on a floor of square tiles whose tops lie in one plane."""
-    surface = Material(friction=friction)
+    """A body on a floor of square tiles whose tops lie in one plane, as deep in it as `compliance` [m/N] lets it."""
+    surface = Material(friction=friction, compliance=0.5 * compliance)
     floor = [
         RigidBody(
             name=f"tile {i} {k}",
@@ -107,7 +108,7 @@ def tiles(
         name="slider",
         mass=MASS,
         shape=shape,
-        position=(*START, SIZE),
+        position=(*START, SIZE - compliance * MASS * GRAVITY),
         velocity=velocity,
         angular_velocity=spin,
         orientation=orientation,
@@ -117,6 +118,7 @@ def tiles(
 
 
 ACROSS = (3.0, 2.0, 0.0)  # m/s
+SOFT = 1e-4  # m/N: the ball lies 1 mm deep
 SLIDES = {
     "ball": tiles(SHAPES["ball"], ACROSS),
     "box": tiles(SHAPES["box"], ACROSS),
@@ -149,6 +151,14 @@ def _measure_passes(simulate: Simulate) -> dict[str, float]:
 
 def _measure_slides(simulate: Simulate) -> dict[str, float]:
     return {f"{name}_on_tiles": float(slide_changes(simulate, name)[-1]) for name in SLIDES}
+
+
+def _measure_soft(simulate: Simulate) -> dict[str, float]:
+    """On one soft plane the level velocity keeps every bit; on tiles a sunk ball meets their edges at a slant."""
+    scene = tiles(SHAPES["ball"], ACROSS, compliance=SOFT)
+    observe = {"v": Trace(quantity=Velocity("slider"))}
+    result = simulate(scene, time_step=TIME_STEP, duration=0.4, observe=observe)
+    return {"soft_ball_on_tiles": float(np.abs(result["v"][:, :2] - ACROSS[:2]).max())}
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -219,6 +229,21 @@ TEST = ScalarTest(
             ),
             "Bodies on tiles.",
             TIME_STEP,
+        ),
+        ask(
+            _measure_soft,
+            (
+                Metric(
+                    name="soft_ball_on_tiles",
+                    description="largest change of the level velocity of a ball 1 mm deep in soft tiles, in 0.4 s",
+                    unit="m/s",
+                    role="reported",
+                    reference=0.0,
+                ),
+            ),
+            "Followed: a ball that has sunk in meets the edges of the next tile at a slant, and is slowed.",
+            TIME_STEP,
+            configuration="soft",
         ),
     ),
     example=lambda: Example(scene=SLIDES["turning_box"], time_step=TIME_STEP, duration=0.5),

@@ -201,7 +201,7 @@ TEST = ScalarTest(
             note="Three plates fall. Followed for the work a heap at rest costs in a step.",
         ),
     ),
-    example=lambda: Example(scene=scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=4.0),
+    example=lambda: Example(scene=scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=LADDER_DURATION),
     figures=(Figure(name="tipping", title="Where the upper plate begins to tip", draw=_draw),),
     ladders=(
         Ladder(

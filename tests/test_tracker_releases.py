@@ -184,7 +184,7 @@ def test_a_changelog_is_found_missed_or_says_nothing(tmp_path: Path) -> None:
     changelog.write_text(f'blown_up = ["blow/*"]\n{changelog.read_text()}')
     page = CliRunner().invoke(main, [*asked, "--markdown"]).output
     assert "**Not in the changelog: no releases**" in page
-    assert "(`blow/*`):\ntheir changes in 1.3 count for nothing here" in page
+    assert "(`blow/*`); their changes in 1.3 count for nothing here" in " ".join(page.split())
 
     changelog.write_text('releases = ["1.0"]\nsource = "x"\nentry = [{release = "9"}]\n')
     refused = CliRunner().invoke(main, asked)

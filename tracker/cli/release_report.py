@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -61,14 +62,24 @@ def page(
 ) -> str:
     """The same as a page in Markdown. Every number in it comes from the recorded runs."""
     names = sorted({series.partition("/")[0] for run in runs for series in history.samples(run.id)})
+    again = f"tracker backfill --engine {engine} --limit 5 {' '.join(f'--test={name}' for name in names)}"
     lines = [
         f"# What {len(runs)} releases of {engine} changed",
         "",
-        f"Each release from {runs[0].engine.version} to {runs[-1].engine.version} was installed from the package index",
-        f"into a folder of its own and asked {_count(max(step.asked for step in steps), 'question')} of these tests:",
-        f"{', '.join(names)}.",
-        "A change is a value that moved by more than 1e-6 of itself (and more than 1e-12), or another outcome.",
-        "Run times and what ran into a time limit are left out.",
+        *_prose(
+            f"Each release from {runs[0].engine.version} to {runs[-1].engine.version} was installed from the package "
+            f"index into a folder of its own and asked {_count(max(step.asked for step in steps), 'question')} of these "
+            f"tests: {', '.join(names)}. A change is a value that moved by more than 1e-6 of itself (and more than "
+            "1e-12), or another outcome. Run times and what ran into a time limit are left out."
+        ),
+        "",
+        "This page is made by two commands, which reproduce every number in it:",
+        "",
+        *(
+            f"    {line}"
+            for line in textwrap.wrap(again, 100, break_on_hyphens=False, subsequent_indent="        ")
+        ),
+        f"    tracker releases {engine} --changelog docs/{engine}-changelog.toml --markdown",
         "",
         "| release | values of questions | changes | where |",
         "|---|---|---|---|",
@@ -97,8 +108,11 @@ def _against(checked: Checked, changelog: Changelog) -> list[str]:
     lines = [
         "## Against the changelog",
         "",
-        f"Read: {changelog.source}, which goes up to {changelog.last}. Its entries about behaviour that these scenes",
-        "could show are listed with the series that could show them; an entry is found if one of these changed.",
+        *_prose(
+            f"Read: {changelog.source}, which goes up to {changelog.last}. Its entries about behaviour that these scenes "
+            "could show name the series that could show them; an entry is found if one of these changed with the "
+            "release, which does not prove that it was the cause."
+        ),
         "",
         f"**Found: {len(checked.found)}**",
         "",
@@ -115,8 +129,10 @@ def _against(checked: Checked, changelog: Changelog) -> list[str]:
     if checked.blown_up:
         lines += [
             "",
-            f"Rounding decides the values of runs that blow up ({', '.join(f'`{one}`' for one in changelog.blown_up)}):",
-            f"their changes in {', '.join(checked.blown_up)} count for nothing here.",
+            *_prose(
+                f"Rounding decides the values of runs that blow up ({', '.join(f'`{one}`' for one in changelog.blown_up)}"
+                f"); their changes in {', '.join(checked.blown_up)} count for nothing here."
+            ),
         ]
     if checked.unread:
         lines += [
@@ -130,10 +146,7 @@ def _change_table(changes: Sequence[Change]) -> list[str]:
     lines = ["| series | before | after | unit | |", "|---|---|---|---|---|"]
     for found in by_test(changes).values():
         for change in found[:SHOWN]:
-            before, after = (
-                _word(change.before, change.before_outcome),
-                _word(change.after, change.after_outcome),
-            )
+            before, after = _words(change)
             lines.append(f"| `{change.series}` | {before} | {after} | {change.unit} | {change.word} |")
         if len(found) > SHOWN:
             lines.append(f"| … and {len(found) - SHOWN} more of {found[0].test} | | | | |")
@@ -142,14 +155,28 @@ def _change_table(changes: Sequence[Change]) -> list[str]:
 
 def values(change: Change) -> str:
     """Before and after, with the unit."""
-    before = _word(change.before, change.before_outcome)
-    return f"{before} → {_word(change.after, change.after_outcome)} {change.unit}".rstrip()
+    before, after = _words(change)
+    return f"{before} → {after} {change.unit}".rstrip()
 
 
-def _word(value: Any, outcome: str | None) -> str:
+def _words(change: Change) -> tuple[str, str]:
+    """Six digits, and more where six do not tell the two apart."""
+    for digits in (6, 9, 17):
+        before = _word(change.before, change.before_outcome, digits)
+        after = _word(change.after, change.after_outcome, digits)
+        if before != after:
+            break
+    return before, after
+
+
+def _word(value: Any, outcome: str | None, digits: int) -> str:
     if outcome in ("value", "unsettled", "out_of_limit"):
-        return f"{float(value):.6g}"
+        return f"{float(value):.{digits}g}"
     return (outcome or "not asked").replace("_", " ")
+
+
+def _prose(text: str) -> list[str]:
+    return textwrap.wrap(text, 115, break_on_hyphens=False, break_long_words=False)
 
 
 def _tests(changes: Iterable[Change]) -> str:

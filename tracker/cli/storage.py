@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -32,13 +33,29 @@ def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @database_option
 def import_files(files: tuple[Path, ...], database: str) -> None:
-    """Record runs from JSON documents; what is there already is left as it is."""
+    """Record runs from JSON documents, whole or in short form; what is there already is left as it is."""
     from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.record import record
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
+    short = _short(files)
     with session_on(database) as session:
-        done = read_in(session, files)
-    click.echo(f"{len(done.stored)} runs recorded, {len(done.present)} were there already")
+        done = read_in(session, [file for file in files if file not in short])
+        new = sum(record(session, document) for document in short.values())
+    stored, present = len(done.stored) + new, len(done.present) + len(short) - new
+    click.echo(f"{stored} runs recorded, {present} were there already")
+
+
+def _short(files: tuple[Path, ...]) -> dict[Path, Any]:
+    """The files that are runs in short form, as whole documents."""
+    from spook_tracker.tracker.measure.short_form import is_short, whole
+    from spook_tracker.tracker.store.border import MAX_BYTES
+
+    found = {}
+    for file in files:
+        if file.is_file() and file.stat().st_size <= MAX_BYTES and is_short(content := file.read_bytes()):
+            found[file] = whole(content, str(file))
+    return found
 
 
 @click.command(epilog=example("tracker schema > run.schema.json"))
