@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from html import escape
 from importlib import import_module
 from typing import Any, Literal
 
@@ -71,6 +72,14 @@ class Result:
         seen = ", ".join(f"{name} {value.shape}" for name, value in self.observables.items())
         rows = [self.failure or self.status, f"{self.steps} steps of {self.time_step:.4g} s"]
         return f"<Result: {'; '.join([*rows, seen or 'nothing observed'])}>"
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks, with the last value of every observable that is one number."""
+        rows = [("status", self.failure or self.status), ("steps", f"{self.steps} of {self.time_step:.4g} s")]
+        for name, value in self.observables.items():
+            rows.append((name, f"{value:.6g}" if value.shape == () else f"array of shape {value.shape}"))
+        cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
+        return f"<table>{cells}</table>"
 
     def to_dataframe(self) -> Any:
         """The traces as a pandas DataFrame: a row per sample time [s], a column per component.

@@ -375,6 +375,8 @@ def test_traces_are_columns_of_a_dataframe() -> None:
     assert frame["all.0"].count() == 3
     assert repr(result).startswith("<Result: completed; 10 steps of 0.01 s; x (11, 3)")
     assert len(repr(result)) < 200
+    hostile = simulate(scene, time_step=0.01, steps=1, observe={"<b>": Final(quantity=Position("weight"))})
+    assert "<tr><th>&lt;b&gt;</th><td>array of shape (3,)</td></tr>" in hostile._repr_html_()
     with pytest.raises(EngineError, match="observe a Trace"):
         simulate(scene, time_step=0.01, steps=1).to_dataframe()
 

@@ -80,6 +80,7 @@ JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
                             const Vec3* second_start) noexcept {
     JointConstants joint;
     joint.kind = spec.kind;
+    joint.holds = holds_of(spec.kind);
     joint.rows = row_count(spec.kind);
     if (first_start) joint.first_arm = spec.first_point - *first_start;
     if (second_start) joint.second_arm = spec.second_point - *second_start;
@@ -102,7 +103,7 @@ void assemble_joint(const JointConstants& joint, const BodyState& first, const B
                  second.angular_velocity - first.angular_velocity};
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
-    const JointHolds holds = holds_of(joint.kind);
+    const JointHolds holds = joint.holds;
     for (int k = holds.linear_first; k < holds.linear_end; ++k) write.linear(axes[k], dot(axes[k], ends.gap));
     if (holds.turning == Turning::free) return;
     const Quat q = relative_turn(first, second);
@@ -133,7 +134,7 @@ void joint_violation(const JointConstants& joint, const BodyState& first, const 
         *out = stretch(joint, ends.gap, length);
         return;
     }
-    const JointHolds holds = holds_of(joint.kind);
+    const JointHolds holds = joint.holds;
     for (int k = holds.linear_first; k < holds.linear_end; ++k)
         *out++ = dot(carried(first, joint.axes[k]), ends.gap);
     if (holds.turning == Turning::free) return;
@@ -168,7 +169,7 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
     }
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
-    const JointHolds holds = holds_of(joint.kind);
+    const JointHolds holds = joint.holds;
     for (int k = holds.linear_first; k < holds.linear_end; ++k)
         *bias++ =
             dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), parting) + dot(spun(w1, axes[k]), ends.gap);

@@ -18,6 +18,7 @@ struct JointRows {
 /// Constant geometry of a joint: arms at the start, from each body's centre, world axes.
 struct JointConstants {
     JointKind kind = JointKind::lock;
+    JointHolds holds = holds_of(JointKind::lock);
     int rows = 6;
     Vec3 first_arm, second_arm;
     Vec3 span;  // distance: second point minus first point at the start

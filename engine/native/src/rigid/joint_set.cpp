@@ -86,23 +86,21 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
     State& state = states[block.joint];
     right.lower.fill(-kUnbounded);
     right.upper.fill(kUnbounded);
-    assemble_rows(block, joint, state, bodies, first, second, right);
+    if (block.axial) {
+        assemble_axial(joint, state, bodies, first, second, right);
+    } else if (joint.general >= 0) {
+        assemble_general(joint, state, bodies, first, second, right);
+    } else {
+        JointRows rows{first, second, {}, {}};
+        assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows,
+                       state.first_reach, state.second_reach);
+        for (int k = 0; k < block.size; ++k)
+            right.right[k] =
+                joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
+    }
     if (!state.broken) return;
     right.lower.fill(0.0);
     right.upper.fill(0.0);
-}
-
-void JointSet::assemble_rows(const JointBlock& block, const Joint& joint, State& state,
-                             std::span<const BodyState> bodies, double* first, double* second,
-                             BlockRight& right) noexcept {
-    if (block.axial) return assemble_axial(joint, state, bodies, first, second, right);
-    if (joint.general >= 0) return assemble_general(joint, state, bodies, first, second, right);
-    JointRows rows{first, second, {}, {}};
-    assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows,
-                   state.first_reach, state.second_reach);
-    for (int k = 0; k < block.size; ++k) {
-        right.right[k] = joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
-    }
 }
 
 double JointSet::unwrapped(const Joint& joint, double angle, double near) const noexcept {
@@ -173,7 +171,7 @@ JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
     const double relaxation = 0.25 * (1.0 / gain.upsilon - 1.0);
     if (c.kind == JointKind::distance || c.kind == JointKind::wire)
         return {gain.violation, relaxation, c.rest_length};
-    const bool linear = row < holds_of(c.kind).linear();
+    const bool linear = row < c.holds.linear();
     const double arms = norm(c.first_arm) + norm(c.second_arm);
     return {gain.violation, relaxation, linear && arms > 0.0 ? arms : 1.0};
 }
@@ -232,7 +230,7 @@ void JointSet::break_overloaded(int index) noexcept {
     const Joint& joint = joints_[index];
     if (!joint.breakable) return;
     State& state = states[index];
-    const JointHolds holds = holds_of(joint.constants.kind);
+    const JointHolds holds = joint.constants.holds;
     const int linear = holds.rows() > 0 ? holds.linear() : 1;  // distance, wire and relation: their row
     double force = 0.0, torque = 0.0;
     for (int i = 0; i < joint.constants.rows; ++i)

@@ -137,9 +137,6 @@ private:
     const BodyState& body(int index, std::span<const BodyState> bodies) const noexcept {
         return index < 0 ? world_ : bodies[index];
     }
-    void assemble_rows(const JointBlock& block, const Joint& joint, State& state,
-                       std::span<const BodyState> bodies, double* first, double* second,
-                       BlockRight& right) noexcept;
     General general_of(const RigidScene& scene, const JointSpec& spec) const;
     Along along(const General& general, std::span<const BodyState> bodies, double* gradient) const noexcept;
     double general_bias(const General& general, std::span<const BodyState> bodies) const noexcept;
