@@ -28,7 +28,10 @@ from spook_tracker.engine.scene import Scene
 OURS = ("spook", "engine")
 GROUP = "spook_tracker.engines"
 EXTRAS: Mapping[str, str] = {"mujoco": "mujoco", "exudyn": "exudyn"}  # engine: its package, from PyPI
-NODE: Mapping[str, str] = {"cannon": "cannon-es"}  # engine: its package, from npm
+NODE: Mapping[str, str] = {
+    "cannon": "cannon-es",
+    "rapier": "@dimforge/rapier3d-compat",
+}  # engine: its package, from npm
 
 
 class EngineMissing(EngineError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -232,3 +233,13 @@ def test_the_changelog_of_mujoco_speaks_of_series_that_are_asked() -> None:
             test, configuration, *_ = pattern.split("/")
             assert test == "*" or test in CATALOGUE, pattern
             assert configuration in configurations, pattern
+
+
+def test_the_page_of_mujoco_answers_every_entry_of_its_changelog() -> None:
+    """The page is made from recorded runs; what it says of the changelog is about the one beside it."""
+    docs = Path(__file__).parent.parent / "docs"
+    page = (docs / "mujoco-releases.md").read_text(encoding="utf-8")
+
+    told = re.findall(r"^- (\S+), item (\d+): (.+?)\.(?: Seen in|$)", page, re.MULTILINE)
+    asked = read_changelog(docs / "mujoco-changelog.toml").entries
+    assert sorted(told) == sorted((entry.release, str(entry.item), entry.says) for entry in asked)

@@ -1,9 +1,7 @@
-// cannon-es in its own loop: a task as JSON on standard input; a line of JSON and float64 states on standard output.
-// A state is 13 numbers a body: position, orientation (w, x, y, z), velocity, angular velocity (SI, world axes).
-import { readFileSync, writeSync } from "node:fs";
+// cannon-es in its own loop: the scene as engine/peers/cannon.py describes it.
+import { read, run } from "./loop.mjs";
 
-const task = JSON.parse(readFileSync(0, "utf8"));
-const began = performance.now();
+const task = read();
 const C = await import(task.module);
 
 const vec = (v) => new C.Vec3(...v);
@@ -89,52 +87,17 @@ function push() {
 
 // A rod's row pushes its ends apart where it is positive; the force of a row is its multiplier. None before a step.
 const measured = task.forces_of.map((name) => rods.get(name));
-const width = 13 * bodies.length + measured.length;
-const samples = task.every_step ? task.steps + 1 : 2;
-const states = new Float64Array(samples * width);
-let kept = 0;
-function keep() {
-  bodies.forEach(({ position: p, quaternion: q, velocity: v, angularVelocity: w }, index) =>
-    states.set([p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z], kept * width + 13 * index),
-  );
-  states.set(measured.map((row) => -row.multiplier), kept * width + 13 * bodies.length);
-  kept += 1;
+function state() {
+  const all = bodies.flatMap(({ position: p, quaternion: q, velocity: v, angularVelocity: w }) => [
+    p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z,
+  ]);
+  return all.concat(measured.map((row) => -row.multiplier));
 }
 
 const pushed = task.loads.length + task.fields.length > 0;
-const started = performance.now();
-let spent = 0;
-let done = 0;
-let status = "completed";
-let failure = "";
-keep();
-while (done < task.steps && status === "completed") {
-  const stop = task.every_step ? done + 1 : Math.min(done + 1000, task.steps);
-  const from = performance.now();
-  for (; done < stop; done += 1) {
-    if (pushed) push();
-    world.step(task.time_step);
-  }
-  const now = performance.now();
-  spent += now - from;
-  if (task.every_step || done === task.steps) keep();
-  if (bodies.some((body) => !Number.isFinite(body.position.lengthSquared()))) {
-    status = "not_finite";
-    failure = `a position is not finite by step ${done}`;
-  } else if (task.time_limit !== null && now - started > 1000 * task.time_limit && done < task.steps) {
-    status = "timed_out";
-    failure = `the time limit of ${task.time_limit} s was reached before step ${done + 1}`;
-  }
+function step() {
+  if (pushed) push();
+  world.step(task.time_step);
 }
 
-const head = { kept, steps: done, status, failure, seconds: spent / 1000, setup_seconds: (started - began) / 1000 };
-const answer = Buffer.concat([
-  Buffer.from(`${JSON.stringify(head)}\n`), Buffer.from(states.buffer, 0, 8 * kept * width),
-]);
-for (let sent = 0; sent < answer.length; ) {
-  try {
-    sent += writeSync(1, answer, sent);
-  } catch (error) {
-    if (error.code !== "EAGAIN") throw error; // the reader is slower than we are
-  }
-}
+run(task, step, state);

@@ -1,0 +1,148 @@
+"""Rapier in Node, by its WebAssembly package: single precision, joints and contacts by sequential impulses.
+
+It has no rod of constant length (its rope only pulls), shows no forces of joints, and single precision bounds every
+answer from below.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.forces import Load
+from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock
+from spook_tracker.engine.peers import node
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
+from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.shapes import Box, Plane, Shape, Sphere
+
+PACKAGE = "@dimforge/rapier3d-compat"
+SCRIPT = Path(__file__).with_suffix(".mjs")
+POINT_INERTIA = 1e-6  # kg m²: it wants one of every moving body; a particle that turns is not seen to
+FOUND = node.package(PACKAGE)
+
+
+class Rapier:
+    """The adapter."""
+
+    name = "rapier"
+    capabilities = Capabilities(
+        shapes=frozenset({Sphere, Box, Plane}),
+        joints=frozenset({Lock, Ball, Hinge}),
+        forces=frozenset({Load}),
+        friction=True,
+    )
+    configurations = (
+        Configuration(
+            name="many-iterations",
+            reason="100 solver iterations a step in place of 4: joints and stacks are solved further",
+            expected_order=1.0,
+            options={"sweeps": 100},
+        ),
+        Configuration(
+            name="defaults",
+            reason="4 solver iterations: what one gets without asking",
+            expected_order=1.0,
+            options={"sweeps": 4},
+        ),
+    )
+
+    def build_info(self) -> BuildInfo:
+        installed = str(node.facts(FOUND)["version"])
+        return BuildInfo(self.name, installed, "", False, "", (), "npm package, WebAssembly run by Node", "")
+
+    def record(self, task: Task) -> Recording:
+        return node.run(SCRIPT, described(task), task.time_limit)
+
+
+def described(task: Task) -> dict[str, Any]:
+    """The task as JSON takes it. Raises NotSupported for pairs kept apart that no joint ties."""
+    scene = task.scene
+    places = {body.name: place for place, body in enumerate(scene.bodies)}
+    joined = {frozenset(c.between) for c in scene.constraints if isinstance(c, Joint)}
+    if scene.contacts and any(frozenset(pair) not in joined for pair in scene.no_contact):
+        raise NotSupported("rapier does not support single pairs that must not touch")
+    return {
+        "module": node.entry(FOUND),
+        "gravity": scene.gravity,
+        "time_step": task.time_step,
+        "steps": task.steps,
+        "every_step": task.every_step,
+        "time_limit": task.time_limit,
+        "options": dict(task.configuration.options),
+        "contacts": scene.contacts,
+        "bodies": [_body(body) for body in scene.bodies],
+        "constraints": [_joint(task, constraint, places) for constraint in scene.constraints],
+        "loads": [
+            {"body": places[f.body], "force": f.force, "torque": f.torque}
+            for f in scene.forces
+            if isinstance(f, Load)
+        ],
+    }
+
+
+def _body(body: Particle | RigidBody) -> dict[str, Any]:
+    if isinstance(body, Particle):
+        return {
+            "mass": body.mass,
+            "inertia": (POINT_INERTIA,) * 3,
+            "position": body.position,
+            "velocity": body.velocity,
+            "orientation": (1.0, 0.0, 0.0, 0.0),
+            "spin": (0.0, 0.0, 0.0),
+            "friction": 0.0,
+            "shape": None,
+        }
+    return {
+        "mass": body.mass if body.motion == "dynamic" else 0.0,
+        "inertia": body.inertia if body.motion == "dynamic" else (0.0, 0.0, 0.0),
+        "position": body.position,
+        "velocity": body.velocity,
+        "orientation": body.orientation,
+        "spin": body.angular_velocity,
+        "friction": body.material.friction,
+        "shape": None if body.shape is None else _shape(body.shape),
+    }
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    if isinstance(shape, Sphere):
+        return {"kind": "sphere", "radius": shape.radius}
+    if isinstance(shape, Box):
+        return {"kind": "box", "half": [0.5 * edge for edge in shape.size]}
+    assert isinstance(shape, Plane)
+    return {"kind": "plane", "normal": list(shape.normal)}
+
+
+def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:
+    """Points, turns and axis in the axes of both ends."""
+    scene, at = task.scene, joint_point(task.scene, joint)
+    frames = [_frame(None if end == WORLD else scene.body(end)) for end in joint.between]
+    points = [list(turned_back(turn, at - place)) for place, turn in frames]
+    axes = [turned_back(turn, np.array(getattr(joint, "axis", (0.0, 0.0, 1.0)))) for _, turn in frames]
+    if isinstance(joint, Hinge) and np.abs(axes[0] - axes[1]).max() > 1e-12:
+        raise NotSupported(
+            "rapier does not support a hinge between bodies that are turned against each other"
+        )
+    return {
+        "kind": {Ball: "ball", Lock: "lock", Hinge: "hinge"}[type(joint)],
+        "ends": [places.get(end, -1) if end != WORLD else None for end in joint.between],
+        "points": points,
+        "turns": [list(conjugate(turn)) for _, turn in frames],
+        "axis": list(axes[0]),
+    }
+
+
+def _frame(body: Particle | RigidBody | None) -> tuple[Any, Any]:
+    if body is None:
+        return np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    turn = (1.0, 0.0, 0.0, 0.0) if isinstance(body, Particle) else body.orientation
+    return np.array(body.position), np.array(turn)
+
+
+ENGINE = Rapier()

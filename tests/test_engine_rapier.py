@@ -1,0 +1,113 @@
+"""Rapier behind the protocol: what it has it does to single precision. Skipped, with the reason, without it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    Ball,
+    Box,
+    Distance,
+    Final,
+    Hinge,
+    Lock,
+    Material,
+    Particle,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Trace,
+)
+from spook_tracker.engine.find import EngineMissing, find
+from spook_tracker.engine.protocol import NotSupported
+
+try:
+    RAPIER = find("rapier")
+except EngineMissing as reason:
+    pytest.skip(str(reason), allow_module_level=True)
+
+STEP = 1.0 / 60.0  # s
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+def fallen(time_step: float) -> float:
+    """How far a fall of 20 s is from the closed form."""
+    ball = Particle(name="ball", mass=2.0, position=(0.0, 0.0, 0.0))
+    scene = Scene(bodies=(ball,), gravity=GRAVITY)
+    end = {"end": Final(quantity=Position("ball"))}
+    run = RAPIER.simulate(scene, time_step=time_step, duration=20.0, observe=end)
+    return abs(float(run["end"][2]) + 0.5 * 9.81 * 400.0)
+
+
+def test_a_smaller_step_stops_helping_where_single_precision_does() -> None:
+    """A first-order step in double precision is g T h / 2 away: 0.02 m at 1/4000 s, and it always shrinks with h."""
+    in_double = 0.5 * 9.81 * 20.0 / 4000.0
+
+    assert fallen(1 / 60) < 2.0
+    assert fallen(1 / 4000) > 4.0 * in_double
+
+
+@pytest.mark.parametrize("kind", [Ball, Hinge, Lock])
+def test_a_joint_holds_a_hanging_box(kind: Any) -> None:
+    box = RigidBody(name="box", mass=2.0, shape=Box((0.2, 0.2, 0.2)), position=(0.0, 0.0, -1.0))
+    more = {"axis": (0.0, 1.0, 0.0)} if kind is Hinge else {}
+    joint = kind(name="joint", between=("world", "box"), at=(0.0, 0.0, 0.0), **more)
+    scene = Scene(bodies=(box,), constraints=(joint,), gravity=GRAVITY)
+    path = {"path": Trace(quantity=Position("box"))}
+    run = RAPIER.simulate(scene, time_step=STEP, duration=2.0, observe=path)
+
+    assert np.abs(run["path"] - [0.0, 0.0, -1.0]).max() < 1e-3
+
+
+def test_a_hinged_box_swings_with_its_period() -> None:
+    """Small swings about a hinge 1 m above the centre: 2 π √((I + m L²) / (m g L))."""
+    mass, inertia, length, angle = 2.0, 0.5, 1.0, 0.02
+    box = RigidBody(
+        name="box",
+        mass=mass,
+        inertia=(inertia, inertia, inertia),
+        position=(length * math.sin(angle), 0.0, -length * math.cos(angle)),
+    )
+    hinge = Hinge(name="hinge", between=("world", "box"), at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    period = 2.0 * math.pi * math.sqrt((inertia + mass * length**2) / (mass * 9.81 * length))
+    run = RAPIER.simulate(
+        Scene(bodies=(box,), constraints=(hinge,), gravity=GRAVITY),
+        time_step=1 / 1000,
+        duration=0.75 * period,
+        observe={"path": Trace(quantity=Position("box"))},
+    )
+    sideways = run["path"][:, 0]
+    crossings = np.flatnonzero(np.sign(sideways[1:]) != np.sign(sideways[:-1]))
+
+    assert crossings[0] / 1000 == pytest.approx(period / 4.0, rel=2e-2)
+    assert np.abs(np.linalg.norm(run["path"], axis=1) - length).max() < 1e-3
+
+
+def test_friction_holds_below_its_coefficient_and_not_above() -> None:
+    rough = Material(friction=0.5)
+
+    def slid(pull: float) -> float:
+        ground = RigidBody(
+            name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough
+        )
+        box = RigidBody(
+            name="box", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, 0.5), material=rough
+        )
+        scene = Scene(bodies=(ground, box), gravity=(pull * 9.81, 0.0, -9.81))
+        end = {"end": Final(quantity=Position("box"))}
+        return float(RAPIER.simulate(scene, time_step=STEP, duration=2.0, observe=end)["end"][0])
+
+    assert abs(slid(0.3)) < 0.02
+    assert slid(0.7) == pytest.approx(0.5 * 0.2 * 9.81 * 4.0, rel=0.1)
+
+
+def test_what_it_lacks_is_not_supported_by_name() -> None:
+    ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
+    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "ball"), compliance=0.0)
+    with pytest.raises(NotSupported, match="the joint distance"):
+        RAPIER.simulate(Scene(bodies=(ball,), constraints=(rod,), gravity=GRAVITY), time_step=STEP, steps=1)
