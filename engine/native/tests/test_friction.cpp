@@ -157,7 +157,7 @@ void the_law_holds_in_random_systems() {
             points.push_back({k, 0.1 + 0.4 * std::abs(unit(random)), 0.0, -1.0});
             system.rows.push_back(block);
         }
-        PivotSolver solver;
+        DirectSolver solver;
         const FrictionReport report = solve_friction_direct(system, points, FrictionModel::cone, solver);
         if (!report.converged) {
             ++unsettled;

@@ -35,10 +35,10 @@ Islands find_islands(const MixedSystem& system) {
 FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points,
                                  const Solve& solve) {
     const Islands islands = find_islands(system);
-    auto solver_of = [&](int first_body) -> PivotSolver& {
-        PivotSolver& solver = solvers_[first_body];
-        solver.floor = floor;
-        solver.refinements = refinements;
+    auto solver_of = [&](int first_body) -> DirectSolver& {
+        DirectSolver& solver = solvers_[first_body];
+        solver.pivot.floor = floor;
+        solver.pivot.refinements = refinements;
         return solver;
     };
     if (islands.count <= 1) return solve(system, points, solver_of(0));
@@ -108,9 +108,9 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
 BlockLdlt::Counters IslandSolver::counters() const noexcept {
     BlockLdlt::Counters sum;
     for (const auto& [body, solver] : solvers_) {
-        const BlockLdlt::Counters more = solver.counters();
-        sum.factorisations += more.factorisations;
-        sum.block_operations += more.block_operations;
+        const BlockLdlt::Counters more = solver.pivot.counters();
+        sum.factorisations += more.factorisations + solver.newton.factorisations();
+        sum.block_operations += more.block_operations + solver.newton.block_operations();
         sum.floored_pivots += more.floored_pivots;
         sum.solves += more.solves;
     }

@@ -5,8 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "contacts/friction_point.hpp"
-#include "contacts/pivot_solver.hpp"
+#include "contacts/friction_direct.hpp"
 
 namespace spook {
 
@@ -22,7 +21,7 @@ Islands find_islands(const MixedSystem& system);
 /// the island does not change. Islands are done in order on one thread: equal input gives equal bits.
 class IslandSolver {
 public:
-    using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, PivotSolver&)>;
+    using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, DirectSolver&)>;
 
     double floor = 1e-12;
     int refinements = 1;
@@ -34,7 +33,7 @@ public:
     BlockLdlt::Counters counters() const noexcept;
 
 private:
-    std::map<int, PivotSolver> solvers_;  // by the island's first body
+    std::map<int, DirectSolver> solvers_;  // by the island's first body
 };
 
 }  // namespace spook

@@ -77,12 +77,12 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
         return {};
     const FrictionReport report = islands.run(
         system, points,
-        [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, PivotSolver& solver) {
+        [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
             switch (o.solver) {
                 case SolverKind::iterative:
                     return solve_iterative(island, own, model, o.iterations, o.residual_tolerance);
                 case SolverKind::hybrid:
-                    return solve_hybrid(island, own, model, solver, o.iterations, o.residual_tolerance);
+                    return solve_hybrid(island, own, model, solver.pivot, o.iterations, o.residual_tolerance);
                 case SolverKind::direct: break;
             }
             return solve_friction_direct(island, own, model, solver);

@@ -16,8 +16,9 @@ constexpr double settled = 1e-10;  // of the largest normal impulse
 constexpr double loosest = 1e-6;
 constexpr double reluctance =
     0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
-constexpr int pivot_rounds = 60;  // a round of the cone need not be exact while its bounds still move
-constexpr int plain_rounds = 3;   // most systems settle within these
+constexpr int pivot_rounds = 60;        // a round of the cone need not be exact while its bounds still move
+constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
+constexpr int plain_rounds = 3;         // most systems settle within these
 
 void bound_tangents(RowBlock& block, double bound) noexcept {
     for (int i = 1; i <= 2; ++i) {
@@ -108,6 +109,27 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
     points = std::move(swept_points);
 }
 
+/// True when the system is for Newton's method on the cone, and is solved by it.
+bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
+                     DirectSolver& direct, FrictionReport& report) {
+    if (model != FrictionModel::cone && !points.empty()) return false;
+    if (system.rows.size() <= few_blocks) return false;
+    for (const RowBlock& block : system.rows)  // rigid joints need the factor of the whole, not a relief
+        if (block.lower[0] != 0.0) return false;
+    MixedSystem start = system;
+    const ConeReport found = direct.newton.solve(system, points);
+    report.rounds += found.iterations;
+    report.residual = found.residual;
+    report.converged = found.converged;
+    if (!found.converged) {  // wedged, or rigid contacts that contradict each other
+        system = std::move(start);
+        report.converged = true;
+        return false;
+    }
+    for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
+    return true;
+}
+
 }  // namespace
 
 bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
@@ -143,9 +165,11 @@ bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& po
 }
 
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
-                                     FrictionModel model, PivotSolver& solver, int max_rounds) {
+                                     FrictionModel model, DirectSolver& direct, int max_rounds) {
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
+    if (solve_by_newton(system, points, model, direct, report)) return report;
+    PivotSolver& solver = direct.pivot;
     MixedSystem start;
     if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
                                        [](const RowBlock& block) { return block.lower[0] == 0.0; }))

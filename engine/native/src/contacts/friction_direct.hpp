@@ -1,10 +1,17 @@
 // Joints, normals and friction together, by direct solves.
 #pragma once
 
+#include "contacts/cone_newton.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/pivot_solver.hpp"
 
 namespace spook {
+
+/// What direct solves of one island keep from step to step.
+struct DirectSolver {
+    PivotSolver pivot;
+    ConeNewton newton;
+};
 
 /// Solves `system` with the friction law `model` at `points`.
 ///
@@ -16,9 +23,11 @@ namespace spook {
 /// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
 /// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
 /// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
+/// Systems of contacts alone with more than 24 blocks, under the cone or without friction, go to Newton's method
+/// first (`contacts/cone_newton.hpp`); what it does not settle to 1e-9 of the speeds starts anew as above.
 /// On return FrictionPoint::normal is the normal impulse.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
-                                     FrictionModel model, PivotSolver& solver, int max_rounds = 60);
+                                     FrictionModel model, DirectSolver& direct, int max_rounds = 60);
 
 /// Whether velocities and multipliers in `system` are the answer already, as those of the step before are at rest:
 /// looking costs one pass over the rows, and no factor. Rows must hold to 1e-14 of the speed that forces give in a

@@ -1,0 +1,94 @@
+// Bounded rows and Coulomb's cone, all at once, by a smoothing Newton method.
+//
+// A contact's law is a complementarity on a self-dual cone L = {y₀ >= |y_t|}: with nu, beta its impulses and u its
+// relative velocity,
+//     y = (nu, beta/mu),  w = (u_n + mu |u_t|, mu u_t),   L ∋ y ⟂ w ∈ L,
+// the term mu |u_t| being De Saxcé's. It holds where y = P(y − rho w), P the projection onto L. Rows with bounds obey
+// the same with P the clamp between them, bilateral ones with P the identity.
+//
+// P is smoothed: each eigenvalue's max(0, λ) becomes (λ + √(λ² + 4 b²))/2. The points of y = P_b(y − rho w) form the
+// central path of the problem, b = 0 its solution. Newton's method follows it with b tied to what is left, each step
+// damped by a search along it. In a step all multipliers are eliminated, contact by contact; what is left is a
+// system in the velocities with one 6×6 block per body and one pair per pair of bodies that touch, however many
+// points they touch at. It is not symmetric, since friction is not.
+//
+// Where a point sticks, dz/dv is infinite. A touch of `relief` in the matrix, never in the equations, keeps it finite
+// and spreads loads evenly where points are redundant; what it leaves undone the next step sees as residual.
+//
+// Sources: De Saxcé and Feng 1998 (the cone's law); Fukushima, Luo, Tseng 2002 (smoothing on second-order cones);
+// Acary, Brémond, Huber 2018 (a comparison of solvers for this law).
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "contacts/cone_unit.hpp"
+#include "contacts/friction_point.hpp"
+#include "linear/block_lu.hpp"
+
+namespace spook {
+
+struct ConeReport {
+    int iterations = 0;      // systems factored
+    double residual = 0.0;   // of the worst row, relative to the speeds in the system
+    bool converged = false;  // the residual is that of rounding, or as good as it gets
+};
+
+class ConeNewton {
+public:
+    double relief = 1e-7;  // of a row's own (G M⁻¹ Gᵀ)ᵢᵢ, in the factored matrix only
+    int max_iterations = 150;
+    int max_directions = 6;  // of a step, against the matrix without relief
+
+    /// Starts from the multipliers in `system` and fills velocities and multipliers with the best it met. Points obey the
+    /// cone; rows that are no point's obey their bounds.
+    ConeReport solve(MixedSystem& system, const std::vector<FrictionPoint>& points);
+
+    std::uint64_t factorisations() const noexcept { return factorisations_; }
+    std::uint64_t block_operations() const noexcept { return block_operations_; }
+
+private:
+    struct Direction {  // dz of every unit, and what it changes in their laws
+        std::vector<ConeUnit::Vec> z, image;
+    };
+    struct Left {
+        double map = 0.0, speed = 0.0;  // √J, m/s
+    };
+    struct Search {
+        double before, after, length;  // squares of the smoothed map, and the step; 0: none lowers it
+    };
+    void prepare(MixedSystem& system, const std::vector<FrictionPoint>& points);
+    void read(const RowBlock& given, int row, const FrictionPoint* friction, ConeUnit& unit) const;
+    void connect();
+    void measure(const MixedSystem& system);
+    double merit(double blur, double length) const;
+    Left worst() const;
+    double rounding() const;
+    Search search(double blur) const;
+    bool find_direction();
+    void precondition(Direction& direction);
+    void image_of(Direction& direction);
+    template <class Multiplier> void velocities_of(const Multiplier& z, std::vector<Vec6>& v) const;
+    static void push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to);
+    static ConeUnit::Vec along(const ConeUnit& unit, const std::vector<Vec6>& v);
+    static ConeUnit::Vec speed_along(const ConeUnit& unit, const std::vector<Vec6>& v,
+                                     const ConeUnit::Vec& z);
+    double speed_of(const MixedSystem& system) const;
+    void keep();
+    bool step(const MixedSystem& system, double blur);
+    double* block(const ConeUnit& unit, bool row_first, bool column_first);
+
+    BlockLu matrix_;
+    std::vector<std::pair<int, int>> pairs_, needed_;  // analysed, and those of this system
+    int bodies_ = -1;
+    std::vector<ConeUnit> units_;
+    std::vector<Mat6> mass_factor_;
+    std::vector<Vec6> velocity_, change_, image_;
+    std::vector<Direction> directions_;
+    std::vector<std::pair<ConeUnit::Vec, ConeUnit::Vec>> best_;  // z and u of every unit
+    double speed_ = 0.0;
+    std::uint64_t factorisations_ = 0, block_operations_ = 0;
+};
+
+}  // namespace spook

@@ -1,0 +1,159 @@
+#include "contacts/cone_unit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contacts/smooth_cone.hpp"
+#include "linear/elementary.hpp"
+
+namespace spook {
+
+double ConeUnit::natural(const Vec& at_z, const Vec& at_u, double blur, double* out) const {
+    const double over = 1.0 / root;
+    if (size == 1) {
+        const double y = at_z[0] * over, a = y - root * at_u[0];
+        double p = a;
+        if (lower == upper) p = lower;
+        else if (lower > -unbounded) {
+            p = lower + positive(a - lower, blur).value;
+            if (upper < unbounded) p -= positive(a - upper, blur).value;
+        } else if (upper < unbounded) {
+            p = upper - positive(upper - a, blur).value;
+        }
+        out[0] = y - p;
+        if (lower == -unbounded && upper == unbounded) out[0] = root * at_u[0];
+        return out[0] * out[0];
+    }
+    const double mu = friction, w1 = root * mu * at_u[1], w2 = root * mu * at_u[2];
+    const double kink = blur * kink_share;
+    const double slide = std::sqrt(w1 * w1 + w2 * w2 + kink * kink) - kink;
+    const double y0 = at_z[0] * over, y1 = at_z[1] * over / mu, y2 = at_z[2] * over / mu;
+    const double a0 = y0 - (root * at_u[0] + slide), a1 = y1 - w1, a2 = y2 - w2;
+    const Spectrum s = project(a0, a1, a2, blur);
+    out[0] = y0 - s.value[0];
+    out[1] = y1 - s.value[1] * s.t1;
+    out[2] = y2 - s.value[1] * s.t2;
+    return out[0] * out[0] + out[1] * out[1] + out[2] * out[2];
+}
+
+void ConeUnit::linearise_row(double blur, double relief) {
+    slope[0] = 1.0, rest[0] = 0.0;
+    const double a = z[0] / root - root * u[0];
+    if (lower == upper) slope[0] = 0.0, rest[0] = 1.0;
+    else if (lower > -unbounded) {
+        const Positive low = positive(a - lower, blur);
+        slope[0] = low.slope, rest[0] = low.rest;
+        if (upper < unbounded) {
+            const Positive high = positive(upper - a, blur);
+            slope[0] = std::max(0.0, slope[0] - high.rest), rest[0] += high.rest;
+        }
+    } else if (upper < unbounded) {
+        const Positive high = positive(upper - a, blur);
+        slope[0] = high.slope, rest[0] = high.rest;
+    }
+    const double stiffness = root * root * slope[0] / (rest[0] + relief);
+    g[0] = 1.0 / (1.0 + stiffness * softness[0]);
+    k[0] = g[0] * stiffness;
+}
+
+void ConeUnit::linearise(double blur, double relief) {
+    natural(z, u, blur, map.data());
+    if (size == 1) return linearise_row(blur, relief);
+    const double over = 1.0 / root, rho = root * root, mu = friction;
+    const double w1 = root * mu * u[1], w2 = root * mu * u[2];
+    const double kink = blur * kink_share, sliding = std::sqrt(w1 * w1 + w2 * w2 + kink * kink);
+    s1 = sliding > 0.0 ? w1 / sliding : 0.0, s2 = sliding > 0.0 ? w2 / sliding : 0.0;
+    const double a0 = z[0] * over - (root * u[0] + sliding - kink);
+    const Spectrum s = project(a0, z[1] * over / mu - w1, z[2] * over / mu - w2, blur);
+    t1 = s.t1, t2 = s.t2;
+    double ratio[3];
+    for (int i = 0; i < 3; ++i) {
+        slope[i] = s.slope[i], rest[i] = s.rest[i];
+        ratio[i] = s.slope[i] / (s.rest[i] + relief);
+    }
+    for (int j = 0; j < 3; ++j) {  // K = rho E (1 − D)⁻¹ D E', column by column
+        const double e[3] = {j == 0 ? 1.0 : mu * (j == 1 ? s1 : s2), j == 1 ? mu : 0.0, j == 2 ? mu : 0.0};
+        double image[3];
+        spectral(ratio, e, image);
+        for (int i = 0; i < 3; ++i) k[3 * i + j] = rho * (i == 0 ? 1.0 : mu) * image[i];
+    }
+    if (soft) soften();
+}
+
+/// g = (1 + K Sig)⁻¹, K ← g K: what is left when the rows give way themselves.
+void ConeUnit::soften() {
+    double m[9];
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) m[3 * i + j] = (i == j) + k[3 * i + j] * softness[j];
+    for (int i = 0; i < 9; ++i) g[i] = i % 4 == 0;
+    for (int p = 0; p < 3; ++p) {
+        const double over_pivot = 1.0 / m[4 * p];
+        for (int j = 0; j < 3; ++j) m[3 * p + j] *= over_pivot, g[3 * p + j] *= over_pivot;
+        for (int i = 0; i < 3; ++i) {
+            if (i == p) continue;
+            const double f = m[3 * i + p];
+            for (int j = 0; j < 3; ++j) m[3 * i + j] -= f * m[3 * p + j], g[3 * i + j] -= f * g[3 * p + j];
+        }
+    }
+    double softened[9];
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            softened[3 * i + j] = g[3 * i] * k[j] + g[3 * i + 1] * k[3 + j] + g[3 * i + 2] * k[6 + j];
+    std::copy_n(softened, 9, k);
+}
+
+/// Σ fᵢ eᵢ eᵢᵀ x, with eᵢ = (1, −t)/√2, (1, t)/√2, (0, t⊥).
+void ConeUnit::spectral(const double* f, const double* x, double* y) const {
+    const double even = 0.5 * (f[0] + f[1]), odd = 0.5 * (f[1] - f[0]);
+    const double along = t1 * x[1] + t2 * x[2], across = f[2] * (t1 * x[2] - t2 * x[1]);
+    const double forth = odd * x[0] + even * along;
+    y[0] = even * x[0] + odd * along;
+    y[1] = forth * t1 - across * t2;
+    y[2] = forth * t2 + across * t1;
+}
+
+void ConeUnit::respond(const Vec& missing, double relief) {
+    if (size == 1) {
+        c[0] = g[0] * root * missing[0] / (rest[0] + relief);
+        return;
+    }
+    double share[3], image[3];
+    for (int i = 0; i < 3; ++i) share[i] = 1.0 / (rest[i] + relief);
+    spectral(share, missing.data(), image);
+    for (int i = 0; i < 3; ++i) image[i] *= root * (i == 0 ? 1.0 : friction);
+    for (int i = 0; i < 3; ++i)
+        c[i] = soft ? g[3 * i] * image[0] + g[3 * i + 1] * image[1] + g[3 * i + 2] * image[2] : image[i];
+}
+
+ConeUnit::Vec ConeUnit::law(const Vec& change_z, const Vec& change_u) const {
+    const double over = 1.0 / root, mu = friction;
+    if (size == 1) return {rest[0] * change_z[0] * over + slope[0] * root * change_u[0], 0.0, 0.0};
+    const double dy[3] = {change_z[0] * over, change_z[1] * over / mu, change_z[2] * over / mu};
+    const double dw[3] = {root * (change_u[0] + mu * (s1 * change_u[1] + s2 * change_u[2])),
+                          root * mu * change_u[1], root * mu * change_u[2]};
+    double one[3], two[3];
+    spectral(rest, dy, one);
+    spectral(slope, dw, two);
+    return {one[0] + two[0], one[1] + two[1], one[2] + two[2]};
+}
+
+void ConeUnit::finish() {
+    const double rho = root * root;
+    if (size == 1) {
+        const double low = lower * root, high = upper * root;
+        z[0] = z[0] - rho * u[0] <= low ? low : std::clamp(z[0], low, high);
+        return;
+    }
+    const double mu = friction, slide = mu * length(u[1], u[2]);
+    const double a0 = z[0] - rho * (u[0] + slide);
+    const double a1 = z[1] / mu - rho * mu * u[1], a2 = z[2] / mu - rho * mu * u[2];
+    if (z[0] <= 0.0 || a0 <= -length(a1, a2)) {
+        z = {};
+        return;
+    }
+    const double bound = mu * z[0], reach = length(z[1], z[2]);
+    if (reach > bound)
+        for (int i = 1; i < 3; ++i) z[i] *= bound / reach;
+}
+
+}  // namespace spook
