@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import pairwise
 
 import pytest
 
@@ -119,3 +120,11 @@ def test_every_scene_of_the_catalogue_fits_its_frame(name: str) -> None:
             numbers = [float(shape.centre[0]), float(shape.centre[1])]
         assert all(-1.0 <= x <= made.width + 1.0 for x in numbers[0::2])
         assert all(-1.0 <= y <= made.height + 1.0 for y in numbers[1::2])
+
+
+def test_a_wire_is_drawn_along_its_whole_way() -> None:
+    scene = CATALOGUE["wires"].example().scene
+    (wire,) = scene.constraints
+    places = [point for _, point in wire.through]
+
+    assert [link.ends for link in drawing(scene).links] == list(pairwise(places))
