@@ -102,10 +102,10 @@ serve: install
 NINJA = -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja
 # Against the library that the Python module was linked from: what is tested is what runs, and compiled once.
 native-tests: develop
-	$(BIN)/cmake -S engine/native/tests -B build/native-tests $(NINJA) -DCMAKE_BUILD_TYPE=Release \
+	$(BIN)/cmake -S engine/native/tests -B build/cpp-tests $(NINJA) -DCMAKE_BUILD_TYPE=Release \
 	    -DSPOOK_LIBRARY="$$(ls -t $(CURDIR)/build/cp*/libspook.a | head -n 1)"
-	$(BIN)/cmake --build build/native-tests
-	$(BIN)/ctest --test-dir build/native-tests --output-on-failure
+	$(BIN)/cmake --build build/cpp-tests
+	$(BIN)/ctest --test-dir build/cpp-tests --output-on-failure
 
 sanitize: develop
 	$(BIN)/cmake -S engine/native -B build/sanitize $(NINJA) \

@@ -211,3 +211,17 @@ def test_welds_as_equalities_let_a_long_beam_fall_and_merged_bodies_do_not() -> 
 
     assert sag("equalities") > 1.0
     assert abs(sag("rk4")) < 1e-12
+
+
+def test_a_slow_run_is_ended_near_its_limit_though_nothing_is_recorded_between() -> None:
+    """Three hundred boxes welded in a row: a thousand steps between two looks at the clock would be minutes."""
+    boxes = [
+        RigidBody(name=f"{k}", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(float(k), 0.0, 0.0))
+        for k in range(300)
+    ]
+    locks = [Lock(name=f"lock {k}", between=(f"{k}", f"{k + 1}")) for k in range(299)]
+    scene = Scene(bodies=tuple(boxes), constraints=tuple(locks), gravity=GRAVITY)
+    run = simulate(scene, "equalities", time_step=1 / 60, steps=1_000_000, time_limit=0.3)
+
+    assert run.status == "timed_out"
+    assert run.steps < 1000

@@ -62,3 +62,21 @@ def test_what_a_killed_publication_left_is_swept_and_a_running_one_is_not(tmp_pa
         folder.add("index.html", "1", lambda: b"here")
 
     assert not old.exists() and young.exists() and foreign.exists()
+
+
+def test_an_engine_without_gates_is_shown_by_what_has_a_limit() -> None:
+    from spook_tracker.tracker.cli.report_table import pass_table
+    from tests.run_documents import definition, run, sample
+
+    shown, followed = "fall/rk4/error", "fall/rk4/energy"
+    document = run(
+        series=(
+            definition(shown, metric="error", role="reported", limit=1.0),
+            definition(followed, metric="energy", role="reported", limit=None),
+        ),
+        samples=(sample(shown, 0.5), sample(followed, 0.5)),
+    )
+
+    assert "error" in pass_table(document, room=120)
+    assert "energy" not in pass_table(document, room=120)
+    assert "energy" in pass_table(document, everything=True, room=120)

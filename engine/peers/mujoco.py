@@ -27,7 +27,8 @@ from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
 
-BLOCK = 1000  # steps between two looks at the clock
+BLOCK = 1000  # steps between two looks at the clock, at most
+LOOK = 0.05  # s after which it is looked at again, or sooner
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 STIFF = 'solref="{h2!r} 1" solimp=".9999 .9999 .001 .5 2"'
 CAREFUL = 'cone="elliptic" impratio="100" noslip_iterations="10" tolerance="1e-12" iterations="200"'
@@ -152,16 +153,18 @@ class _Run:
         samples = range(self.task.steps + 1) if self.task.every_step else (0, self.task.steps)
         count, n = len(samples), len(self.ids)
         keep = _Kept(count, n)
-        done, failure, status, spent = 0, "", "completed", 0.0
+        done, failure, status, spent, block = 0, "", "completed", 0.0, 1
         entered = time.perf_counter()
         self._read(keep, 0, 0)
         for place, sample in enumerate(samples[1:], start=1):
             while done < sample and status == "completed":
-                block = min(BLOCK, sample - done)
+                taken = min(block, sample - done)
                 began = time.perf_counter()
-                mujoco.mj_step(self.model, self.data, block)
-                spent += time.perf_counter() - began
-                done += block
+                mujoco.mj_step(self.model, self.data, taken)
+                took = time.perf_counter() - began
+                spent += took
+                done += taken
+                block = min(2 * block, BLOCK) if took < LOOK else max(block // 2, 1)
                 status, failure = self._health(done, time.perf_counter() - entered)
             if status != "completed":
                 break

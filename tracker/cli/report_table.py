@@ -111,7 +111,9 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
     """The table with its heading and its verdict, ready to print."""
     shown = [pair for pair in pairs(run) if pair[0].kind == "scalar"]
     if not everything:
-        shown = [pair for pair in shown if pair[0].role != "reported"]
+        judged = [pair for pair in shown if pair[0].role != "reported"]
+        # An engine that is only shown has no gates; what has a limit is what a reader asks for.
+        shown = judged or [pair for pair in shown if pair[0].limit is not None]
     lines = [title(run), ""]
     lines += _scalars(shown, room or width())
     ladders = [pair for pair in pairs(run) if pair[0].kind in ("ladder", "order", "time")]
