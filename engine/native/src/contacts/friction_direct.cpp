@@ -19,6 +19,8 @@ constexpr double reluctance =
 constexpr int pivot_rounds = 60;        // a round of the cone need not be exact while its bounds still move
 constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
 constexpr int plain_rounds = 3;         // most systems settle within these
+constexpr int quick_rounds = 4;         // what rests or moves on as it did is found within these, exactly
+constexpr int longest_wait = 16;        // solves
 
 void bound_tangents(RowBlock& block, double bound) noexcept {
     for (int i = 1; i <= 2; ++i) {
@@ -109,25 +111,143 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
     points = std::move(swept_points);
 }
 
-/// True when the system is for Newton's method on the cone, and is solved by it.
-bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                     DirectSolver& direct, FrictionReport& report) {
+/// Whether the system is one for Newton's method on the cone.
+bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
     if (model != FrictionModel::cone && !points.empty()) return false;
     if (system.rows.size() <= few_blocks) return false;
-    for (const RowBlock& block : system.rows)  // rigid joints need the factor of the whole, not a relief
-        if (block.lower[0] != 0.0) return false;
+    // Rigid joints need the factor of the whole, not a relief.
+    return std::all_of(system.rows.begin(), system.rows.end(),
+                       [](const RowBlock& block) { return block.lower[0] == 0.0; });
+}
+
+/// True when Newton's method solved it; else the system is as it was: wedged, or rigid contacts that contradict.
+bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
+                     FrictionReport& report) {
     MixedSystem start = system;
     const ConeReport found = direct.newton.solve(system, points);
     report.rounds += found.iterations;
-    report.residual = found.residual;
-    report.converged = found.converged;
-    if (!found.converged) {  // wedged, or rigid contacts that contradict each other
+    if (!found.converged) {
         system = std::move(start);
-        report.converged = true;
         return false;
     }
+    report.residual = found.residual;
+    report.converged = true;
     for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
     return true;
+}
+
+/// Pivoting with bounds and directions renewed until the law holds; `quick`: given up where it is not near.
+/// True when it holds; a system that is not finite is reported.
+bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
+                      PivotSolver& solver, int max_rounds, bool quick, FrictionReport& report) {
+    auto solve = [&](bool same_matrix) {
+        const PivotReport pivots = solver.solve(system, same_matrix);
+        ++report.rounds;
+        report.pivots += pivots.flips;
+        report.converged = pivots.converged;
+        report.finite = pivots.finite;
+        return pivots.finite;
+    };
+    const bool some_unknown =
+        std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
+    if (some_unknown) {  // no step before: the normal forces without friction are the first guess
+        for (const FrictionPoint& point : points) bound_tangents(system.rows[point.block], 0.0);
+        if (!solve(false)) return false;
+        for (FrictionPoint& point : points)
+            if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
+        for (const FrictionPoint& point : points)
+            for (int i = 1; i <= 2; ++i) system.rows[point.block].state[i] = RowState::free;
+    }
+    std::vector<Mat6> mass_factor;
+    std::vector<double> scale(points.size(), 1.0);
+    if (model == FrictionModel::cone) {
+        turn_along_predicted_slip(system, points);
+        for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
+        for (std::size_t k = 0; k < points.size(); ++k)
+            scale[k] = tangent_scale(system.rows[points[k].block], points[k], mass_factor);
+    }
+
+    bool same_matrix = false;
+    Acceleration acceleration;
+    double accepted = settled;
+    std::vector<double> used(points.size()), given(points.size());
+    const int round_limit = solver.round_limit;
+    if (quick) solver.round_limit = quick_rounds;
+    else if (model == FrictionModel::cone) solver.round_limit = pivot_rounds;
+    struct Restore {
+        PivotSolver& solver;
+        int value;
+        ~Restore() { solver.round_limit = value; }
+    } restore{solver, round_limit};
+    for (int round = 0; round < (quick ? quick_rounds : max_rounds); ++round) {
+        for (const FrictionPoint& point : points)
+            bound_tangents(system.rows[point.block], point.coefficient * std::max(0.0, point.normal));
+        if (!solve(same_matrix)) return false;
+        same_matrix = true;
+
+        // Contradicting rigid contacts leave residuals that no round removes: ask less after 25 rounds.
+        if (round >= 25 && round % 5 == 0) accepted = std::min(10.0 * accepted, loosest);
+        // The bounds in use count, too: without them a round in which every normal force vanishes would settle at
+        // once, with the friction of the step before.
+        double largest = 0.0, change = 0.0;
+        for (const FrictionPoint& point : points)
+            largest = std::max({largest, system.rows[point.block].multiplier[0], point.normal});
+        double residual = 0.0;
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            FrictionPoint& point = points[k];
+            RowBlock& block = system.rows[point.block];
+            const double now = std::max(0.0, block.multiplier[0]);
+            if (model != FrictionModel::box)
+                change = std::max(change, point.coefficient * std::abs(now - point.normal));
+            if (model == FrictionModel::cone) {
+                const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
+                const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
+                                          accepted * point.coefficient * largest, reluctant, system.velocity);
+                residual = std::max(residual, law.residual);
+                if (law.moved) same_matrix = false;
+            }
+            used[k] = point.normal;
+            given[k] = point.normal = now;
+        }
+        report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
+        if (report.residual <= accepted && report.converged) return true;
+        if (quick && !report.converged) return false;
+        if (points.empty() || model == FrictionModel::box) {
+            report.residual = unbounded;  // the pivoting itself gave up
+            break;
+        }
+        if (round < plain_rounds) continue;
+        const std::vector<double> next = acceleration.next(used, given);
+        for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
+    }
+    report.converged = false;
+    return false;
+}
+
+/// Rounds that start from the answer of the step before find what rests or moves on at once, and exactly; they are
+/// asked first unless they failed lately. True when they settled; else the system is as it was.
+bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
+                    DirectSolver& direct, FrictionReport& report) {
+    if (direct.wait > 0) {
+        --direct.wait;
+        return false;
+    }
+    MixedSystem start = system;
+    const std::vector<FrictionPoint> start_points = points;
+    const FrictionReport before = report;
+    if (settle_by_rounds(system, points, model, direct.pivot, quick_rounds, true, report)) {
+        direct.failures = 0;
+        return true;
+    }
+    direct.wait = std::min(longest_wait, 1 << direct.failures);
+    direct.failures = std::min(direct.failures + 1, 8);
+    system = std::move(start);
+    points = start_points;
+    const int rounds = report.rounds, pivots = report.pivots;
+    report = before;
+    report.rounds = rounds;
+    report.pivots = pivots;
+    return false;
 }
 
 }  // namespace
@@ -168,91 +288,16 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
                                      FrictionModel model, DirectSolver& direct, int max_rounds) {
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
-    if (solve_by_newton(system, points, model, direct, report)) return report;
-    PivotSolver& solver = direct.pivot;
+    if (is_for_newton(system, points, model)) {
+        if (settle_quickly(system, points, model, direct, report)) return report;
+        if (solve_by_newton(system, points, direct, report)) return report;
+    }
     MixedSystem start;
     if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
                                        [](const RowBlock& block) { return block.lower[0] == 0.0; }))
         start = system;
-    auto solve = [&](bool same_matrix) {
-        const PivotReport pivots = solver.solve(system, same_matrix);
-        ++report.rounds;
-        report.pivots += pivots.flips;
-        report.converged = pivots.converged;
-        report.finite = pivots.finite;
-        return pivots.finite;
-    };
-    const bool some_unknown =
-        std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
-    if (some_unknown) {  // no step before: the normal forces without friction are the first guess
-        for (const FrictionPoint& point : points) bound_tangents(system.rows[point.block], 0.0);
-        if (!solve(false)) return report;
-        for (FrictionPoint& point : points)
-            if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
-        for (const FrictionPoint& point : points)
-            for (int i = 1; i <= 2; ++i) system.rows[point.block].state[i] = RowState::free;
-    }
-    std::vector<Mat6> mass_factor;
-    std::vector<double> scale(points.size(), 1.0);
-    if (model == FrictionModel::cone) {
-        turn_along_predicted_slip(system, points);
-        for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
-        for (std::size_t k = 0; k < points.size(); ++k)
-            scale[k] = tangent_scale(system.rows[points[k].block], points[k], mass_factor);
-    }
-
-    bool same_matrix = false;
-    Acceleration acceleration;
-    double accepted = settled;
-    std::vector<double> used(points.size()), given(points.size());
-    const int round_limit = solver.round_limit;
-    if (model == FrictionModel::cone) solver.round_limit = pivot_rounds;
-    struct Restore {
-        PivotSolver& solver;
-        int value;
-        ~Restore() { solver.round_limit = value; }
-    } restore{solver, round_limit};
-    for (int round = 0; round < max_rounds; ++round) {
-        for (const FrictionPoint& point : points)
-            bound_tangents(system.rows[point.block], point.coefficient * std::max(0.0, point.normal));
-        if (!solve(same_matrix)) return report;
-        same_matrix = true;
-
-        // Contradicting rigid contacts leave residuals that no round removes: ask less after 25 rounds.
-        if (round >= 25 && round % 5 == 0) accepted = std::min(10.0 * accepted, loosest);
-        // The bounds in use count, too: without them a round in which every normal force vanishes would settle at
-        // once, with the friction of the step before.
-        double largest = 0.0, change = 0.0;
-        for (const FrictionPoint& point : points)
-            largest = std::max({largest, system.rows[point.block].multiplier[0], point.normal});
-        double residual = 0.0;
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            FrictionPoint& point = points[k];
-            RowBlock& block = system.rows[point.block];
-            const double now = std::max(0.0, block.multiplier[0]);
-            if (model != FrictionModel::box)
-                change = std::max(change, point.coefficient * std::abs(now - point.normal));
-            if (model == FrictionModel::cone) {
-                const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
-                const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
-                                          accepted * point.coefficient * largest, reluctant, system.velocity);
-                residual = std::max(residual, law.residual);
-                if (law.moved) same_matrix = false;
-            }
-            used[k] = point.normal;
-            given[k] = point.normal = now;
-        }
-        report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
-        if (report.residual <= accepted && report.converged) return report;
-        if (points.empty() || model == FrictionModel::box) {
-            report.residual = unbounded;  // the pivoting itself gave up
-            break;
-        }
-        if (round < plain_rounds) continue;
-        const std::vector<double> next = acceleration.next(used, given);
-        for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
-    }
-    report.converged = false;
+    if (settle_by_rounds(system, points, model, direct.pivot, max_rounds, false, report) || !report.finite)
+        return report;
     finish_by_sweeps(system, start, points, model, report);
     return report;
 }

@@ -11,6 +11,8 @@ namespace spook {
 struct DirectSolver {
     PivotSolver pivot;
     ConeNewton newton;
+    int wait = 0;      // solves until pivoting is asked before Newton's method again
+    int failures = 0;  // of those attempts in a row
 };
 
 /// Solves `system` with the friction law `model` at `points`.
@@ -23,8 +25,9 @@ struct DirectSolver {
 /// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
 /// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
 /// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
-/// Systems of contacts alone with more than 24 blocks, under the cone or without friction, go to Newton's method
-/// first (`contacts/cone_newton.hpp`); what it does not settle to 1e-9 of the speeds starts anew as above.
+/// Systems of contacts alone with more than 24 blocks, under the cone or without friction, get a few of these rounds,
+/// which settle what rests exactly, and go to Newton's method then (`contacts/cone_newton.hpp`); what it does not
+/// settle to 1e-9 of the speeds starts anew as above. Where the few rounds failed they wait, up to 16 solves.
 /// On return FrictionPoint::normal is the normal impulse.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);
