@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,7 @@ def sample(series: str = KEY, value: Any = 0.407038, **changes: Any) -> Sample:
             calibration=(0.002, 0.0021),
         ),
     }
-    if value in ("nan", "inf", "-inf"):
+    if not math.isfinite(Number(value)):
         fields |= {"outcome": "not_finite", "passed": False, "set_point_held": False}
     return Sample(**fields | changes)
 
