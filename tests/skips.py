@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 # What CI may lack: other engines, a clone with its history, a distribution's WebAssembly compiler.
-LAWFUL = ("the extra ", "clone", "not a git checkout")
+LAWFUL = ("the extra ", "engine '", "clone", "not a git checkout")
 WASM = "make wasm"
 
 
