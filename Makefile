@@ -5,11 +5,12 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy wasm three-scene nightly test check bench bench-publish bench-heaps heaps mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene nightly test check bench bench-publish bench-heaps heaps mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
+	@echo "make tidy-deep the core read along every path by clang's analyser: weekly"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
@@ -44,9 +45,9 @@ check: develop
 	$(MAKE) --no-print-directory tidy
 
 # Over the core; again only when something in it has changed since it passed.
-tidy: develop
+tidy tidy-deep: develop
 	$(BIN)/cmake -S engine/native -B build/tidy $(NINJA) -DSPOOK_PYTHON=OFF -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
-	sh .ci/tidy $(BIN)/clang-tidy build/tidy
+	sh .ci/tidy $(BIN)/clang-tidy build/tidy $(patsubst tidy-%,%,$@)
 
 # The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
 package: develop
