@@ -105,6 +105,17 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     return sum;
 }
 
+std::map<int, Patience> IslandSolver::patience() const {
+    std::map<int, Patience> found;
+    for (const auto& [body, solver] : solvers_) found[body] = solver.patience;
+    return found;
+}
+
+void IslandSolver::be_patient(const std::map<int, Patience>& patience) {
+    for (auto& [body, solver] : solvers_) solver.patience = {};
+    for (const auto& [body, known] : patience) solvers_[body].patience = known;
+}
+
 BlockLdlt::Counters IslandSolver::counters() const noexcept {
     BlockLdlt::Counters sum;
     for (const auto& [body, solver] : solvers_) {

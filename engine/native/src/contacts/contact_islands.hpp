@@ -32,6 +32,10 @@ public:
 
     BlockLdlt::Counters counters() const noexcept;
 
+    /// Of every island, by its first body.
+    std::map<int, Patience> patience() const;
+    void be_patient(const std::map<int, Patience>& patience);
+
 private:
     std::map<int, DirectSolver> solvers_;  // by the island's first body
 };

@@ -131,9 +131,18 @@ public:
     struct Memory {
         std::vector<Touch> touches;
         ContactCounters counters;
+        std::map<int, Patience> resting, impact, parting;
     };
-    Memory memory() const { return {touches_, counters_}; }
-    void remember(const Memory& memory) { touches_ = memory.touches, counters_ = memory.counters; }
+    Memory memory() const {
+        return {touches_, counters_, resting_solver_.patience(), impact_solver_.patience(),
+                parting_solver_.patience()};
+    }
+    void remember(const Memory& memory) {
+        touches_ = memory.touches, counters_ = memory.counters;
+        resting_solver_.be_patient(memory.resting);
+        impact_solver_.be_patient(memory.impact);
+        parting_solver_.be_patient(memory.parting);
+    }
 
     /// Force [N] on `body` from `other` (or from all if −1), mean over the step.
     Vec3 force(int body, int other) const noexcept;

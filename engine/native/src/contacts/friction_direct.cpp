@@ -228,19 +228,19 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 /// asked first unless they failed lately. True when they settled; else the system is as it was.
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                     DirectSolver& direct, FrictionReport& report) {
-    if (direct.wait > 0) {
-        --direct.wait;
+    if (direct.patience.wait > 0) {
+        --direct.patience.wait;
         return false;
     }
     MixedSystem start = system;
     const std::vector<FrictionPoint> start_points = points;
     const FrictionReport before = report;
     if (settle_by_rounds(system, points, model, direct.pivot, quick_rounds, true, report)) {
-        direct.failures = 0;
+        direct.patience.failures = 0;
         return true;
     }
-    direct.wait = std::min(longest_wait, 1 << direct.failures);
-    direct.failures = std::min(direct.failures + 1, 8);
+    direct.patience.wait = std::min(longest_wait, 1 << direct.patience.failures);
+    direct.patience.failures = std::min(direct.patience.failures + 1, 8);
     system = std::move(start);
     points = start_points;
     const int rounds = report.rounds, pivots = report.pivots;
