@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene nightly test check bench bench-publish bench-heaps heaps mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -16,6 +16,7 @@ help:
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
+	@echo "make campaign  random heaps from clean starts: does their energy ever rise?"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
@@ -60,6 +61,9 @@ release:
 
 heaps: develop
 	$(BIN)/python bench/piles.py
+
+campaign: develop
+	$(BIN)/python bench/campaign.py
 
 mutants: develop
 	$(BIN)/python bench/mutants.py
