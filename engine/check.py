@@ -1,11 +1,12 @@
-"""Checks shared by the scene's dataclasses: each returns the clean value or names the culprit."""
+"""Checks shared by scenes and runs: each returns the clean value or names the culprit."""
 
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any
 
-from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.errors import MethodError, SceneError
 
 Vector = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), body to world
@@ -79,3 +80,29 @@ def name(kind: str, value: object) -> str:
     if not isinstance(value, str) or not value.strip():
         raise SceneError(f"a {kind} needs a name, not {value!r}")
     return value
+
+
+def step_count(value: Any) -> int:
+    """A number of steps, or a MethodError."""
+    try:
+        steps = -1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        steps = -1
+    if steps < 0:
+        raise MethodError(f"steps must be a whole number, zero or above, not {value!r}")
+    if steps >= 2**53:
+        raise MethodError(f"{steps} steps are more than any machine can do; use a larger time step")
+    return steps
+
+
+def wall_time(value: Any) -> float:
+    """A limit of wall time [s] as the core takes it, 0 for none; or a MethodError."""
+    if value is None:
+        return 0.0
+    try:
+        seconds = math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise MethodError(f"time_limit must be a positive number of seconds, not {value!r}")
+    return seconds

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from spook_tracker.engine import _core
+from spook_tracker.engine import _core, check
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
 from spook_tracker.engine.result import Array, Result
@@ -126,11 +126,12 @@ class Program:
         `time_limit` [s] of wall time ends the run as "timed_out", within a step, too;
         `time_stages` measures seconds by stage, which slows the run down.
         """
+        steps, limit = check.step_count(steps), check.wall_time(time_limit)
         for name, what in self._observe.items():
             if max(what.first, what.last or 0) > steps:
                 raise MethodError(f"observe {name!r}: its samples end beyond the last step, {steps}")
         with self._running:
-            report = self._native.run(steps, time_limit or 0.0, time_stages)
+            report = self._native.run(steps, limit, time_stages)
         return self.result(report, time_limit)
 
     @property

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType, TracebackType
@@ -112,14 +112,11 @@ class Run:
     def step(self, steps: int = 1, *, time_limit: float | None = None) -> None:
         """So many steps on, natively. Raises SimulationFailed, with the run so far in `.result`, when a value is
         no longer finite or the time limit [s] is over; `restore` takes the run back to before."""
-        if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps < 2**53:
-            raise MethodError(f"steps must be a whole number, zero or above, not {steps!r}")
-        if time_limit is not None and not time_limit > 0.0:
-            raise MethodError(f"time_limit must be positive, not {time_limit!r}")
+        steps, limit = check.step_count(steps), check.wall_time(time_limit)
         with self._held():
             if self._failure is not None:
                 raise SimulationFailed(self._failure)
-            report = self._native.advance(steps, time_limit or 0.0)
+            report = self._native.advance(steps, limit)
             self._read = None
             self._steps += report["steps"]
             self._seconds += report["seconds"]
@@ -345,7 +342,10 @@ def _flat(scene: Scene, state: Mapping[str, Array] | None) -> list[float]:
     for body in scene.bodies:
         if body.name not in state:
             raise MethodError(f"state: body {body.name!r} is missing; give all bodies of the scene")
-        numbers = [check.number(f"state of {body.name!r}", "each entry", value) for value in state[body.name]]
+        given: Any = state[body.name]
+        if not isinstance(given, Iterable):
+            raise MethodError(f"state of {body.name!r} needs 13 numbers, not {given!r}")
+        numbers = [check.number(f"state of {body.name!r}", "each entry", value) for value in given]
         if len(numbers) != 13:
             raise MethodError(f"state of {body.name!r} needs 13 numbers, not {len(numbers)}")
         check.rotation(f"state of {body.name!r}", "orientation", numbers[3:7])

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import SupportsFloat
 
+from spook_tracker.engine import check
 from spook_tracker.engine.compiler import NOTHING, compile
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.method import PLAIN, Method
@@ -42,10 +43,4 @@ def simulate(
         if not (math.isfinite(duration) and duration >= 0.0):
             raise MethodError(f"duration must be finite and not negative, not {duration!r}")
         steps = round(duration / time_step)
-    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 0:
-        raise MethodError(f"steps must be a whole number, zero or above, not {steps!r}")
-    if steps >= 2**53:
-        raise MethodError(f"{steps} steps are more than any machine can do; use a larger time step")
-    if time_limit is not None and not time_limit > 0.0:
-        raise MethodError(f"time_limit must be positive, not {time_limit!r}")
-    return program.run(steps, time_limit, time_stages)
+    return program.run(check.step_count(steps), time_limit, time_stages)

@@ -35,6 +35,7 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
     Velocity,
+    compile,
     explain,
     simulate,
     start,
@@ -306,6 +307,18 @@ def hostile() -> dict[str, tuple[Any, type, str]]:
     return {
         "steps": (on(driven, lambda run: run.step(1.5)), MethodError, "steps"),
         "negative steps": (on(driven, lambda run: run.step(-1)), MethodError, "steps"),
+        "wordy limit": (on(driven, lambda run: run.step(time_limit="1")), MethodError, "time_limit must be"),
+        "a program's limit": (
+            lambda: compile(driven, time_step=0.1).run(1, time_limit=math.nan),
+            MethodError,
+            "time_limit must be",
+        ),
+        "a program's steps": (lambda: compile(driven, time_step=0.1).run(2.0), MethodError, "steps must be"),  # type: ignore[arg-type]
+        "a scalar state": (
+            lambda: start(driven, time_step=0.1, state={"block": 3.0}),  # type: ignore[dict-item]
+            MethodError,
+            "13 numbers",
+        ),
         "no such load": (on(driven, lambda run: run.set_load("pull")), SceneError, "'pull'"),
         "load of NaN": (
             on(driven, lambda run: run.set_load("push", force=(math.nan, 0, 0))),
