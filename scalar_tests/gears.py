@@ -32,10 +32,10 @@ from spook_tracker.scalar_tests.case import (
     Figure,
     Ladder,
     Measurement,
-    Metric,
     ScalarTest,
     Simulate,
 )
+from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.sweep import line, told
 
 SUN, PLANET, RING = 20.0, 30.0, 80.0  # teeth; ring = sun + 2 planets
@@ -189,19 +189,6 @@ STATICS = "statics are exact in one step; rounding remains"
 SMALL = "exact for turns of less than 1e-6 rad a step"
 
 
-def _error(name: str, description: str, role: str, limit: float, source: str, unit: str = "1") -> Metric:
-    return Metric(
-        name=name,
-        description=description,
-        unit=unit,
-        role=role,  # type: ignore[arg-type]
-        limit=limit,
-        limit_source=source,
-        reference=0.0,
-        tolerance=0.1 * limit,
-    )
-
-
 OFF = "the turn of a step is asin h ω: the meshes stand off by θ Σ z (h ω)³/6, at most 1.3e-7 of the angle turned"
 
 TEST = ScalarTest(
@@ -232,31 +219,37 @@ TEST = ScalarTest(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                _error(
+                error(
                     "ratio_error",
                     "angle of the sun over five times the carrier's after 10 s, minus one",
-                    "gate",
+                    "1",
                     1.3e-7,
                     OFF,
                 ),
-                _error("planet_error", "the same of the planet against the ring", "companion", 1.3e-7, OFF),
-                _error(
-                    "ring_torque_error", "relative error of the torque on the ring", "gate", 1e-11, STATICS
+                error(
+                    "planet_error", "the same of the planet against the ring", "1", 1.3e-7, OFF, "companion"
                 ),
-                _error(
+                error("ring_torque_error", "relative error of the torque on the ring", "1", 1e-11, STATICS),
+                error(
                     "sun_torque_error",
                     "relative error of the torque at the sun's mesh",
-                    "companion",
+                    "1",
                     1e-11,
                     STATICS,
+                    "companion",
                 ),
-                _error(
-                    "creep", "largest speed of the carrier in balance", "companion", 1e-12, STATICS, "rad/s"
+                error(
+                    "creep", "largest speed of the carrier in balance", "rad/s", 1e-12, STATICS, "companion"
                 ),
-                _error(
-                    "rack_error", "relative error of the rack's speed after 1 s", "companion", 1e-9, SMALL
+                error(
+                    "rack_error",
+                    "relative error of the rack's speed after 1 s",
+                    "1",
+                    1e-9,
+                    SMALL,
+                    "companion",
                 ),
-                _error("pinion_error", "relative error of the pinion's", "companion", 1e-9, SMALL),
+                error("pinion_error", "relative error of the pinion's", "1", 1e-9, SMALL, "companion"),
             ),
             measure=turn,
             note="planetary set and rack",
@@ -265,10 +258,10 @@ TEST = ScalarTest(
             configuration="start",
             time_step=TIME_STEP,
             metrics=(
-                _error(
+                error(
                     "inertia_error",
                     "relative error of the carrier's first angular acceleration",
-                    "gate",
+                    "1",
                     1e-11,
                     "the first step from rest knows no turn: exact",
                 ),

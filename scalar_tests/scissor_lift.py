@@ -34,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
+from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -189,19 +190,6 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _error(name: str, description: str, role: str, limit: float, source: str) -> Metric:
-    return Metric(
-        name=name,
-        description=description,
-        unit="1",
-        role=role,  # type: ignore[arg-type]
-        limit=limit,
-        limit_source=source,
-        reference=0.0,
-        tolerance=0.1 * limit,
-    )
-
-
 ROUNDING = (
     "statics are exact in one step; forces grow like n² along the arms, 400 roundings of 2e-16 are 1e-13"
 )
@@ -235,16 +223,15 @@ TEST = ScalarTest(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                _error(
-                    "force_error", "largest relative error of the force, n = 1 … 20", "gate", 1e-12, ROUNDING
-                ),
-                _error("angle_error", "the same at 5 to 80°, three stages", "companion", 1e-12, ROUNDING),
-                _error(
+                error("force_error", "largest relative error of the force, n = 1 … 20", "1", 1e-12, ROUNDING),
+                error("angle_error", "the same at 5 to 80°, three stages", "1", 1e-12, ROUNDING, "companion"),
+                error(
                     "ratio_error",
                     "the same for loads of 1 to 1e6 arms, three stages",
-                    "companion",
+                    "1",
                     1e-12,
                     ROUNDING,
+                    "companion",
                 ),
                 Metric(
                     name="sag",
@@ -264,10 +251,10 @@ TEST = ScalarTest(
             configuration="driven",
             time_step=TIME_STEP,
             metrics=(
-                _error(
+                error(
                     "rate_error",
                     "largest relative error of the first step's lift rate, n = 1 … 20",
-                    "gate",
+                    "1",
                     1e-12,
                     "a velocity row is exact in one step; rounding times the leverage",
                 ),

@@ -36,10 +36,10 @@ from spook_tracker.scalar_tests.case import (
     Figure,
     Ladder,
     Measurement,
-    Metric,
     ScalarTest,
     Simulate,
 )
+from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -215,19 +215,6 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _error(name: str, description: str, unit: str, role: str, limit: float, source: str) -> Metric:
-    return Metric(
-        name=name,
-        description=description,
-        unit=unit,
-        role=role,  # type: ignore[arg-type]
-        limit=limit,
-        limit_source=source,
-        reference=0.0,
-        tolerance=0.1 * limit,
-    )
-
-
 STEADY = "a steady force is exact in the velocities of the discrete step; rounding remains"
 TURNS = (
     "the drum turns by φ a step with sin φ = h ω, (h ω)³/6 more than h ω, so the weights go (h ω)²/6 faster than it: "
@@ -263,39 +250,27 @@ TEST = ScalarTest(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                _error(
-                    "wire_error",
-                    "relative error of the speed after 1 s over eyes",
-                    "1",
-                    "gate",
-                    1e-11,
-                    STEADY,
+                error("wire_error", "relative error of the speed after 1 s over eyes", "1", 1e-11, STEADY),
+                error("pull_error", "relative error of the wire's pull", "1", 1e-11, STEADY, "companion"),
+                error(
+                    "drum_error", "relative error of the speed after 2 s over the drum", "1", 2.6e-3, TURNS
                 ),
-                _error("pull_error", "relative error of the wire's pull", "1", "companion", 1e-11, STEADY),
-                _error(
-                    "drum_error",
-                    "relative error of the speed after 2 s over the drum",
-                    "1",
-                    "gate",
-                    2.6e-3,
-                    TURNS,
-                ),
-                _error(
+                error(
                     "tackle_motion",
                     "largest speed of a balanced tackle in 1 s",
                     "m/s",
-                    "companion",
                     1e-12,
                     STEADY,
+                    "companion",
                 ),
-                _error("tackle_pull", "relative error of its pull", "1", "companion", 1e-11, STEADY),
-                _error(
+                error("tackle_pull", "relative error of its pull", "1", 1e-11, STEADY, "companion"),
+                error(
                     "tackle_error",
                     "relative error of the block's speed, out of balance",
                     "1",
-                    "companion",
                     1e-11,
                     STEADY,
+                    "companion",
                 ),
             ),
             measure=fall,
@@ -305,37 +280,36 @@ TEST = ScalarTest(
             configuration="snap",
             time_step=TIME_STEP,
             metrics=(
-                _error(
+                error(
                     "speed_error",
                     "parting speed after the snap, plus e times that before",
                     "m/s",
-                    "gate",
                     1e-9,
                     "the blow is a row of its own: exact",
                 ),
-                _error(
+                error(
                     "momentum_error",
                     "largest change of momentum",
                     "N s",
-                    "companion",
                     1e-12,
                     "equal and opposite",
+                    "companion",
                 ),
-                _error(
+                error(
                     "loss_error",
                     "relative error of the energy lost",
                     "1",
-                    "companion",
                     1e-9,
                     "½ µ u² (1 − e²)",
+                    "companion",
                 ),
-                _error(
+                error(
                     "gain",
                     "largest gain of energy in a step",
                     "J",
-                    "companion",
                     1e-12,
                     "no step of a rope gives energy",
+                    "companion",
                 ),
             ),
             measure=snap,
