@@ -342,11 +342,14 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
                         f"{configuration}, the night before", before, of, colour, definition.unit
                     )
                     lines.append(_ghost(line))
-            if axis == "seconds":
-                lines += _peer_lines(peers, name, definition.unit, len(points))
+            everybody = [r for found in points.values() for r in found]
+            if axis == "seconds":  # what one engine counts, another does not
+                beside = _peer_rungs(peers, name)
+                lines += _peer_lines(beside, definition.unit, len(points))
+                everybody += [r for _, found in beside for r in found]
             if not any(line.x for line in lines):
                 continue
-            lines.append(_front([r for found in points.values() for r in found], of))
+            lines.append(_front(everybody, of))
             charts.append(
                 Chart(
                     name=f"{prefix}l-{slug(name)}-{axis}",
@@ -363,15 +366,21 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
     return charts
 
 
-def _peer_lines(peers: Peers, ladder: str, unit: str, colour: int) -> list[Line]:
-    """The ladders of other engines, after ours."""
-    lines = []
-    for engine, test in peers:
-        for configuration, trends in ladders(test).get(ladder, {}).items():
-            found = rungs(trends, lambda t: t.latest)
-            lines.append(_ladder_line(f"{engine}: {configuration}", found, lambda r: r.seconds, colour, unit))
-            colour += 1
-    return lines
+def _peer_rungs(peers: Peers, ladder: str) -> list[tuple[str, list[Rung]]]:
+    """The ladders of other engines: engine and configuration, points."""
+    return [
+        (f"{engine}: {configuration}", rungs(trends, lambda t: t.latest))
+        for engine, test in peers
+        for configuration, trends in ladders(test).get(ladder, {}).items()
+    ]
+
+
+def _peer_lines(beside: Sequence[tuple[str, Sequence[Rung]]], unit: str, colour: int) -> list[Line]:
+    """Lines of other engines, after ours."""
+    return [
+        _ladder_line(name, found, lambda r: r.seconds, colour + i, unit)
+        for i, (name, found) in enumerate(beside)
+    ]
 
 
 def _ghost(line: Line) -> Line:
