@@ -31,6 +31,7 @@ EXTRAS: Mapping[str, str] = {"mujoco": "mujoco", "exudyn": "exudyn"}  # engine: 
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",
     "rapier": "@dimforge/rapier3d-compat",
+    "jolt": "jolt-physics",
 }  # engine: its package, from npm
 
 

@@ -30,12 +30,12 @@ def run(
     """Put the questions (all, or those named) to the engine; nothing is recorded.
 
     `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
-    tracker.measure.run.Questions (catalogue, engine, limit).
+    tracker.measure.run.Questions (catalogue, engine, limit, limits).
     """
     from spook_tracker.tracker.measure.run import Questions, Request
     from spook_tracker.tracker.measure.run import run as measure
 
-    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit") if name in asked}
+    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit", "limits") if name in asked}
     request = Request(tests=tuple(tests), **asked)
     return measure(Questions(**where), request, watch or (lambda progress: None))
 
@@ -114,15 +114,24 @@ def trend(
     return list(judge_all(found, accepted).values())
 
 
-def publish(history: History, out: Path, accepted: Sequence[Accepted] = (), database: str = "") -> Any:
+def publish(
+    history: History,
+    out: Path,
+    accepted: Sequence[Accepted] = (),
+    database: str = "",
+    title: str = "",
+    home_page: str = "",
+) -> Any:
     """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
 
     `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
+    `title` and `home_page` say whose website it is.
     """
     from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.publish import publish as build
 
-    return build(history, out, accepted, database_file(database) if database else None)
+    offered = database_file(database) if database else None
+    return build(history, out, accepted, offered, title, home_page)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +157,8 @@ def nightly(
     watch: Callable[[Any], None] | None = None,
     tell: Callable[[Any], None] = lambda news: None,
     with_database: bool = False,
+    title: str = "",
+    home_page: str = "",
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
@@ -175,5 +186,6 @@ def nightly(
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
-        published = publish(history, out, accepted, database if with_database else "")
+        offered = database if with_database else ""
+        published = publish(history, out, accepted, offered, title, home_page)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

@@ -15,6 +15,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     source_options,
 )
+from spook_tracker.tracker.cli.settings import present
 
 
 def history_of(database: str) -> Any:
@@ -161,7 +162,11 @@ def list_tests(engine: str, catalogue: str) -> None:
     from spook_tracker.tracker.cli.report_catalogue import catalogue_table
     from spook_tracker.tracker.measure.run import Questions
 
-    say(catalogue_table(Questions(catalogue=catalogue, engine=engine).tests()))
+    say(
+        catalogue_table(
+            Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine)).tests()
+        )
+    )
 
 
 @click.command(epilog=example("tracker show pendulum"))
@@ -173,7 +178,9 @@ def show(test: str, engine: str, catalogue: str) -> None:
     from spook_tracker.tracker.cli.report_catalogue import card
     from spook_tracker.tracker.measure.run import Questions, select
 
-    tests = select(Questions(catalogue=catalogue, engine=engine).tests(), [test])
+    tests = select(
+        Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine)).tests(), [test]
+    )
     say(card(test, tests[test]))
 
 
@@ -190,7 +197,7 @@ def explain(test: str, cost: bool, engine: str, catalogue: str) -> None:
     from spook_tracker.tracker.measure.ladder import saved_by_leaving_out, stage_costs
     from spook_tracker.tracker.measure.run import Questions, select
 
-    source = Questions(catalogue=catalogue, engine=engine)
+    source = Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine))
     tests = select(source.tests(), [test])
     if cost:
         simulate = source.simulate()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -12,7 +12,8 @@ from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.document.wording import page_of
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
-from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.tonight import Finding, not_compared
+from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import QUIET, WORDS, spaced
 
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
@@ -224,7 +225,15 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
         summary(findings),
         *shared,
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
+        *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
     ]
+
+
+def _verdicts(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
+    """Of what was measured: a sum of work says nothing that its parts do not say."""
+    for finding in findings:
+        if finding.definition is None or finding.definition.kind != "work":
+            yield finding.test, finding.verdict
 
 
 def summary(findings: Sequence[Finding]) -> str:
@@ -241,9 +250,7 @@ def summary(findings: Sequence[Finding]) -> str:
     if words["new"]:
         parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
     if words["not_comparable"]:
-        parts.append(
-            f"{words['not_comparable']} cannot be compared (new definition, float environment, unquiet machine)"
-        )
+        parts.append(f"{words['not_comparable']} cannot be compared")
     return click.style("✓ " + "; ".join(parts), fg="green")
 
 

@@ -28,7 +28,7 @@ from spook_tracker.tracker.judge.series_history import (
 )
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
-from spook_tracker.tracker.judge.tonight import map_key
+from spook_tracker.tracker.judge.tonight import map_key, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
 from spook_tracker.tracker.judge.work import FAMILIES
@@ -89,7 +89,8 @@ def known(told: Mapping[str, Told], before: str, after: str) -> Known:
         level, threshold = old.usual
         usual[key] = (_time(old), threshold) if old.red else (level, threshold)
         if new is not None:
-            values[key] = (_time(old), _time(new))
+            confirmed = new.confirms and old.state == "suspected"  # by what both are slower than
+            values[key] = (level if confirmed else _time(old), _time(new))
             if new.state == "suspected":
                 suspected.add(key)
     return Known(usual=usual, values=values, suspected=frozenset(suspected), first_bad=first_bad)
@@ -370,6 +371,13 @@ def _notes(before: ComparedRun, after: ComparedRun, changes: Sequence[Change]) -
         notes.append("values are not compared: the runs are of different float environments")
     if before.side.engine != after.side.engine:
         notes.append(f"different engines: {before.side.engine} and {after.side.engine}")
+    if before.side.float_environment == after.side.float_environment:
+        told = [
+            (change.test, Verdict(word=change.word, sentence=change.sentence))
+            for change in changes
+            if change.kind not in ("work", *TIMES)
+        ]
+        notes += not_compared(told)
     lost = sum(
         change.before_outcome in NO_VALUE and change.after_outcome in NO_VALUE and change.role != "reported"
         for change in changes
