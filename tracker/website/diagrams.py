@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
 from spook_tracker.tracker.document.wording import (
@@ -90,7 +90,11 @@ def grid_view(grid: Grid) -> View:
 
 
 def trend_chart(
-    trend: Trend, nights: Sequence[Night], events: Sequence[Event] = (), title: str = ""
+    trend: Trend,
+    nights: Sequence[Night],
+    events: Sequence[Event] = (),
+    title: str = "",
+    each: Literal["night", "version"] = "night",
 ) -> Chart:
     """A series over versions, with its limit, set point, reference, and where it became worse."""
     definition = trend.definition
@@ -143,7 +147,7 @@ def trend_chart(
     return Chart(
         name=f"v-{slug(definition.key)}",
         title=(f"{title}: " if title else "") + f"{named(definition)[0]} ({conditions(definition)})",
-        x_label="night",
+        x_label=each,
         y_label=f"{magnitude}value" + (f" [{definition.unit}]" if definition.unit != "1" else ""),
         lines=tuple(lines),
         y_scale=scale,

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import msgspec
@@ -269,9 +269,9 @@ def engine_page(book: Book, chapter: Chapter) -> Page:
         "counts": [
             _counts(name, [of_gate[name] for of_gate in cells.values() if name in of_gate]) for name in names
         ],
-        "versions": list(reversed(_versions(chapter, steps)))[:MOST_RELEASES],
+        "versions": _folded(list(reversed(_versions(chapter, steps))))[:MOST_RELEASES],
         "trends": [
-            view(trend_chart(trend, chapter.nights, (), ours_title(ours, trend)))
+            view(trend_chart(trend, chapter.nights, (), ours_title(ours, trend), "version"))
             for trend in _moving(chapter, steps)
         ],
     }
@@ -329,6 +329,20 @@ def _versions(chapter: Chapter, steps: Steps) -> list[dict[str, Any]]:
             }
         )
     return told
+
+
+def _folded(told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Neighbours that changed nothing are one line."""
+    folded: list[dict[str, Any]] = []
+    for quiet, group in groupby(told, key=lambda one: not one["count"] and not one["first"]):
+        found = list(group)
+        if quiet and len(found) > 1:
+            names = f"{found[-1]['version']} … {found[0]['version']}"
+            days = " … ".join(dict.fromkeys((found[-1]["measured"], found[0]["measured"])))
+            folded.append({**found[0], "version": names, "measured": days, "tests": f"{len(found)} versions"})
+        else:
+            folded += found
+    return folded
 
 
 def _size(change: tuple[Trend, int]) -> tuple[bool, float]:
