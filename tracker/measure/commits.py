@@ -13,6 +13,7 @@ import subprocess
 import sys
 import sysconfig
 from collections.abc import Sequence
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import spook_tracker
@@ -108,7 +109,7 @@ def build_in_place(place: Path) -> None:
     configure = [cmake, "-S", source, "-B", output, f"-DPython_EXECUTABLE={sys.executable}"]
     for command in (configure, [cmake, "--build", output, "-j2"]):
         _must(command, f"{place.name} does not build")
-    modules = [*(place / "build").glob("_core*.so"), *(place / "build").glob("_core*.pyd")]
+    modules = [file for file in (place / "build").iterdir() if file.name.endswith(tuple(EXTENSION_SUFFIXES))]
     if not modules:
         raise CommitError(f"{place.name} builds, but without a module for Python")
     for module in modules:
