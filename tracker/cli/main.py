@@ -9,6 +9,7 @@ import click
 
 import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
+from spook_tracker.tracker.cli.ci import ci
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -306,6 +307,7 @@ def serve(folder: Path, port: int) -> None:
 
 
 for command in (
+    ci,
     releases.backfill,
     releases.releases_command,
     ranking.rank,

@@ -177,7 +177,7 @@ def _verdict(document: CompareDocument) -> str:
 def compare_markdown(document: CompareDocument) -> str:
     """The comparison as Markdown; names and sentences from outside are data, never markup."""
     lines = [
-        f"### {_escape(name_of(document.before))} → {_escape(name_of(document.after))}",
+        f"### {escaped(name_of(document.before))} → {escaped(name_of(document.after))}",
         "",
         f"**{spaced(document.verdict)}**: {counted(document)}",
         "",
@@ -193,7 +193,7 @@ def compare_markdown(document: CompareDocument) -> str:
             _limit(change.limit),
             change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
         )
-        lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
+        lines.append("| " + " | ".join(escaped(cell) for cell in cells) + " |")
     if len(shown) > MOST_ROWS:
         lines.append(f"\nand {len(shown) - MOST_ROWS} more")
     moved = _moved(document)
@@ -202,13 +202,13 @@ def compare_markdown(document: CompareDocument) -> str:
         lines += ["|---|---:|---:|"]
     for f in moved[:MOST_ROWS]:
         ratios = [f"{ratio:.3g}" if ratio else "-" for ratio in _ratios(f)[:2]]
-        lines.append(f"| {_escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
-    lines += ["", *(f"- {_escape(note)}" for note in document.notes)]
+        lines.append(f"| {escaped(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
+    lines += ["", *(f"- {escaped(note)}" for note in document.notes)]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _escape(text: str) -> str:
-    """Markdown and HTML signs made harmless."""
+def escaped(text: str) -> str:
+    """Text from outside in Markdown: no sign of it is markup, names nobody, breaks no line."""
     text = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return "".join("\\" + c if c in "\\`*_{}[]#|~!" else c for c in text).replace(
         "@", "@\N{ZERO WIDTH SPACE}"
