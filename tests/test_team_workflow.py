@@ -117,7 +117,7 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     assert worse["change"].result == "failure"
     assert worse["night"].result == "skipped"
     assert "**regressed**" in worse["change"].summary
-    assert "::error title=throw%3A" in worse["change"].log
+    assert "::error title=pebble became worse::" in worse["change"].log
 
     git(team.clone, "checkout", "-q", "main")
     team.change("Pull as it should", "mend", "1.01 * time_step", "time_step")

@@ -18,6 +18,7 @@ from spook_tracker.tracker.cli.options import (
     accepted_option,
     database_option,
     example,
+    executor_option,
     limit_option,
     source_options,
     website_options,
@@ -46,6 +47,7 @@ def ci() -> None:
 @click.option(
     "--site", metavar="URL", default="", help="Where the website will be, for links in the summary."
 )
+@executor_option
 @workers_option
 @limit_option
 @website_options
@@ -81,6 +83,7 @@ def night(
 @click.option(
     "--base", metavar="V", default="last-green", show_default=True, help="What it is compared with."
 )
+@executor_option
 @workers_option
 @limit_option
 @accepted_option
@@ -94,7 +97,7 @@ def change(
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.cli.main import run_command
-    from spook_tracker.tracker.cli.report_ci import change_annotations
+    from spook_tracker.tracker.cli.report_comment import workflow_commands
     from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
     from spook_tracker.tracker.library import compare
 
@@ -108,7 +111,7 @@ def change(
     with history_of(database) as kept:
         document = compare(kept, base, "latest", accepted_levels(accepted))
     say(compare_table(document))
-    _tell(compare_markdown(document), change_annotations(document.changes))
+    _tell(compare_markdown(document), workflow_commands(document).splitlines())
     context.exit(document.exit_code)
 
 

@@ -113,7 +113,7 @@ def compare(told: Comparisons, book: Book) -> Page:
             "changes": pair["changes"][:MOST_CHANGES],
             "left_out": max(0, len(pair["changes"]) - MOST_CHANGES),
         }
-    nights = [*book.nights, *(night for night, _ in book.others)]
+    nights = [*book.nights, *(chapter.tonight for chapter in book.others)]
     names = [f"{clean(night.engine.name)} " for night in nights]
     names[: len(book.nights)] = [""] * len(book.nights)
     choices = [
@@ -155,7 +155,6 @@ def versions(book: Book) -> Page:
             {"machine": machine, "anchor": slug(machine.fingerprint), "nights": count}
             for machine, count in machines.most_common()
         ],
-        "others": [(night, len(tests)) for night, tests in book.others],
     }
     return Page("versions.html", "versions.html", "Versions and machines", "What ran where.", context)
 
