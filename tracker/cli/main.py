@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import spook_tracker.tracker.cli.past as past
 import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
@@ -306,6 +307,7 @@ def serve(folder: Path, port: int) -> None:
 
 
 for command in (
+    past.bisect,
     releases.backfill,
     releases.releases_command,
     ranking.rank,
