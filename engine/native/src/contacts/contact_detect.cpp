@@ -369,6 +369,7 @@ void ContactStage::order_points() {
         point.parting_before = touches_[old].parting;
         std::copy_n(touches_[old].tangent, 2, point.tangent_before);
     }
+    ordered_ = points_.size();
 }
 
 /// Approach, push and part in the impact of every point, from the current velocities.
