@@ -177,6 +177,9 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "compliance": 0.0,
         "damping": 4.5 * step,
         "slip_compliance": 0.0,
+        "rolling_friction": 0.0,
+        "torsional_friction": 0.0,
+        "surface_velocity": _ORIGIN,
     }
     if isinstance(body, Particle):
         return columns
@@ -194,6 +197,9 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "compliance": material.compliance,
         "damping": _or(material.damping, 4.5 * step),
         "slip_compliance": material.slip_compliance,
+        "rolling_friction": material.rolling_friction,
+        "torsional_friction": material.torsional_friction,
+        "surface_velocity": body.surface_velocity,
     }
 
 

@@ -20,6 +20,7 @@ from spook_tracker.scalar_tests import (
     motor,
     robot_arm,
     sinking_sphere,
+    turntable,
     wires,
 )
 from spook_tracker.scalar_tests.beam import scene as beam
@@ -354,6 +355,17 @@ def test_the_terminal_speed_is_the_fixed_point_of_a_step_and_is_reached() -> Non
     for _ in range(600):
         v += h * (sinking_sphere.PULL - sinking_sphere.RESISTANCE * v * v)
     assert measurement("sinking_sphere", "plain").metrics[0].passes(v / sinking_sphere.TERMINAL - 1.0)
+
+
+def test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn() -> None:
+    turn = turntable.CIRCLE * turntable.TIME_STEP
+    places = turntable.recursion(turntable.TIME_STEP, turntable.STEPS)
+    angles = np.unwrap(np.angle(np.diff(places)))
+    found = (angles[-1] - angles[0]) / ((turntable.STEPS - 1) * turn) - 1.0
+
+    assert found == pytest.approx(math.atan(turn) / turn - 1.0, rel=1e-9)
+    assert found == pytest.approx(-(turn**2) / 3.0, rel=1e-4)
+    assert measurement("turntable", "plain").metrics[0].passes(found)
 
 
 def test_a_square_log_falls_between_the_densities_of_its_metacentre() -> None:

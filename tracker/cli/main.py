@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import spook_tracker.tracker.cli.past as past
 import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
@@ -21,9 +22,11 @@ from spook_tracker.tracker.cli.options import (
     refuse_unwritable,
     source_options,
     terminated_is_interrupted,
+    website_options,
     with_database_option,
     workers_option,
 )
+from spook_tracker.tracker.cli.settings import present
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
 
 FIRST_STEPS = """\
@@ -134,6 +137,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
 @with_database_option
+@website_options
 @accepted_option
 @source_options
 @database_option
@@ -141,6 +145,8 @@ def nightly(
     out: Path,
     quick: bool,
     with_database: bool,
+    title: str,
+    home_page: str,
     workers: int,
     time_limit: float,
     accepted: Path | None,
@@ -184,8 +190,11 @@ def nightly(
             watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
             tell=tell,
             with_database=with_database,
+            title=title,
+            home_page=home_page,
             catalogue=catalogue,
             engine=first,
+            limits=present().limits_of(first),
             limit=limit,
             figures=True,
             sweep=not quick,
@@ -218,9 +227,12 @@ def engines() -> None:
     "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
 )
 @with_database_option
+@website_options
 @accepted_option
 @database_option
-def publish(out: Path, with_database: bool, accepted: Path | None, database: str) -> None:
+def publish(
+    out: Path, with_database: bool, title: str, home_page: str, accepted: Path | None, database: str
+) -> None:
     """Build the website from what is recorded."""
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import History
@@ -228,15 +240,19 @@ def publish(out: Path, with_database: bool, accepted: Path | None, database: str
 
     with History.open(database) as history:
         offered = database if with_database else ""
-        _say_published(build(history, out, accepted_levels(accepted), offered), out)
+        report = build(history, out, accepted_levels(accepted), offered, title, home_page)
+    _say_published(report, out)
 
 
 @main.command(epilog=example("tracker report --pdf night.pdf"))
 @click.option("--pdf", type=click.Path(dir_okay=False, path_type=Path), help="Print the night as PDF (A4).")
 @click.option("--html", type=click.Path(dir_okay=False, path_type=Path), help="Write it as one HTML file.")
+@website_options
 @accepted_option
 @database_option
-def report(pdf: Path | None, html: Path | None, accepted: Path | None, database: str) -> None:
+def report(
+    pdf: Path | None, html: Path | None, title: str, home_page: str, accepted: Path | None, database: str
+) -> None:
     """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
     import tempfile
 
@@ -248,7 +264,7 @@ def report(pdf: Path | None, html: Path | None, accepted: Path | None, database:
     if pdf is None and html is None:
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
     with History.open(database) as history:
-        text = one_file(history, accepted_levels(accepted))
+        text = one_file(history, accepted_levels(accepted), title, home_page)
     if html is not None:
         _write(html, text)
         say(f"wrote {html}")
@@ -291,6 +307,7 @@ def serve(folder: Path, port: int) -> None:
 
 
 for command in (
+    past.bisect,
     releases.backfill,
     releases.releases_command,
     ranking.rank,
@@ -313,7 +330,8 @@ def _measure(request: Any, engine: str, limit: float | None, catalogue: str, dat
     from spook_tracker.tracker.cli.console import watching
     from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
-    source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
+    engine = engine.strip()
+    source = Questions(catalogue=catalogue, engine=engine, limit=limit, limits=present().limits_of(engine))
     if database is None:
         with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))

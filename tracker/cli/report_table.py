@@ -16,7 +16,7 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
 )
-from spook_tracker.tracker.judge.standing import HAVE_VALUES, count, is_red, standing
+from spook_tracker.tracker.judge.standing import HAVE_VALUES, against_limit, count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
@@ -90,7 +90,11 @@ def set_point(definition: SeriesDefinition, sample: Sample) -> str:
 
 def word(definition: SeriesDefinition, sample: Sample) -> str:
     """The last column: what a reader looks for first."""
-    mark, said, _ = CLASSES[standing(definition, sample)]
+    shown_only = (
+        definition.role == "reported" and definition.limit is not None
+    )  # of an engine that gates nothing
+    stands = against_limit(definition, sample) if shown_only else standing(definition, sample)
+    mark, said, _ = CLASSES[stands]
     return f"{mark} {said}"
 
 
@@ -139,8 +143,8 @@ def title(run: RunDocument) -> str:
     """Which engine, which commit, which machine."""
     engine = run.engine
     commit = engine.git_hash[:10] + (" with local changes" if engine.dirty else "")
-    words = f"{engine.name} {engine.version} · {commit} · {run.machine.processor} · {run.started[:16]}Z"
-    return click.style(clean(words), bold=True)
+    facts = (f"{engine.name} {engine.version}", commit, run.machine.processor, f"{run.started[:16]}Z")
+    return click.style(clean(" · ".join(filter(None, facts))), bold=True)
 
 
 def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
@@ -207,7 +211,14 @@ def verdict(run: RunDocument) -> str:
     """The last line: how many limits held."""
     found = count(pairs(run))
     if not found.expected and not found.lost:
-        return "nothing was measured against a limit"
+        shown = [against_limit(*pair) for pair in pairs(run) if pair[0].limit is not None]
+        if "pass" not in shown and "fail" not in shown:
+            return "nothing was measured against a limit"
+        asked = len(shown) - shown.count("none")
+        return (
+            f"· {clean(run.engine.name)} decides nothing here: it keeps {shown.count('pass')} of the {asked} limits it "
+            f"can be asked; {shown.count('none')} are not supported"
+        )
     if not found.red:
         words = (
             f"✓ green: all {found.expected} limits and set points hold; gates (●) among them: {found.gates}"

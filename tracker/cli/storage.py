@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from spook_tracker.tracker.cli.filters import json_option
 from spook_tracker.tracker.cli.options import database_option, example
 
 
@@ -120,8 +121,9 @@ def copy(source: str, target: str) -> None:
 
 
 @db.command(epilog=example("tracker db stats"))
+@json_option
 @database_option
-def stats(database: str) -> None:
+def stats(as_json: bool, database: str) -> None:
     """Say how much is stored."""
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.storage_counts import statistics
@@ -131,6 +133,11 @@ def stats(database: str) -> None:
         found = statistics(opened)
     finally:
         opened.dispose()
+    if as_json:
+        from spook_tracker.tracker.cli.report_json import stats_json
+
+        click.echo(stats_json(found))
+        return
     click.echo(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
     for engine, runs in found.engines.items():
         click.echo(f"  {runs} runs of {engine}")

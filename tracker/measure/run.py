@@ -8,7 +8,6 @@ The catalogue and the engine are named as "module:attribute", so that every proc
 from __future__ import annotations
 
 import difflib
-import importlib
 import os
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,6 +18,8 @@ from typing import Any, Literal
 
 import msgspec
 
+import spook_tracker.tracker.measure.catalogues as catalogues
+import spook_tracker.tracker.measure.limits as limits
 import spook_tracker.tracker.measure.others as others
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
@@ -64,25 +65,18 @@ class RunError(TrackerError):
 class Questions:
     """Where the questions and the engine are found, by name."""
 
-    catalogue: str = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
+    catalogue: str = catalogues.STANDARD  # as `catalogues.find` knows it
     engine: str = "spook"  # as `engine.find` knows it
     limit: float | None = None  # s of wall time for one simulation; None leaves it to the test
+    limits: limits.Limits = ()  # a team's own, by series
 
     def tests(self) -> Mapping[str, ScalarTest]:
-        module, _, attribute = self.catalogue.partition(":")
-        try:
-            found: Mapping[str, ScalarTest] = getattr(
-                importlib.import_module(module), attribute or "CATALOGUE"
-            )
-        except (ImportError, AttributeError) as error:
-            raise RunError(
-                f"there is no catalogue {self.catalogue!r} ({error}); name one as module:NAME"
-            ) from None
-        if not isinstance(found, Mapping) or not all(isinstance(test, ScalarTest) for test in found.values()):
-            raise RunError(f"{self.catalogue!r} is no catalogue: a mapping from name to ScalarTest")
+        found = catalogues.find(self.catalogue)
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
-        return others.asked_of(found, configurations, engine.gating) if configurations else found
+        if configurations:
+            found = others.asked_of(found, configurations, engine.gating)
+        return limits.held_to(found, self.limits) if self.limits else found
 
     def module(self) -> Any:
         """The engine: simulate, build_info, and its configurations if it is not ours."""

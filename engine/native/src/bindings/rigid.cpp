@@ -15,7 +15,10 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
                   angular_velocity = table.numbers("angular_velocity", 3), force = table.numbers("force", 3),
                   torque = table.numbers("torque", 3), friction = table.numbers("friction"),
                   restitution = table.numbers("restitution"), compliance = table.numbers("compliance"),
-                  damping = table.numbers("damping"), slip_compliance = table.numbers("slip_compliance");
+                  damping = table.numbers("damping"), slip_compliance = table.numbers("slip_compliance"),
+                  rolling = table.numbers("rolling_friction"),
+                  torsional = table.numbers("torsional_friction"),
+                  surface_velocity = table.numbers("surface_velocity", 3);
     for (std::size_t i = 0; i < table.rows(); ++i) {
         RigidBodySpec& body = scene.bodies.emplace_back();
         body.motion = motion[i];
@@ -28,7 +31,8 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
         body.angular_velocity = angular_velocity.vec(i);
         body.force = force.vec(i);
         body.torque = torque.vec(i);
-        body.material = {friction[i], restitution[i], compliance[i], damping[i], slip_compliance[i]};
+        body.material = {friction[i],        restitution[i], compliance[i], damping[i],
+                         slip_compliance[i], rolling[i],     torsional[i],  surface_velocity.vec(i)};
     }
     table.expect_all_read();
 }

@@ -368,6 +368,7 @@ void ContactStage::order_points() {
         point.before = touches_[old].normal;
         point.parting_before = touches_[old].parting;
         std::copy_n(touches_[old].tangent, 2, point.tangent_before);
+        std::copy_n(touches_[old].turning, 3, point.turning_before);
     }
     ordered_ = points_.size();
 }

@@ -33,9 +33,10 @@ void ContactStage::hand_over() {
         row.normal_before = point.before;
         row.impulse[0] = std::max(0.0, point.before);
         std::copy_n(point.tangent_before, 2, row.impulse + 1);
-        if (row.first < 0 || row.second < 0) {
+        if (conveys_ || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, cross(row.normal, row.tangent)};
             for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
+            for (int i = 1; i < 3; ++i) row.right[i] -= carried(point, directions[i]);
         }
         row.right[0] += resting_right(point);
         sweeps_.add(row);
