@@ -245,7 +245,7 @@ private:
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
     ContactSweeps sweeps_, parting_sweeps_;
     MixedSystem parting_;
-    std::vector<Vec6> next_;  // velocities between sweeps, per body of the scene
+    std::vector<Vec6> next_;                     // velocities between sweeps, per body of the scene
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 
     std::vector<Pose> poses_;
