@@ -49,12 +49,29 @@ def record(document: RunDocument, database: str) -> bool:
         return store(session, document)
 
 
+FORK_POINT = "fork-point"
+
+
+def fork_point(history: History, after: str) -> Any:
+    """The run that a version's branch is to be compared with: the nearest measured commit it builds on."""
+    from spook_tracker.tracker.document.errors import UnknownName
+    from spook_tracker.tracker.judge.lane import forked_from
+    from spook_tracker.tracker.store import git
+
+    run = history.resolve(after)
+    found = forked_from(history.runs(), run, git.fork_point(history.repository, run.engine.git_hash))
+    if found is None:
+        raise UnknownName(f"nothing was measured that {after!r} builds on; record its fork point first")
+    return found
+
+
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
-    """What changed between two versions, each named as on the command line."""
+    """What changed between two versions, each named as on the command line; `before` may be fork-point."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
     from spook_tracker.tracker.judge.work import with_work
 
-    old, new = history.resolve(before), history.resolve(after)
+    new = history.resolve(after)
+    old = fork_point(history, after) if before == FORK_POINT else history.resolve(before)
     earlier, later = (
         ComparedRun(
             side=side_of(run),
@@ -86,9 +103,16 @@ def idle_entries(
 
 
 def trend(
-    history: History, test: str, metric: str | None = None, accepted: Sequence[Accepted] = ()
+    history: History,
+    test: str,
+    metric: str | None = None,
+    accepted: Sequence[Accepted] = (),
+    engine: str | None = None,
 ) -> list[Told]:
-    """The series of a test (or of a key), or of one of its metrics, every night judged; UnknownName if none."""
+    """The series of a test (or of a key), or of one of its metrics, every night judged; UnknownName if none.
+
+    They are of `engine`, or of the first one that answers the test.
+    """
     import difflib
 
     from spook_tracker.tracker.document.errors import UnknownName
@@ -102,7 +126,11 @@ def trend(
         hint = f"did you mean {' or '.join(near)}?" if near else "`tracker db stats` shows what is recorded"
         raise UnknownName(f"nothing is recorded of a test {test!r}; {hint}")
     found: dict[str, SeriesHistory] = {}
-    for line in lines(history.runs()):
+    runs = history.runs(engine)
+    if not runs and engine is not None:
+        names = ", ".join(sorted({run.engine.name for run in history.runs()}))
+        raise UnknownName(f"nothing is recorded of an engine {engine!r}; there are {names}")
+    for line in lines(runs):
         found = found or histories(history, line, keys)
     if stem != test:
         found = {key: series for key, series in found.items() if key == test}

@@ -11,6 +11,7 @@ from spook_tracker.tracker.cli.console import Column, clean, table, width
 from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.document.wording import page_of
 from spook_tracker.tracker.judge.causes import causes_tonight
+from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
@@ -85,7 +86,8 @@ def red_line(change: Change) -> str:
 def compare_table(document: CompareDocument, everything: bool = False, room: int | None = None) -> str:
     """The comparison for a terminal: what is red in full, the rest in a table, the verdict last."""
     shown = [change for change in document.changes if everything or change.word not in QUIET]
-    lines = [click.style(f"{name_of(document.before)} → {name_of(document.after)}", bold=True), ""]
+    heading = click.style(f"{name_of(document.before)} → {name_of(document.after)}", bold=True)
+    lines = [*_worst(document), heading, ""]
     if shown:
         rows = [
             (
@@ -110,6 +112,16 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
     lines += [f"note: {clean(note)}" for note in document.notes]
     lines.append(_verdict(document))
     return "\n".join(lines)
+
+
+def _worst(document: CompareDocument) -> list[str]:
+    """The sentence over all: how many are worse, and which is the worst; none where nothing is."""
+    worst = worst_change(document)
+    if worst is None:
+        return []
+    reds = sum(change.red for change in document.changes)
+    words = f"✗ {reds} worse; the worst: {clean(worst.series)}, {clean(worst.name or worst.word)}"
+    return [click.style(words, fg="red", bold=True)]
 
 
 def _how(change: Change) -> str:
@@ -178,7 +190,7 @@ def _verdict(document: CompareDocument) -> str:
 def compare_markdown(document: CompareDocument) -> str:
     """The comparison as Markdown; names and sentences from outside are data, never markup."""
     lines = [
-        f"### {_escape(name_of(document.before))} → {_escape(name_of(document.after))}",
+        f"### {escape(name_of(document.before))} → {escape(name_of(document.after))}",
         "",
         f"**{spaced(document.verdict)}**: {counted(document)}",
         "",
@@ -194,7 +206,7 @@ def compare_markdown(document: CompareDocument) -> str:
             _limit(change.limit),
             change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
         )
-        lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
+        lines.append("| " + " | ".join(escape(cell) for cell in cells) + " |")
     if len(shown) > MOST_ROWS:
         lines.append(f"\nand {len(shown) - MOST_ROWS} more")
     moved = _moved(document)
@@ -203,12 +215,12 @@ def compare_markdown(document: CompareDocument) -> str:
         lines += ["|---|---:|---:|"]
     for f in moved[:MOST_ROWS]:
         ratios = [f"{ratio:.3g}" if ratio else "-" for ratio in _ratios(f)[:2]]
-        lines.append(f"| {_escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
-    lines += ["", *(f"- {_escape(note)}" for note in document.notes)]
+        lines.append(f"| {escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
+    lines += ["", *(f"- {escape(note)}" for note in document.notes)]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _escape(text: str) -> str:
+def escape(text: str) -> str:
     """Markdown and HTML signs made harmless."""
     text = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return "".join("\\" + c if c in "\\`*_{}[]#|~!" else c for c in text).replace(

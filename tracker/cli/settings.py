@@ -36,12 +36,15 @@ KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an op
     "out": (str,),
     "title": (str,),
     "home_page": (str,),
+    "executor": (str,),
     "workers": (int,),
     "limit": (int, float),
     "time_limit": (int, float),
 }
 WORDS = {str: "a text", int: "a whole number", float: "a number"}
-NOT_MEANT = {"backfill": {"engine", "catalogue", "out"}, "export": {"out"}, "rank": {"engine"}}
+NOT_MEANT = {"backfill": {"engine", "catalogue", "out"}, "export": {"out"}, "rank": {"engine"}} | {
+    name: {"engine"} for name in ("compare", "judge", "trend")
+}
 
 
 @dataclass(frozen=True)

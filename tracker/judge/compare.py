@@ -128,13 +128,13 @@ def compare(
         changes += [_in_history(change, history) for change in run_times(before.samples, after.samples)]
     changes = [_blamed(_accept(change, accepted, after.night), history.first_bad) for change in changes]
     changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
-    verdict = _overall(changes)
+    verdict = overall(changes)
     return CompareDocument(
         schema_version=1,
         before=before.side,
         after=after.side,
         verdict=verdict,
-        exit_code={"regressed": 1, "not_comparable": 3}.get(verdict, 0),  # type: ignore[arg-type]
+        exit_code=exit_code(verdict),
         counts=dict(Counter(change.word for change in changes)),
         changes=tuple(changes),
         frontiers=tuple(frontiers(before.samples, after.samples, same_machine)),
@@ -164,7 +164,7 @@ def compare_in(
     return compare(earlier, later, accepted, known(told, old.id, new.id))
 
 
-def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regressed", "not_comparable"]:
+def overall(changes: Sequence[Change]) -> Literal["identical", "same", "regressed", "not_comparable"]:
     """Red before anything; then whether what decides could be compared at all."""
     if any(change.red for change in changes):
         return "regressed"
@@ -174,6 +174,11 @@ def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regress
         return "not_comparable"
     told = [change for change in compared if change.kind not in TIMES] or compared
     return "identical" if all(change.word == "identical" for change in told) else "same"
+
+
+def exit_code(verdict: str) -> Literal[0, 1, 3]:
+    """What a command ends with."""
+    return 1 if verdict == "regressed" else 3 if verdict == "not_comparable" else 0
 
 
 def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> list[Change]:

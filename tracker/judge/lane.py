@@ -54,6 +54,17 @@ def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
     return [*before, of_engine[place]]
 
 
+def forked_from(runs: Sequence[Any], run: Any, main_line: set[str]) -> Any:
+    """The nearest measured ancestor of a run on the main line; where that is not known, the run before it.
+
+    None if nothing was measured before.
+    """
+    before = line_of(runs, run)[:-1]
+    on_main = [other for other in before if other.engine.git_hash in main_line]
+    others = [other for other in before if other.engine.git_hash != run.engine.git_hash]
+    return next(reversed(on_main or others), None)
+
+
 def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
     """Commits among these runs that lie on another branch than a run's commit, as far as parents tell.
 
@@ -103,6 +114,9 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     if not placed:
         return list(runs)
     line = line_of(placed, placed[-1])
+    aside = [run for run in placed if run not in line]
+    if aside and len(other := line_of(placed, aside[-1])) > len(line):
+        line = other  # a branch that was measured once is not what the history is about
     return line if _placed(newest) else [*line, newest]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
@@ -350,7 +350,7 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
             if axis == "seconds":  # what one engine counts, another does not
                 beside = _peer_rungs(peers, name)
                 lines += _peer_lines(beside, definition.unit, len(points))
-                everybody += [r for _, found in beside for r in found]
+                everybody += [r for _, found in beside for _, r in found]
             if not any(line.x for line in lines):
                 continue
             lines.append(_front(everybody, of))
@@ -370,21 +370,42 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
     return charts
 
 
-def _peer_rungs(peers: Peers, ladder: str) -> list[tuple[str, list[Rung]]]:
-    """The ladders of other engines: engine and configuration, points."""
+def _peer_rungs(peers: Peers, ladder: str) -> list[tuple[str, list[tuple[str, Rung]]]]:
+    """The ladders of other engines: engine, and its points with the configuration of each."""
     return [
-        (f"{engine}: {configuration}", rungs(trends, lambda t: t.latest))
+        (
+            engine,
+            [
+                (configuration, rung)
+                for configuration, trends in ladders(test).get(ladder, {}).items()
+                for rung in rungs(trends, lambda t: t.latest)
+            ],
+        )
         for engine, test in peers
-        for configuration, trends in ladders(test).get(ladder, {}).items()
     ]
 
 
-def _peer_lines(beside: Sequence[tuple[str, Sequence[Rung]]], unit: str, colour: int) -> list[Line]:
-    """Lines of other engines, after ours."""
-    return [
-        _ladder_line(name, found, lambda r: r.seconds, colour + i, unit)
-        for i, (name, found) in enumerate(beside)
-    ]
+def _peer_lines(
+    beside: Sequence[tuple[str, Sequence[tuple[str, Rung]]]], unit: str, colour: int
+) -> list[Line]:
+    """One line for each other engine, after ours: the points that no other configuration of it beats."""
+    lines = []
+    for engine, found in beside:
+        best, kept = math.inf, []
+        timed = [(c, r) for c, r in found if math.isfinite(r.seconds) and math.isfinite(r.error)]
+        for configuration, rung in sorted(timed, key=lambda one: one[1].seconds):
+            if abs(rung.error) < best:
+                best = abs(rung.error)
+                kept.append((configuration, rung))
+        if kept:
+            line = _ladder_line(engine, [r for _, r in kept], lambda r: r.seconds, colour, unit)
+            notes = tuple(
+                note.replace(engine, f"{engine}: {configuration}", 1)
+                for note, (configuration, _) in zip(line.notes, kept, strict=True)
+            )
+            lines.append(replace(line, notes=notes))
+            colour += 1
+    return lines
 
 
 def _ghost(line: Line) -> Line:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby, pairwise
 from typing import Any
@@ -30,7 +30,7 @@ from spook_tracker.tracker.judge.rank import ERRORS, Answer, Samples, Standing, 
 from spook_tracker.tracker.judge.release_notes import moved
 from spook_tracker.tracker.judge.standing import against_limit
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.diagrams import trend_chart, view
+from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart, view
 from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page
 
@@ -269,6 +269,12 @@ def engine_page(book: Book, chapter: Chapter) -> Page:
         "counts": [
             _counts(name, [of_gate[name] for of_gate in cells.values() if name in of_gate]) for name in names
         ],
+        "ladders": [
+            view(chart, table=False)
+            for test in chapter.tests
+            for chart in ladder_charts(retitled(ours, test), f"{slug(test.name)}-")
+            if chart.name.endswith("-seconds")
+        ],
         "versions": _folded(list(reversed(_versions(chapter, steps))))[:MOST_RELEASES],
         "trends": [
             view(trend_chart(trend, chapter.nights, (), ours_title(ours, trend), "version"))
@@ -283,6 +289,12 @@ def _counts(name: str, answered: Sequence[Cell]) -> tuple[str, int, int, int]:
     """Of one configuration: gates kept, gates it supports, gates asked."""
     kept = sum(cell.stands == "pass" for cell in answered)
     return name, kept, sum(cell.stands != "none" for cell in answered), len(answered)
+
+
+def retitled(tests: dict[str, TestHistory], test: TestHistory) -> TestHistory:
+    """A test of another engine under the title it has in our catalogue."""
+    known = tests.get(test.name)
+    return replace(test, card=known.card) if known else test
 
 
 def ours_title(tests: dict[str, TestHistory], trend: Trend) -> str:

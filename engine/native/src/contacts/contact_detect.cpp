@@ -370,6 +370,7 @@ void ContactStage::order_points() {
         std::copy_n(touches_[old].tangent, 2, point.tangent_before);
         std::copy_n(touches_[old].turning, 3, point.turning_before);
     }
+    ordered_ = points_.size();
 }
 
 /// Approach, push and part in the impact of every point, from the current velocities.
