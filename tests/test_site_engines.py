@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 
 from spook_tracker.tracker.website.publish import publish
+from tests.browser import arrive, wait_for
 from tests.synthetic_history import (
     HOSTILE,
     MACHINE,
@@ -144,3 +146,25 @@ def test_a_hostile_name_of_an_engine_is_text_and_a_file_within_the_folder(tmp_pa
     assert len(pages) == 1
     assert "<img src=x" not in pages[0].read_text(encoding="utf-8")
     assert "<img src=x" not in (tmp_path / "public" / "engines.html").read_text(encoding="utf-8")
+
+
+def test_two_versions_of_another_engine_can_be_compared_in_the_page(driver: Any, site: Path) -> None:
+    def told(before: str, after: str) -> str:
+        arrive(
+            driver, f"{(site / 'compare.html').as_uri()}#after=run-rival-{after}&before=run-rival-{before}"
+        )
+        places = {"3.1": 3, "3.2": 4, "3.3": 5}
+        shown = f"{places[before]},{places[after]}"
+        wait_for(driver, "document.getElementById('told').dataset.shown === arguments[0]", shown)
+        return str(driver.find_element("id", "told").text)
+
+    assert "32 identical, 2 same" in told("3.1", "3.2")
+    changed = told("3.2", "3.3")
+    assert "Door on hinges" in changed and "0.0125" in changed
+    assert "Pendulum" not in changed
+
+
+def test_two_engines_are_not_held_to_each_other_s_values(driver: Any, site: Path) -> None:
+    arrive(driver, f"{(site / 'compare.html').as_uri()}#after=run-rival-3.3&before=run-spook-0001")
+
+    wait_for(driver, "document.querySelector('#told a[href=\"engines.html\"]')")

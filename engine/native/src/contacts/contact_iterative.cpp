@@ -50,8 +50,10 @@ bool ContactStage::find_more() {
         next_[b] = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
     if (outrun(next_)) find_open();
     const std::size_t known = points_.size();
-    if (open_.empty() || find_strikes(next_, true) == 0) return false;
-    take_back_strikes(known, next_);
+    const bool turned = find_turned(next_);
+    const std::size_t taken = points_.size();
+    if (find_strikes(next_, true) > 0) take_back_strikes(taken, next_);
+    else if (!turned) return false;
     counters_.contacts += points_.size() - known;
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];

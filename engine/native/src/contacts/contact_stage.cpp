@@ -218,8 +218,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         move_on(system, next);
         const std::size_t known = points_.size();
         if (outrun(next)) find_open();
-        if (open_.empty() || find_strikes(next, true) == 0) break;
-        take_back_strikes(known, next);
+        const bool turned = find_turned(next);
+        const std::size_t taken = points_.size();
+        if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
+        else if (!turned) break;
         counters_.contacts += points_.size() - known;
         order_points();
     }

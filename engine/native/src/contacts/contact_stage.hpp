@@ -187,6 +187,8 @@ private:
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void find_open();
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
+    bool find_turned(const std::vector<Vec6>& velocity);
+    bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
     bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
                     const std::vector<Vec6>& velocity, bool late);
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
@@ -243,8 +245,8 @@ private:
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
     ContactSweeps sweeps_, parting_sweeps_;
     MixedSystem parting_;
-    std::vector<Vec6> next_;  // velocities between sweeps, per body of the scene
-    std::size_t handed_over_ = 0;
+    std::vector<Vec6> next_;                     // velocities between sweeps, per body of the scene
+    std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
