@@ -119,14 +119,23 @@ MUTANTS = (
             ),
         ),
     ),
-    wrong(
+    Mutant(
         "particles",
         "fast-clock",
         "places move on by 1.0001 steps",
         "falling_object",
-        "particles/particle_system.cpp",
-        "nodes_.x[node] += parts_.h * nodes_.v[node];",
-        "nodes_.x[node] += 1.0001 * parts_.h * nodes_.v[node];",
+        (
+            (
+                f"{SRC}/particles/particle_system.cpp",
+                "nodes_.x[node] += parts_.h * nodes_.v[node];",
+                "nodes_.x[node] += 1.0001 * parts_.h * nodes_.v[node];",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "x[node] += h * v[node];",
+                "x[node] += 1.0001 * h * v[node];",
+            ),
+        ),
     ),
     wrong(
         "particles",
@@ -146,23 +155,32 @@ MUTANTS = (
         "time_step * field.strength / (r2 * r)",
         "0.9999 * time_step * field.strength / (r2 * r)",
     ),
-    wrong(
+    Mutant(
         "particles",
         "flat-curvature",
         "curved constraints see a fifth where a quarter belongs",
         "pendulum",
-        "particles/particle_curvature.cpp",
-        "(0.25 + row.relaxation) * ahead",
-        "(0.2 + row.relaxation) * ahead",
+        (
+            (
+                f"{SRC}/particles/particle_curvature.cpp",
+                "(0.25 + row.relaxation) * ahead",
+                "(0.2 + row.relaxation) * ahead",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "(0.25 + r.relaxation) * ahead",
+                "(0.2 + r.relaxation) * ahead",
+            ),
+        ),
     ),
     wrong(
         "particles",
         "late-half-step",
         "velocities begin .4 of a step early, not half of one",
-        "pendulum",
+        "planetarium",
         "particles/particle_curvature.cpp",
-        "start[node] - 0.5 * (nodes_.v[node] - start[node])",
-        "start[node] - 0.4 * (nodes_.v[node] - start[node])",
+        "nodes_.v[node] -= 0.5 * nodes_.kick[node];",
+        "nodes_.v[node] -= 0.4 * nodes_.kick[node];",
     ),
     wrong(
         "strings",
@@ -470,7 +488,7 @@ def main() -> int:
     chosen = tuple(m for m in chosen if not given.names or m.name in given.names)
     rows: list[tuple[Mutant, bool, str]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        head = commits.full_hash(ROOT, "HEAD")
+        head = commits.full_hash(ROOT, given.commit)
         place = commits.built(ROOT, head, (given.keep or Path(folder)).resolve())
         sound = {
             sweep: measure(place, sorted(tests), sweep)

@@ -52,6 +52,7 @@ from spook_tracker.tracker.measure.question import (
     metric_series,
     study,
 )
+from spook_tracker.tracker.measure.renames import with_aliases
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
@@ -244,7 +245,7 @@ def _document(
         engine=version,
         machine=machine(),
         tests=tuple(test_card(name, test, engine, timed[1].get(name, {})) for name, test in tests.items()),
-        series=tuple(series for series, _ in measured),
+        series=with_aliases((series for series, _ in measured), tests),
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
         maps=tuple(maps),
