@@ -144,7 +144,7 @@ $(BIN)/pip: | require
 
 $(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
 	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
-	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e .
+	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e ".[standard]"
 	@touch $@
 
 # The same with the tools of development; one installation does for both.

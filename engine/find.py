@@ -31,6 +31,7 @@ EXTRAS: Mapping[str, str] = {
     "mujoco": "mujoco",
     "exudyn": "exudyn",
     "pybullet": "pybullet",
+    "drake": "drake",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",

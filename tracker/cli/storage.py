@@ -14,15 +14,41 @@ from spook_tracker.tracker.cli.options import database_option, example
 @click.command(epilog=example("tracker export latest --out runs/"))
 @click.argument("versions", nargs=-1, metavar="[V]...")
 @click.option(
-    "--out", metavar="DIR", type=click.Path(path_type=Path), help="One file per run; default: print."
+    "--out",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="A folder, for one file per run or month; default: print. The file of a table.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["json", "months", "csv", "parquet"]),
+    default="json",
+    show_default=True,
+    help="months: a compressed file a month; csv, parquet: one table of all values.",
 )
 @database_option
-def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
-    """Write runs (all, or those named) as JSON documents."""
+def export(versions: tuple[str, ...], out: Path | None, form: str, database: str) -> None:
+    """Write runs (all, or those named) as JSON documents, or all values as one table."""
     from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.store.transfer import encoded, export_runs
 
+    if form != "json" and (out is None or (versions and form == "months")):
+        raise click.UsageError(
+            f"--format {form} writes " + ("all runs; name none" if out else "files: say --out")
+        )
     with history_of(database) as history:
+        if form == "months":
+            from spook_tracker.tracker.store.months import export_months
+
+            click.echo(f"{len(export_months(history, Path(str(out))))} files written in {out}")
+            return
+        if form in ("csv", "parquet"):
+            from spook_tracker.tracker.store.table import write_table
+
+            count = write_table(history.to_dataframe(versions), Path(str(out)), form)
+            click.echo(f"{count} values in {out}")
+            return
         if out is not None:
             click.echo(f"{len(export_runs(history, out, versions))} runs in {out}")
             return
@@ -36,14 +62,17 @@ def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
 def import_files(files: tuple[Path, ...], database: str) -> None:
     """Record runs from JSON documents, whole or in short form; what is there already is left as it is."""
     from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.months import import_months, is_month
     from spook_tracker.tracker.store.record import record
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
     short = _short(files)
+    months = [file for file in files if is_month(file)]
     with session_on(database) as session:
-        done = read_in(session, [file for file in files if file not in short])
+        done = read_in(session, [file for file in files if file not in short and file not in months])
         new = sum(record(session, document) for document in short.values())
-    stored, present = len(done.stored) + new, len(done.present) + len(short) - new
+        fresh, known = import_months(session, months)
+    stored, present = len(done.stored) + new + fresh, len(done.present) + len(short) - new + known
     click.echo(f"{stored} runs recorded, {present} were there already")
 
 

@@ -19,6 +19,7 @@ from typing import Any, Literal
 import msgspec
 
 import spook_tracker.tracker.measure.catalogues as catalogues
+import spook_tracker.tracker.measure.executors as executors
 import spook_tracker.tracker.measure.limits as limits
 import spook_tracker.tracker.measure.others as others
 import spook_tracker.tracker.measure.trajectory as motion
@@ -116,6 +117,7 @@ class Request:
     time_limit: float = crew.Limits.seconds  # s for one piece of work
     memory_limit: int = crew.Limits.memory  # bytes for one piece of work
     repeats: int = 5  # of each timing
+    executor: str = executors.PROCESS  # where values are measured, as `executors.answers` knows it
 
 
 Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
@@ -305,7 +307,9 @@ def _perform_all(
     """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer."""
     left = {name: sum(task.test == name for task in tasks) for name in tests}
     found: Iterator[tuple[Task, Any]] = ((task, perform(source, task)) for task in tasks)
-    if request.workers:
+    if request.executor != executors.PROCESS:
+        found = executors.answers(request.executor, partial(perform, source), tasks, partial(_place, source))
+    elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
         found = crew.answers(partial(perform, source), tasks, request.workers, limits)
     for done, (task, parts) in enumerate(found, start=1):
@@ -317,6 +321,10 @@ def _perform_all(
         )
         watch(Progress(done, len(tasks), task.test, left[task.test] == 0, bad))
         yield task, parts
+
+
+def _place(source: Questions) -> executors.Place:
+    return executors.place_of(source.module())
 
 
 Errors = Mapping[tuple[str, int, int], ladders.ErrorPoints]

@@ -11,7 +11,7 @@ import gc
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sqlalchemy import ColumnElement, and_, select
 from sqlalchemy.orm import Session
@@ -29,6 +29,9 @@ from spook_tracker.tracker.store import git, models, rows
 from spook_tracker.tracker.store.ancestry import commit_order
 from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
+
+if TYPE_CHECKING:
+    import pandas
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
 
@@ -172,6 +175,17 @@ class History:
             partial=stored.partial,
             asked=run.asked,
         )
+
+    def to_dataframe(self, names: Iterable[str] = ()) -> pandas.DataFrame:
+        """Every value of the runs that `names` stand for (none: all) as a pandas DataFrame, a row each.
+
+        Columns: night, run, engine, version, git_hash, machine, test, configuration, metric, role, kind, time_step [s],
+        unit, series, value, outcome, passed, set_point_held, limit_low, limit_high. TableError without pandas.
+        """
+        from spook_tracker.tracker.store.table import values_table
+
+        runs = [self.resolve(name) for name in names] or self._runs
+        return values_table(self._session, [run.key for run in runs])
 
     def _read_runs(self) -> tuple[RunInfo, ...]:
         connection = self._session.connection()
