@@ -32,6 +32,7 @@ EXTRAS: Mapping[str, str] = {
     "exudyn": "exudyn",
     "pybullet": "pybullet",
     "drake": "drake",
+    "dart": "dartpy",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",

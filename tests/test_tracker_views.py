@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas
+import pytest
 from sqlalchemy import inspect, text
 
 from spook_tracker.tracker.judge.standing import is_red
@@ -9,6 +11,7 @@ from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.revisions import revert
+from spook_tracker.tracker.store.table import write_table
 from spook_tracker.tracker.store.views import ABOUT, COLUMNS, columns_of
 from tests.run_documents import definition, engine, run, sample
 
@@ -137,3 +140,18 @@ def test_the_history_as_a_dataframe_keeps_every_bit(session):
     assert [float(n).hex() for n in table["value"]] == [float(n).hex() for n in numbers]
     assert list(table["series"]) == [s.key for s in series]
     assert str(table["night"].dtype).endswith("UTC]")
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_a_table_written_and_read_again_keeps_every_bit(session, tmp_path, form):
+    series = tuple(definition(f"t/c/m{n}") for n in range(4))
+    numbers = (0.1 + 0.2, "inf", -0.0, 5e-324)
+    samples = tuple(sample(s.key, n) for s, n in zip(series, numbers, strict=True))
+    record(session, run(series=series, samples=samples))
+    file = tmp_path / f"values.{form}"
+
+    assert write_table(History(session).to_dataframe(), file, form) == 4
+
+    read = pandas.read_csv(file) if form == "csv" else pandas.read_parquet(file)
+    assert [float(n).hex() for n in read["value"]] == [float(n).hex() for n in numbers]
+    assert list(read["series"]) == [s.key for s in series]

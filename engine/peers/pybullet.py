@@ -7,12 +7,8 @@ and what pushes besides gravity is pushed from there. Springs, central gravity a
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
-import sys
 import time
-from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any
 
@@ -36,7 +32,7 @@ from spook_tracker.engine.peers.joint_tree import (
     turn_of,
 )
 from spook_tracker.engine.peers.pushes import Pushes
-from spook_tracker.engine.peers.stepped import Kept, stepped
+from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.peers.surfaces import one_restitution, pairs_apart
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned, turned_back
@@ -44,22 +40,7 @@ from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
 
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """What Bullet writes to standard output, past Python, goes nowhere."""
-    sys.stdout.flush()
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
-
-
-with _quiet():  # it says when it was built
+with quiet():  # it says when it was built
     import pybullet as bullet
 
 SWEEPS = 500  # of the solver, in place of 50
@@ -106,7 +87,7 @@ class PyBullet:
 
     def record(self, task: Task) -> Recording:
         began = time.perf_counter()
-        with _quiet():
+        with quiet():
             client = bullet.connect(bullet.DIRECT)
             try:
                 run = _Run(task, client)

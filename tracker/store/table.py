@@ -1,10 +1,11 @@
 """The history as one table, a row for each value: a pandas DataFrame, and from it CSV and Parquet.
 
-pandas, and pyarrow for Parquet, are an optional extra: `pip install 'spook-tracker[data]'`.
+pandas, and fastparquet for Parquet, are an optional extra: `pip install 'spook-tracker[data]'`.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
@@ -77,9 +78,11 @@ def write_table(table: pandas.DataFrame, file: Path, form: str) -> int:
         if form == "csv":
             table.to_csv(file, index=False, date_format="%Y-%m-%dT%H:%M:%S.%f%z")
         else:
-            table.to_parquet(file, index=False)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what fastparquet and pandas have to settle with each other
+                table.to_parquet(file, index=False)
     except ImportError:
-        raise TableError("Parquet needs pyarrow; install spook-tracker[data], or ask for csv") from None
+        raise TableError("Parquet needs fastparquet; install spook-tracker[data], or ask for csv") from None
     except OSError as error:
         raise TableError(f"{file} cannot be written: {error.strerror or error}") from None
     return len(table)
