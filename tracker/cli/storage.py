@@ -160,6 +160,15 @@ def copy(source: str, target: str) -> None:
     )
 
 
+@db.command(epilog=example("tracker db partition timescaledb | psql postgresql://host/tracker"))
+@click.argument("extension", type=click.Choice(["timescaledb", "citus"]))
+def partition(extension: Any) -> None:
+    """Print the SQL that splits the large tables of a PostgreSQL database by time, or over several servers."""
+    from spook_tracker.tracker.store.partition import statements
+
+    click.echo("\n".join(statements(extension)))
+
+
 @db.command(epilog=example("tracker db stats"))
 @json_option
 @database_option
