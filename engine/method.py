@@ -23,7 +23,8 @@ class Method:
     substeps           steps of h/substeps per reported step
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
-                       compliance, damping and corrections play no part; forces are those at the sample's time
+                       compliance, damping and corrections play no part; forces are those at the sample's time.
+                       Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
     iterations, residual_tolerance   when an iterative solve stops; sweeps over contacts go on, up to four times as
                        many, where rows are still off by more than unsettled_residual
