@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -65,6 +66,12 @@ class Method:
                 refuse(field, "a number")
             if isinstance(value, int) and abs(value) > sys.float_info.max:
                 raise MethodError(f"method: {field} is a number too large for arithmetic")
+        for field in ("half_step_velocities", "string_stiffness"):
+            if not isinstance(getattr(self, field), bool):
+                refuse(field, "True or False")
+        for field in ("corrections", "substeps", "iterations", "refinements"):
+            if isinstance(getattr(self, field), bool):
+                refuse(field, "a whole number")
         if self.corrections not in (0, 1, 2):
             refuse("corrections", "0, 1 or 2")
         if not 0.0 < self.correction_cap <= 1.0:
@@ -89,6 +96,8 @@ class Method:
             refuse("refinements", "a whole number from 0 to 10")
         if not 0.0 <= self.floor < 1.0:
             refuse("floor", "from 0 to below 1")
+        if isinstance(self.force_stages, str) or not isinstance(self.force_stages, Iterable):
+            refuse("force_stages", "names of stages, such as ('rotation',)")
         object.__setattr__(self, "force_stages", tuple(self.force_stages))
         for stage in self.force_stages:
             if stage not in STAGES_THAT_CAN_BE_FORCED:
