@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -98,6 +98,14 @@ three-scene:
 	    --format=iife --global-name=THREE --legal-comments=none \
 	    --banner:js="/* three.js 0.187.0, MIT licence: three-LICENSE.txt */" --outfile=$(CURDIR)/site/static/three-scene.min.js
 
+# The vendored part of the font of formulas again: STIX Two Math, the signs that formulas have.
+formulas-font: develop
+	mkdir -p build/font && cd build/font && npm install --no-save @fontsource/stix-two-math@5.3.0
+	$(BIN)/pip install -q fonttools brotli
+	$(BIN)/pyftsubset build/font/node_modules/@fontsource/stix-two-math/files/stix-two-math-latin-400-normal.woff2 \
+	    --unicodes="U+20-7E,U+B1,U+B7,U+D7,U+BC-BE,U+393-3C9,U+2032-2033,U+207A-208E,U+210E,U+2153-215A,U+2192,U+2202,U+2211,U+2212,U+221A,U+221E,U+222B,U+2248,U+2264,U+2265,U+22C5,U+1D434-1D467,U+1D6E2-1D71B,U+302,U+307,U+308" \
+	    --flavor=woff2 --layout-features=ssty --no-hinting --output-file=site/static/formulas.woff2
+
 site: install
 	$(BIN)/tracker publish --db $(DB) --out $(OUT)
 
@@ -136,7 +144,7 @@ $(BIN)/pip: | require
 
 $(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
 	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
-	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e .
+	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e ".[standard]"
 	@touch $@
 
 # The same with the tools of development; one installation does for both.

@@ -37,7 +37,10 @@ class Particle:
 class Material:
     """How a surface behaves in contact.
 
-    Two surfaces combine: friction by the geometric mean, restitution by the larger, compliance by the sum.
+    Two surfaces combine: friction by the geometric mean, restitution, rolling and torsional friction by the larger,
+    compliance by the sum. Viscous friction, a force c times the slip, is a slip_compliance of 1/c under a friction that
+    is never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
+    a blow that returns.
     """
 
     friction: float = 0.0  # Coulomb's mu, 1
@@ -45,9 +48,11 @@ class Material:
     compliance: float = 0.0  # m/N per contact point
     damping: float | None = None  # s; None means 4.5 time steps
     slip_compliance: float = 0.0  # gamma, m/(N s): creep speed per tangential force
+    rolling_friction: float = 0.0  # m: largest torque against rolling, over the normal force
+    torsional_friction: float = 0.0  # m: largest torque against turning on the spot, over the normal force
 
     def __post_init__(self) -> None:
-        for name in ("friction", "compliance", "slip_compliance"):
+        for name in ("friction", "compliance", "slip_compliance", "rolling_friction", "torsional_friction"):
             object.__setattr__(self, name, check.not_negative("material", name, getattr(self, name)))
         restitution = check.not_negative("material", "restitution", self.restitution)
         if restitution > 1.0:
@@ -64,6 +69,7 @@ class RigidBody:
     `inertia` holds the principal moments [kg m²] about the body axes; None takes those of the shape, of
     uniform density. A static body never moves; a kinematic one moves with its given velocities whatever
     pushes it, times its `pace` if that is given; neither needs a mass. `shape` None means the body has no surface and touches nothing.
+    A surface may move along itself as a conveyor's belt does: `surface_velocity` of whatever lies on it.
     """
 
     name: str
@@ -77,6 +83,7 @@ class RigidBody:
     motion: Literal["dynamic", "static", "kinematic"] = "dynamic"
     material: Material = field(default_factory=Material)
     pace: TimeFunction | None = None  # of a kinematic body: what both velocities are times
+    surface_velocity: Vector = (0.0, 0.0, 0.0)  # body axes, m/s; only its part along the surface counts
 
     def __post_init__(self) -> None:
         check.name("rigid body", self.name)
@@ -89,8 +96,12 @@ class RigidBody:
             raise SceneError(f"{owner}: shape must be one of engine's shapes, not {self.shape!r}")
         if not isinstance(self.material, Material):
             raise SceneError(f"{owner}: material must be a Material, not {self.material!r}")
-        for name in ("position", "velocity", "angular_velocity"):
+        for name in ("position", "velocity", "angular_velocity", "surface_velocity"):
             object.__setattr__(self, name, check.vector(owner, name, getattr(self, name)))
+        if any(self.surface_velocity) and (self.shape is None or self.material.friction == 0.0):
+            raise SceneError(
+                f"{owner}: only a surface with friction takes things along; give it a shape and friction"
+            )
         object.__setattr__(self, "orientation", check.rotation(owner, "orientation", self.orientation))
         if self.pace is not None and not isinstance(self.pace, TimeFunction):
             raise SceneError(f"{owner}: pace must be a Sinusoid, Ramp or Table, not {self.pace!r}")

@@ -27,10 +27,17 @@ from spook_tracker.engine.scene import Scene
 
 OURS = ("spook", "engine")
 GROUP = "spook_tracker.engines"
-EXTRAS: Mapping[str, str] = {"mujoco": "mujoco", "exudyn": "exudyn"}  # engine: its package, from PyPI
+EXTRAS: Mapping[str, str] = {
+    "mujoco": "mujoco",
+    "exudyn": "exudyn",
+    "pybullet": "pybullet",
+    "drake": "drake",
+    "dart": "dartpy",
+}  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",
     "rapier": "@dimforge/rapier3d-compat",
+    "jolt": "jolt-physics",
 }  # engine: its package, from npm
 
 

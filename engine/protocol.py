@@ -165,6 +165,10 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "restitution"
     if (body.material.compliance > RIGID or body.material.slip_compliance) and not can.compliance:
         yield "compliance of a surface"
+    if body.material.rolling_friction or body.material.torsional_friction:
+        yield "friction of rolling or turning"
+    if any(body.surface_velocity):
+        yield "a surface that moves along itself"
 
 
 def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:

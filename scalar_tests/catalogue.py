@@ -49,6 +49,10 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "scissor_lift": "scissor_lift",
     "gears": "gears",
     "robot_arm": "robot_arm",
+    "conveyor": "conveyor",
+    "turntable": "turntable",
+    "rolling_friction": "rolling_friction",
+    "masonry_arch": "masonry_arch",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

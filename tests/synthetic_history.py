@@ -313,6 +313,18 @@ class DocumentHistory:
         definitions = {d.key: d for d in run.series}
         return {s.series: (definitions[s.series], s) for s in run.samples}
 
+    def samples_of(
+        self, run_ids: Sequence[str], tests: set[str] | None = None
+    ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
+        return {
+            run_id: {
+                key: pair
+                for key, pair in self.samples(run_id).items()
+                if tests is None or pair[0].test in tests
+            }
+            for run_id in run_ids
+        }
+
     def cards(self, run_id: str) -> tuple[TestCard, ...]:
         return self.documents[run_id].tests
 
@@ -333,6 +345,45 @@ def history(nights: int = 24, *, broken: int = 10**9, hostile: bool = False) -> 
     )
 
 
+def rival(version: str, *, door: float = 0.5, machine: Machine = MACHINE, name: str = "rival") -> RunDocument:
+    """Another engine on the same questions: quicker below an error of 1e-4, without friction, one door too heavy."""
+    pairs: list[tuple[SeriesDefinition, Sample]] = []
+    for test, (_, unit, limit, value, _) in SEVEN.items():
+        for configuration, factor in (("rk4", 1.0), ("euler", 3.0)):
+            gate = series(
+                test, "deviation", unit=unit, limit=limit, configuration=configuration,
+                better="inside" if isinstance(limit, tuple) else "smaller_magnitude",
+            )  # fmt: skip
+            if test == "friction":
+                lacking = f"{name} ({configuration}) does not support friction"
+                facts = {"outcome": "not_supported", "passed": False, "failure": lacking}
+                pairs.append((gate, sample(gate, math.nan, **facts)))
+            else:
+                pairs.append((gate, sample(gate, factor * (door if test == "door" else value))))
+        if test == "pendulum":
+            for h in STEPS:
+                rung = series(
+                    test, "ladder:length", configuration="rk4", time_step=h, kind="ladder", unit=unit,
+                    description="largest error against the reference",
+                )  # fmt: skip
+                timing = Timing(seconds=(2e-5 / h,), runs_per_repeat=10)
+                pairs.append((rung, sample(rung, 0.3 * h**4, timing=timing)))
+    found = document(0, name=name)
+    return msgspec.structs.replace(
+        found, id=f"run-{name}-{version}", idempotency_key=f"key-{name}-{version}", trigger="backfill", machine=machine,
+        engine=msgspec.structs.replace(
+            found.engine, version=version, git_hash="", commit_time="", parents=(), compiler="wheel", flags=""
+        ),
+        series=tuple(d for d, _ in pairs), samples=tuple(s for _, s in pairs), figures=(), maps=(), tests=(),
+    )  # fmt: skip
+
+
+def with_rival(found: DocumentHistory) -> DocumentHistory:
+    """The same history and three releases of another engine, the last of which changed the door."""
+    releases = [rival("3.1"), rival("3.2"), rival("3.3", door=0.0125)]
+    return DocumentHistory([*found.documents.values(), *releases])
+
+
 def decade(nights: int = 3650) -> DocumentHistory:
     """Ten years of nights: the values of forty, again and again."""
     few = [document(n) for n in range(40)]
@@ -349,4 +400,4 @@ def decade(nights: int = 3650) -> DocumentHistory:
     )
 
 
-__all__ = ["DocumentHistory", "decade", "document", "history"]
+__all__ = ["DocumentHistory", "decade", "document", "history", "rival", "with_rival"]

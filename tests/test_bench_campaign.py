@@ -1,4 +1,4 @@
-"""Random heaps never gain energy, whichever solver holds them; the one way known in which they do is named."""
+"""Random heaps never gain energy, whichever solver holds them."""
 
 from __future__ import annotations
 
@@ -30,11 +30,10 @@ def test_a_random_heap_never_gains_energy(campaign: Any, number: int) -> None:
     assert ending.rise <= campaign.RISE
 
 
-@pytest.mark.xfail(
-    strict=True, reason="an edge that a turning box brings near within one step sinks in, and is lifted"
-)
-def test_a_heap_of_boxes_that_turn_fast_gains_none_either(campaign: Any) -> None:
-    assert campaign.fall(27).kept
+@pytest.mark.parametrize("number", [27, 33, 54])
+def test_edges_and_ends_that_turn_in_within_a_step_gain_none(campaign: Any, number: int) -> None:
+    """Boxes and bars at some 10 rad/s: what no manifold knew of sank in by up to 87 mm, and was lifted."""
+    assert campaign.fall(number).kept
 
 
 def test_what_gains_energy_is_not_kept(campaign: Any) -> None:

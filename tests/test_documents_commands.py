@@ -17,6 +17,7 @@ DOCUMENTS = (
     "CONTRIBUTING.md",
     "ARCHITECTURE.md",
     *sorted(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md")),
+    "examples/pebble/README.md",
 )
 TYPED = re.compile(r"^(?: {4}|.*?`)(?:\S*/)?(?P<line>(?:tracker|make) [a-z][^`#\n]*)", re.MULTILINE)
 

@@ -7,12 +7,13 @@ import pytest
 
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import arrive, look
+from tests.synthetic_history import with_rival
 from tests.test_site_causes import nights
 from tests.test_site_causes import recorded as recorded  # a fixture
 
 PAGES = (
     "index.html", "tests/friction.html", "error-time.html", "stability.html", "live.html", "compare.html",
-    "regressions.html", "versions.html", "data.html", "document.html",
+    "regressions.html", "versions.html", "data.html", "document.html", "engines.html", "engines/rival.html",
 )  # fmt: skip
 WIDTHS = (360, 768, 1400, 2200)
 AXE = """
@@ -57,7 +58,7 @@ return [...new Set(told)].slice(0, 20);
 @pytest.fixture(scope="module")
 def site(tmp_path_factory, recorded):
     out = tmp_path_factory.mktemp("seen") / "public"
-    publish(nights(motions=recorded), out)
+    publish(with_rival(nights(motions=recorded)), out)
     return out
 
 

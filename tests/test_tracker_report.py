@@ -80,3 +80,27 @@ def test_an_engine_without_gates_is_shown_by_what_has_a_limit() -> None:
     assert "error" in pass_table(document, room=120)
     assert "energy" not in pass_table(document, room=120)
     assert "energy" in pass_table(document, everything=True, room=120)
+
+
+def test_an_engine_that_gates_nothing_is_shown_against_the_limits_and_counted_apart() -> None:
+    from spook_tracker.tracker.cli.report_table import pass_table
+    from tests.run_documents import definition, run, sample
+
+    kept, broken, lacking = (f"fall/rk4/{name}" for name in ("kept", "broken", "lacking"))
+    document = run(
+        series=tuple(
+            definition(key, metric=key.rpartition("/")[2], role="reported", limit=1.0)
+            for key in (kept, broken, lacking)
+        ),
+        samples=(
+            sample(kept, 0.5),
+            sample(broken, 2.0, outcome="out_of_limit", passed=False),
+            sample(lacking, float("nan"), outcome="not_supported", passed=False),
+        ),
+    )
+
+    table = pass_table(document, room=120)
+
+    lines = {line.split()[0]: line for line in table.splitlines() if line.startswith("  ")}
+    assert "PASS" in lines["kept"] and "FAIL" in lines["broken"] and "not supported" in lines["lacking"]
+    assert "keeps 1 of the 2 limits it can be asked; 1 are not supported" in table

@@ -30,12 +30,12 @@ def run(
     """Put the questions (all, or those named) to the engine; nothing is recorded.
 
     `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
-    tracker.measure.run.Questions (catalogue, engine, limit).
+    tracker.measure.run.Questions (catalogue, engine, limit, limits).
     """
     from spook_tracker.tracker.measure.run import Questions, Request
     from spook_tracker.tracker.measure.run import run as measure
 
-    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit") if name in asked}
+    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit", "limits") if name in asked}
     request = Request(tests=tuple(tests), **asked)
     return measure(Questions(**where), request, watch or (lambda progress: None))
 
@@ -49,12 +49,29 @@ def record(document: RunDocument, database: str) -> bool:
         return store(session, document)
 
 
+FORK_POINT = "fork-point"
+
+
+def fork_point(history: History, after: str) -> Any:
+    """The run that a version's branch is to be compared with: the nearest measured commit it builds on."""
+    from spook_tracker.tracker.document.errors import UnknownName
+    from spook_tracker.tracker.judge.lane import forked_from
+    from spook_tracker.tracker.store import git
+
+    run = history.resolve(after)
+    found = forked_from(history.runs(), run, git.fork_point(history.repository, run.engine.git_hash))
+    if found is None:
+        raise UnknownName(f"nothing was measured that {after!r} builds on; record its fork point first")
+    return found
+
+
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
-    """What changed between two versions, each named as on the command line."""
+    """What changed between two versions, each named as on the command line; `before` may be fork-point."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
     from spook_tracker.tracker.judge.work import with_work
 
-    old, new = history.resolve(before), history.resolve(after)
+    new = history.resolve(after)
+    old = fork_point(history, after) if before == FORK_POINT else history.resolve(before)
     earlier, later = (
         ComparedRun(
             side=side_of(run),
@@ -86,9 +103,16 @@ def idle_entries(
 
 
 def trend(
-    history: History, test: str, metric: str | None = None, accepted: Sequence[Accepted] = ()
+    history: History,
+    test: str,
+    metric: str | None = None,
+    accepted: Sequence[Accepted] = (),
+    engine: str | None = None,
 ) -> list[Told]:
-    """The series of a test (or of a key), or of one of its metrics, every night judged; UnknownName if none."""
+    """The series of a test (or of a key), or of one of its metrics, every night judged; UnknownName if none.
+
+    They are of `engine`, or of the first one that answers the test.
+    """
     import difflib
 
     from spook_tracker.tracker.document.errors import UnknownName
@@ -101,8 +125,15 @@ def trend(
         near = difflib.get_close_matches(test, {key.partition("/")[0] for key in history.series_keys()}, n=3)
         hint = f"did you mean {' or '.join(near)}?" if near else "`tracker db stats` shows what is recorded"
         raise UnknownName(f"nothing is recorded of a test {test!r}; {hint}")
+    if metric is not None and not metric.startswith("work:"):
+        stems = (metric, metric.removesuffix(":run-time"))
+        keys = [key for key in keys if key.split("/")[2:3] and key.split("/")[2] in stems] or keys
     found: dict[str, SeriesHistory] = {}
-    for line in lines(history.runs()):
+    runs = history.runs(engine)
+    if not runs and engine is not None:
+        names = ", ".join(sorted({run.engine.name for run in history.runs()}))
+        raise UnknownName(f"nothing is recorded of an engine {engine!r}; there are {names}")
+    for line in lines(runs):
         found = found or histories(history, line, keys)
     if stem != test:
         found = {key: series for key, series in found.items() if key == test}
@@ -114,15 +145,24 @@ def trend(
     return list(judge_all(found, accepted).values())
 
 
-def publish(history: History, out: Path, accepted: Sequence[Accepted] = (), database: str = "") -> Any:
+def publish(
+    history: History,
+    out: Path,
+    accepted: Sequence[Accepted] = (),
+    database: str = "",
+    title: str = "",
+    home_page: str = "",
+) -> Any:
     """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
 
     `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
+    `title` and `home_page` say whose website it is.
     """
     from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.publish import publish as build
 
-    return build(history, out, accepted, database_file(database) if database else None)
+    offered = database_file(database) if database else None
+    return build(history, out, accepted, offered, title, home_page)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +188,8 @@ def nightly(
     watch: Callable[[Any], None] | None = None,
     tell: Callable[[Any], None] = lambda news: None,
     with_database: bool = False,
+    title: str = "",
+    home_page: str = "",
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
@@ -175,5 +217,6 @@ def nightly(
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
-        published = publish(history, out, accepted, database if with_database else "")
+        offered = database if with_database else ""
+        published = publish(history, out, accepted, offered, title, home_page)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

@@ -86,7 +86,7 @@ function push() {
 }
 
 // A rod's row pushes its ends apart where it is positive; the force of a row is its multiplier. None before a step.
-const measured = task.forces_of.map((name) => rods.get(name));
+const measured = Object.keys(task.forces_of).map((name) => rods.get(name));
 function state() {
   const all = bodies.flatMap(({ position: p, quaternion: q, velocity: v, angularVelocity: w }) => [
     p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z,

@@ -8,18 +8,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.bodies import WORLD
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock
 from spook_tracker.engine.observe import ConstraintForce
 from spook_tracker.engine.peers import node
+from spook_tracker.engine.peers.described import described as common
+from spook_tracker.engine.peers.described import numbered
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import joint_point
 from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Plane, Sphere
 
 PACKAGE = "cannon-es"
 SCRIPT = Path(__file__).with_suffix(".mjs")
@@ -65,63 +65,15 @@ class Cannon:
 
 def described(task: Task) -> dict[str, Any]:
     """The task as JSON takes it. Raises NotSupported for rods that do not end in centres."""
-    scene = task.scene
-    places = {body.name: place for place, body in enumerate(scene.bodies)}
-    joined = [c.between for c in scene.constraints if isinstance(c, Joint) and WORLD not in c.between]
-    pairs = {tuple(sorted((places[a], places[b]))) for a, b in (*scene.no_contact, *joined)}
+    places = numbered(task)
+    rods = [c.name for c in task.scene.constraints if isinstance(c, Distance)]
     return {
-        "module": node.entry(FOUND),
-        "gravity": scene.gravity,
-        "time_step": task.time_step,
-        "steps": task.steps,
-        "every_step": task.every_step,
-        "time_limit": task.time_limit,
-        "options": dict(task.configuration.options),
+        **common(
+            task, FOUND, [_constraint(task, constraint, places) for constraint in task.scene.constraints]
+        ),
         "force": FORCE,
-        "contacts": scene.contacts,
-        "apart": sorted(pairs),
-        "bodies": [_body(body) for body in scene.bodies],
-        "forces_of": [c.name for c in scene.constraints if isinstance(c, Distance)]
-        if task.constraint_forces
-        else [],
-        "constraints": [_constraint(task, constraint, places) for constraint in scene.constraints],
-        "loads": [
-            {"body": places[f.body], "force": f.force, "torque": f.torque}
-            for f in scene.forces
-            if isinstance(f, Load)
-        ],
-        "fields": [
-            {"centre": f.centre, "strength": f.strength}
-            for f in scene.forces
-            if isinstance(f, CentralGravity)
-        ],
+        "forces_of": dict.fromkeys(rods, 1) if task.constraint_forces else {},
     }
-
-
-def _body(body: Particle | RigidBody) -> dict[str, Any]:
-    moves = isinstance(body, Particle) or body.motion == "dynamic"
-    return {
-        "mass": body.mass if moves else 0.0,
-        "inertia": (0.0, 0.0, 0.0) if isinstance(body, Particle) or not moves else body.inertia,
-        "position": body.position,
-        "velocity": body.velocity,
-        "orientation": (1.0, 0.0, 0.0, 0.0) if isinstance(body, Particle) else body.orientation,
-        "spin": (0.0, 0.0, 0.0) if isinstance(body, Particle) else body.angular_velocity,
-        "friction": 0.0 if isinstance(body, Particle) else body.material.friction,
-        "shape": None if isinstance(body, Particle) or body.shape is None else _shape(body.shape),
-    }
-
-
-def _shape(shape: Shape) -> dict[str, Any]:
-    upright = (1.0, 0.0, 0.0, 0.0)
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "radius": shape.radius, "turn": upright}
-    if isinstance(shape, Box):
-        return {"kind": "box", "half": [0.5 * edge for edge in shape.size], "turn": upright}
-    assert isinstance(shape, Plane)
-    x, y, z = shape.normal
-    turn = np.array([1.0 + z, -y, x, 0.0]) if z > -1.0 + 1e-12 else np.array([0.0, 1.0, 0.0, 0.0])
-    return {"kind": "plane", "turn": list(turn / np.linalg.norm(turn))}
 
 
 def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 // What every engine in JavaScript shares: the task as JSON on standard input, and the loop with its clock; the answer
 // is a line of JSON and the float64 states. A state is 13 numbers a body: position, orientation (w, x, y, z),
-// velocity, angular velocity (SI, world axes); then one number a rod, its tension.
+// velocity, angular velocity (SI, world axes); then the forces of constraints that are asked for, one number for a rod's
+// tension, six for a joint's force and torque; then the deepest penetration, if asked for.
 import { readFileSync, writeSync } from "node:fs";
 
 const BLOCK = 1000; // steps between two looks at the clock where nothing is recorded between

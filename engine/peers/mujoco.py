@@ -21,14 +21,13 @@ from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
 from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, model
+from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
 
-BLOCK = 1000  # steps between two looks at the clock, at most
-LOOK = 0.05  # s after which it is looked at again, or sooner
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 STIFF = 'solref="{h2!r} 1" solimp=".9999 .9999 .001 .5 2"'
 CAREFUL = 'cone="elliptic" impratio="100" noslip_iterations="10" tolerance="1e-12" iterations="200"'
@@ -150,53 +149,18 @@ class _Run:
             mujoco.mj_forward(self.model, self.data)
 
     def recording(self, setup: float) -> Recording:
-        samples = range(self.task.steps + 1) if self.task.every_step else (0, self.task.steps)
-        count, n = len(samples), len(self.ids)
-        keep = _Kept(count, n)
-        done, failure, status, spent, block = 0, "", "completed", 0.0, 1
-        entered = time.perf_counter()
-        self._read(keep, 0, 0)
-        for place, sample in enumerate(samples[1:], start=1):
-            while done < sample and status == "completed":
-                taken = min(block, sample - done)
-                began = time.perf_counter()
-                mujoco.mj_step(self.model, self.data, taken)
-                took = time.perf_counter() - began
-                spent += took
-                done += taken
-                block = min(2 * block, BLOCK) if took < LOOK else max(block // 2, 1)
-                status, failure = self._health(done, time.perf_counter() - entered)
-            if status != "completed":
-                break
-            self._read(keep, place, sample)
-        kept = keep.count
-        return Recording(
-            samples=np.array(samples[:kept], dtype=np.int64),
-            positions=keep.positions[:kept],
-            orientations=keep.orientations[:kept],
-            velocities=keep.velocities[:kept],
-            angular_velocities=keep.spins[:kept],
-            steps=done,
-            seconds=spent,
-            setup_seconds=setup,
-            constraint_forces={name: np.array(values) for name, values in keep.forces.items()},
-            contact_forces={pair: keep.pair(pair)[:kept] for pair in keep.pairs},
-            contact_count=keep.contacts[:kept],
-            penetration=keep.depths[:kept],
-            status=status,  # type: ignore[arg-type]
-            failure=failure,
-        )
+        def step(count: int) -> None:
+            mujoco.mj_step(self.model, self.data, count)
 
-    def _health(self, step: int, spent: float) -> tuple[str, str]:
+        return stepped(self.task, step, self._read, setup, self._health)
+
+    def _health(self) -> str:
         for kind in BAD:
             if self.data.warning[getattr(mujoco.mjtWarning, kind)].number:
-                return "diverged", f"mujoco reset a state it calls bad ({kind[7:].lower()}) by step {step}"
-        limit = self.task.time_limit
-        if limit is not None and spent > limit:
-            return "timed_out", f"the time limit of {limit:g} s was reached before step {step + 1}"
-        return "completed", ""
+                return f"mujoco reset a state it calls bad ({kind[7:].lower()})"
+        return ""
 
-    def _read(self, keep: _Kept, place: int, sample: int) -> None:
+    def _read(self, keep: Kept, place: int, sample: int) -> None:
         m, d = self.model, self.data
         if self.task.constraint_forces:
             self._read_constraints(keep, sample)
@@ -210,9 +174,8 @@ class _Run:
         keep.orientations[place] = d.xquat[self.ids]
         keep.spins[place] = spin
         keep.velocities[place] = d.cvel[self.ids, 3:] + np.cross(spin, where - d.subtree_com[self.roots])
-        keep.count = place + 1
 
-    def _read_constraints(self, keep: _Kept, sample: int) -> None:
+    def _read_constraints(self, keep: Kept, sample: int) -> None:
         scene, m, d = self.task.scene, self.model, self.data
         if sample:
             mujoco.mj_rnePostConstraint(m, d)
@@ -274,7 +237,7 @@ class _Run:
         index = self._body(name)
         return np.asarray(self.data.xpos[index] + turned(np.array(self.data.xquat[index]), local))
 
-    def _read_contacts(self, keep: _Kept, place: int) -> None:
+    def _read_contacts(self, keep: Kept, place: int) -> None:
         m, d = self.model, self.data
         names = {int(self.ids[i]): body.name for i, body in enumerate(self.task.scene.bodies)}
         keep.contacts[place] = d.ncon
@@ -286,23 +249,6 @@ class _Run:
             force = np.reshape(contact.frame, (3, 3)).T @ wrench[:3]  # on the second, along the normal
             first, second = (names[int(m.geom_bodyid[g])] for g in (contact.geom1, contact.geom2))
             keep.pair((first, second))[place] -= force
-
-
-class _Kept:
-    """Arrays that fill up as the run goes."""
-
-    def __init__(self, count: int, n: int) -> None:
-        self.count, self.length = 0, count
-        self.positions, self.velocities = np.empty((count, n, 3)), np.empty((count, n, 3))
-        self.spins, self.orientations = np.empty((count, n, 3)), np.empty((count, n, 4))
-        self.contacts, self.depths = np.zeros(count), np.zeros(count)
-        self.forces: dict[str, list[Any]] = {}
-        self.pairs: dict[tuple[str, str], Array] = {}
-
-    def pair(self, pair: tuple[str, str]) -> Array:
-        if pair not in self.pairs:
-            self.pairs[pair] = np.zeros((self.length, 3))
-        return self.pairs[pair]
 
 
 def _attraction(run: _Run, fields: list[CentralGravity]) -> Callable[[Any, Any], None]:

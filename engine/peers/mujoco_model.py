@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -14,6 +14,16 @@ import numpy as np
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.forces import Spring
 from spook_tracker.engine.joints import Ball, Constraint, Distance, Hinge, Joint, Lock, Prismatic, Universal
+from spook_tracker.engine.peers.joint_tree import (
+    UPRIGHT,
+    Node,
+    alone,
+    fixed,
+    grown,
+    plane_of_motion,
+    rod_axes,
+    turn_of,
+)
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
 from spook_tracker.engine.result import Array
@@ -22,18 +32,6 @@ from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-12  # kg m²: MuJoCo wants one of every moving body; a point mass has none
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it as equalities
-UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-
-
-@dataclass
-class _Node:
-    """A body on its way into the tree: the joint that ties it to its parent, if any."""
-
-    body: Particle | RigidBody
-    index: int
-    parent: str | None = None  # None: free, or fixed
-    tie: Constraint | None = None
-    children: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -53,74 +51,14 @@ def numbers(values: Iterable[float]) -> str:
 
 def model(scene: Scene, *, joint_coordinates: bool, option: str, geom: str, equality: str) -> Model:
     """The whole model; `option`, `geom` and `equality` are XML attributes of the configuration."""
-    nodes = {body.name: _Node(body, index) for index, body in enumerate(scene.bodies)}
-    if joint_coordinates:
-        _grow(scene, nodes)
+    nodes = grown(scene) if joint_coordinates else alone(scene)
     return _Writer(scene, nodes, geom, equality).write(option)
 
 
-def _fixed(body: Particle | RigidBody) -> bool:
-    return isinstance(body, RigidBody) and body.motion != "dynamic"
-
-
-def _grow(scene: Scene, nodes: dict[str, _Node]) -> None:
-    """Hang every body that joints reach from the world on the shortest way there; loops stay constraints."""
-    beside: dict[str, list[Constraint]] = {}
-    for constraint in scene.constraints:
-        if isinstance(constraint, Distance) and not _is_rod(scene, constraint):
-            continue
-        for end in constraint.between:
-            beside.setdefault(end if isinstance(end, str) else WORLD, []).append(constraint)
-    fixed = [name for name, node in nodes.items() if _fixed(node.body)]
-    reached, line = {WORLD, *fixed}, [WORLD, *fixed]
-    starts = iter(list(nodes))
-    while True:
-        while line:
-            parent = line.pop(0)
-            for constraint in beside.get(parent, ()):
-                names = [end if isinstance(end, str) else WORLD for end in constraint.between]
-                child = names[1] if names[0] == parent else names[0]
-                if child in reached:
-                    continue
-                reached.add(child)
-                line.append(child)
-                nodes[child].parent, nodes[child].tie = parent, constraint
-                if parent in nodes:
-                    nodes[parent].children.append(child)
-        free = next((name for name in starts if name not in reached), None)
-        if free is None:
-            return
-        reached.add(free)  # a body that flies free, and what hangs from it
-        line.append(free)
-
-
-def _is_rod(scene: Scene, rod: Distance) -> bool:
-    """Whether a distance is a rod between centres at its rest length, so that hinges can stand for it."""
-    ends = [scene.body(end) for end in rod.between if isinstance(end, str)]
-    length = scene.length(rod)
-    return all(isinstance(body, Particle) for body in ends) and (
-        rod.rest_length is None or abs(rod.rest_length - length) <= 1e-14 * length
-    )
-
-
-def _plane_of_motion(scene: Scene) -> Array | None:
-    """The normal of the plane in which all particles stay, if there is one."""
-    if scene.forces:
-        return None
-    points = [b.position for b in scene.bodies]
-    points += [end for c in scene.constraints for end in c.between if not isinstance(end, str)]
-    spread = [np.subtract(p, points[0]) for p in points[1:]]
-    spread += [np.array(b.velocity) for b in scene.bodies] + [np.array(scene.gravity)]
-    _, sizes, axes = np.linalg.svd(np.array(spread))
-    if sizes[0] == 0.0 or (len(sizes) > 2 and sizes[2] > 1e-12 * sizes[0]):
-        return None
-    return np.asarray(axes[2])
-
-
 class _Writer:
-    def __init__(self, scene: Scene, nodes: dict[str, _Node], geom: str, equality: str) -> None:
+    def __init__(self, scene: Scene, nodes: dict[str, Node], geom: str, equality: str) -> None:
         self.scene, self.nodes, self.geom, self.equality = scene, nodes, geom, equality
-        self.normal = _plane_of_motion(scene)
+        self.normal = plane_of_motion(scene)
         self.tree = {node.tie.name: name for name, node in nodes.items() if node.tie is not None}
         self.equalities: dict[str, tuple[int, ...]] = {}
         self.equality_lines: list[str] = []
@@ -181,16 +119,15 @@ class _Writer:
         if name is None or name == WORLD:
             return np.zeros(3), UPRIGHT
         body = self.nodes[name].body
-        turn = UPRIGHT if isinstance(body, Particle) else np.array(body.orientation)
-        return np.array(body.position), turn
+        return np.array(body.position), turn_of(body)
 
-    def _body(self, node: _Node) -> str:
+    def _body(self, node: Node) -> str:
         body = node.body
         place, turn = self._frame(body.name)
         above, above_turn = self._frame(node.parent)
         at, q = turned_back(above_turn, place - above), product(conjugate(above_turn), turn)
         text = f"<body name={quoteattr(body.name)} pos={numbers(at)} quat={numbers(q)}>"
-        if not _fixed(body):
+        if not fixed(body):
             inertia = (POINT_INERTIA,) * 3 if isinstance(body, Particle) else body.inertia
             assert inertia is not None and body.mass is not None
             text += self._joints(node, place, turn)
@@ -199,7 +136,7 @@ class _Writer:
             text += self._geom(body)
         return text + "".join(self.sites[body.name])
 
-    def _joints(self, node: _Node, place: Array, turn: Array) -> str:
+    def _joints(self, node: Node, place: Array, turn: Array) -> str:
         if node.tie is None:
             if isinstance(node.body, RigidBody):
                 return "<freejoint/>"
@@ -207,7 +144,7 @@ class _Writer:
         tie, second = node.tie, node.tie.between[1] == node.body.name
         if isinstance(tie, Distance):
             anchor = np.array(self.scene.anchor(tie, 0 if second else 1))
-            axes, kind, at = self._rod_axes(anchor - place), "hinge", anchor
+            axes, kind, at = rod_axes(anchor - place, self.normal), "hinge", anchor
         else:
             assert isinstance(tie, Joint)
             at = joint_point(self.scene, tie)
@@ -226,14 +163,6 @@ class _Writer:
         return "".join(
             f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))}/>' for axis in axes
         )
-
-    def _rod_axes(self, rod: Array) -> list[Array]:
-        if self.normal is not None:
-            return [self.normal]
-        least = np.eye(3)[int(np.argmin(np.abs(rod)))]
-        one = np.cross(rod, least)
-        two = np.cross(rod, one)
-        return [one / np.linalg.norm(one), two / np.linalg.norm(two)]
 
     def _geom(self, body: RigidBody) -> str:
         assert body.shape is not None
@@ -300,7 +229,7 @@ class _Writer:
     def _ends(self, joint: Joint) -> tuple[str, str, str]:
         """The attributes of an equality's two bodies, and the one whose frame its anchor is in."""
         one, two = joint.between
-        if one == WORLD or (_fixed(self.nodes[one].body) and two != WORLD):
+        if one == WORLD or (fixed(self.nodes[one].body) and two != WORLD):
             one, two = two, one
         second = "" if two == WORLD else f" body2={quoteattr(two)}"
         return f"body1={quoteattr(one)}{second}", one, two
@@ -327,7 +256,7 @@ class _Writer:
         if self.one_friction:
             return text
         for (a, one), (b, two) in combinations(solid.items(), 2):
-            if frozenset((a, b)) in apart or (_fixed(one) and _fixed(two)):
+            if frozenset((a, b)) in apart or (fixed(one) and fixed(two)):
                 continue
             mu = math.sqrt(one.material.friction * two.material.friction)
             text += (

@@ -12,6 +12,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -86,10 +87,12 @@ def _without_address_limit() -> None:
 
 
 def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Recording:
-    rods = task.get("forces_of", ())
-    rows = states.reshape(head["kept"], 13 * len(task["bodies"]) + len(rods))
-    whole = rows[:, : 13 * len(task["bodies"])].reshape(head["kept"], -1, 13)
-    tensions = rows[:, 13 * len(task["bodies"]) :]
+    """`forces_of` says how many numbers follow the bodies' for which constraint; `depth` that one more is the deepest."""
+    forces = task.get("forces_of", {})
+    widths = [13 * len(task["bodies"]), *forces.values(), int(task.get("depth", False))]
+    rows = states.reshape(head["kept"], sum(widths))
+    states, *forced, depth = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    whole = states.reshape(head["kept"], -1, 13)
     samples = range(task["steps"] + 1) if task["every_step"] else (0, task["steps"])
     return Recording(
         samples=np.array(samples[: head["kept"]], dtype=np.int64),
@@ -100,16 +103,19 @@ def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Rec
         steps=head["steps"],
         seconds=head["seconds"],
         setup_seconds=head["setup_seconds"],
-        constraint_forces={name: tensions[:, place] for place, name in enumerate(rods)},
+        constraint_forces={
+            name: rows[:, 0] if forces[name] == 1 else rows for name, rows in zip(forces, forced, strict=True)
+        },
+        penetration=depth[:, 0] if depth.size else None,
         status=head["status"],
         failure=head["failure"],
     )
 
 
 def _nothing(task: dict[str, Any], failure: str) -> Recording:
-    start = np.array(
-        [[*b["position"], *b["orientation"], *b["velocity"], *b["spin"]] for b in task["bodies"]]
-    )
+    bodies = [[*b["position"], *b["orientation"], *b["velocity"], *b["spin"]] for b in task["bodies"]]
+    more = sum(task.get("forces_of", {}).values()) + int(task.get("depth", False))
+    start = np.array([*chain.from_iterable(bodies), *[0.0] * more])
     head = {
         "kept": 1,
         "steps": 0,

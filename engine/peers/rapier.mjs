@@ -8,6 +8,7 @@ await R.init();
 const vec = ([x, y, z]) => ({ x, y, z });
 const quat = ([w, x, y, z]) => ({ w, x, y, z });
 const upright = quat([1, 0, 0, 0]);
+const pointInertia = vec([1e-6, 1e-6, 1e-6]); // kg m²: every moving body wants one; a particle that turns is not seen to
 
 const world = new R.World(vec(task.gravity));
 world.timestep = task.time_step;
@@ -25,7 +26,8 @@ function bodyOf(given) {
   const body = world.createRigidBody(
     described.setLinvel(...given.velocity).setAngvel(vec(given.spin)).setLinearDamping(0).setAngularDamping(0),
   );
-  if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), vec(given.inertia), upright, true);
+  const inertia = given.motion === "particle" ? pointInertia : vec(given.inertia);
+  if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), inertia, upright, true);
   if (given.shape && task.contacts) {
     const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(0);
     world.createCollider(collider.setFriction(given.friction), body);

@@ -16,14 +16,15 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import Load
 from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock
 from spook_tracker.engine.peers import node
+from spook_tracker.engine.peers.described import described as common
+from spook_tracker.engine.peers.described import numbered
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
 from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Plane, Sphere
 
 PACKAGE = "@dimforge/rapier3d-compat"
 SCRIPT = Path(__file__).with_suffix(".mjs")
-POINT_INERTIA = 1e-6  # kg m²: it wants one of every moving body; a particle that turns is not seen to
 FOUND = node.package(PACKAGE)
 
 
@@ -63,60 +64,11 @@ class Rapier:
 def described(task: Task) -> dict[str, Any]:
     """The task as JSON takes it. Raises NotSupported for pairs kept apart that no joint ties."""
     scene = task.scene
-    places = {body.name: place for place, body in enumerate(scene.bodies)}
     joined = {frozenset(c.between) for c in scene.constraints if isinstance(c, Joint)}
     if scene.contacts and any(frozenset(pair) not in joined for pair in scene.no_contact):
         raise NotSupported("rapier does not support single pairs that must not touch")
-    return {
-        "module": node.entry(FOUND),
-        "gravity": scene.gravity,
-        "time_step": task.time_step,
-        "steps": task.steps,
-        "every_step": task.every_step,
-        "time_limit": task.time_limit,
-        "options": dict(task.configuration.options),
-        "contacts": scene.contacts,
-        "bodies": [_body(body) for body in scene.bodies],
-        "constraints": [_joint(task, constraint, places) for constraint in scene.constraints],
-        "loads": [
-            {"body": places[f.body], "force": f.force, "torque": f.torque}
-            for f in scene.forces
-            if isinstance(f, Load)
-        ],
-    }
-
-
-def _body(body: Particle | RigidBody) -> dict[str, Any]:
-    if isinstance(body, Particle):
-        return {
-            "mass": body.mass,
-            "inertia": (POINT_INERTIA,) * 3,
-            "position": body.position,
-            "velocity": body.velocity,
-            "orientation": (1.0, 0.0, 0.0, 0.0),
-            "spin": (0.0, 0.0, 0.0),
-            "friction": 0.0,
-            "shape": None,
-        }
-    return {
-        "mass": body.mass if body.motion == "dynamic" else 0.0,
-        "inertia": body.inertia if body.motion == "dynamic" else (0.0, 0.0, 0.0),
-        "position": body.position,
-        "velocity": body.velocity,
-        "orientation": body.orientation,
-        "spin": body.angular_velocity,
-        "friction": body.material.friction,
-        "shape": None if body.shape is None else _shape(body.shape),
-    }
-
-
-def _shape(shape: Shape) -> dict[str, Any]:
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "radius": shape.radius}
-    if isinstance(shape, Box):
-        return {"kind": "box", "half": [0.5 * edge for edge in shape.size]}
-    assert isinstance(shape, Plane)
-    return {"kind": "plane", "normal": list(shape.normal)}
+    places = numbered(task)
+    return common(task, FOUND, [_joint(task, constraint, places) for constraint in scene.constraints])
 
 
 def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:

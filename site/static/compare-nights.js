@@ -5,7 +5,7 @@ const NIGHT_OUTCOMES = ["value", "out_of_limit", "not_finite", "diverged", "cras
 const nightBlocks = new Map();
 
 // Called by each file of compare/.
-function comparedNights(number, block) { nightBlocks.set(number, block); }
+function comparedNights(name, block) { nightBlocks.set(name, block); }
 
 function decodedRow(block, row) {
   const number = (value) => (typeof value === "string" ? { nan: NaN, inf: Infinity, "-inf": -Infinity }[value] : value);

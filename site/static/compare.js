@@ -5,7 +5,7 @@
 (function () {
   const source = document.getElementById("comparisons");
   if (!source) { return; }
-  const choices = JSON.parse(source.textContent), own = choices.own;
+  const choices = JSON.parse(source.textContent), own = choices.engines[0][1];
   const versions = choices.nights.map(([id, label, hash]) => ({ id, label, hash }));
   let newest = null;  // pairs, texts, words of the series, accepted levels: compare/newest.js
   window.comparedNewest = (told) => {
@@ -65,10 +65,18 @@
     return asked.get(address);
   }
 
+  // Nights stand engine by engine, ours first: which of them one is of, and its place there.
+  function engineOf(place) {
+    let left = place;
+    const which = choices.engines.findIndex(([, count]) => { if (left < count) { return true; } left -= count; return false; });
+    return { which, left };
+  }
+
   async function nightAt(place) {
-    const number = Math.floor(place / choices.block);
-    await script(`compare/nights-${number}.js`);
-    return nightOf(nightBlocks.get(number), place % choices.block);
+    const { which, left } = engineOf(place);
+    const name = `${choices.engines[which][0]}-${Math.floor(left / choices.block)}`;
+    await script(`compare/${name}.js`);
+    return nightOf(nightBlocks.get(name), left % choices.block);
   }
 
   // Two nights judged here, in the form of a stored pair with texts in place of places.
@@ -110,9 +118,9 @@
       told.replaceChildren(make("div", { class: "card pad" }, verdict("pass", "IDENTICAL"), make("p", {}, "The same run on both sides.")));
       return;
     }
-    if (i >= own || j >= own) {
-      const link = make("a", { href: "error-time.html" }, "Error and run time");
-      told.replaceChildren(make("div", { class: "card pad" }, make("p", {}, "Two engines are not held to each other's values; what accuracy costs in each stands on the page ", link, ".")));
+    if (engineOf(i).which !== engineOf(j).which) {
+      const link = make("a", { href: "engines.html" }, "Engines");
+      told.replaceChildren(make("div", { class: "card pad" }, make("p", {}, "Two engines are not held to each other's values; who is ahead at equal error stands on the page ", link, ".")));
       return;
     }
     let pair;

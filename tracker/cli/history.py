@@ -7,6 +7,13 @@ from typing import Any
 
 import click
 
+from spook_tracker.tracker.cli.filters import (
+    engine_option,
+    json_option,
+    kind_options,
+    of_engine,
+    test_option,
+)
 from spook_tracker.tracker.cli.options import (
     ACCEPTED,
     RED,
@@ -15,6 +22,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     source_options,
 )
+from spook_tracker.tracker.cli.settings import present
 
 
 def history_of(database: str) -> Any:
@@ -39,7 +47,7 @@ def accepted_levels(file: Path | None = None) -> Any:
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["table", "markdown", "json", "junit"]),
+    type=click.Choice(["table", "markdown", "comment", "annotations", "json", "junit"]),
     default="table",
     show_default=True,
 )
@@ -51,26 +59,45 @@ def accepted_levels(file: Path | None = None) -> Any:
     help="What ends with exit code 1.",
 )
 @click.option("--all", "everything", is_flag=True, help="Show what is identical, too.")
+@engine_option
+@test_option
+@kind_options
 @accepted_option
 @database_option
 def compare(
-    before: str, after: str, form: str, fail_on: str, everything: bool, accepted: Path | None, database: str
+    before: str,
+    after: str,
+    form: str,
+    fail_on: str,
+    everything: bool,
+    engine: str | None,
+    tests: tuple[str, ...],
+    kinds: tuple[str, ...],
+    roles: tuple[str, ...],
+    accepted: Path | None,
+    database: str,
 ) -> None:
     """Say what changed between two versions.
 
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green.
+    V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
+    annotations are for pull requests, and empty when nothing became worse.
     """
     from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.judge.choice import Choice
+    from spook_tracker.tracker.library import FORK_POINT
     from spook_tracker.tracker.library import compare as compared
 
-    levels = accepted_levels(accepted)
+    levels, choice = accepted_levels(accepted), Choice(tests=tests, kinds=kinds, roles=roles)
     with history_of(database) as history:
         if form == "table" and {before, after} <= {run.engine.name for run in history.runs()}:
             import spook_tracker.tracker.cli.rank as ranking
 
             say("\n".join(ranking.table_lines(history, (before, after))))  # two engines: nobody regressed
             return
-        document = compared(history, before, after, levels)
+        old = before if before == FORK_POINT else of_engine(engine, before)
+        document = compared(history, old, of_engine(engine, after), levels)
+    document = choice.of_comparison(document)
     if form == "json":
         from spook_tracker.tracker.document.json_form import readable
 
@@ -79,6 +106,14 @@ def compare(
         from spook_tracker.tracker.cli.report_junit import junit_of_comparison
 
         click.echo(junit_of_comparison(document), nl=False)
+    elif form in ("comment", "annotations"):
+        from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
+
+        words = comment(document) if form == "comment" else workflow_commands(document)
+        if words and form == "comment":
+            say(words)
+        elif words:
+            click.echo(words)  # they are meant to be commands, and hold nothing else that is one
     elif form == "markdown":
         from spook_tracker.tracker.cli.report_compare import compare_markdown
 
@@ -101,14 +136,25 @@ def _exit_as(document: Any, fail_on: str) -> None:
 
 @click.command("judge", epilog=example("tracker judge latest", "tracker judge 0f3c --junit judged.xml"))
 @click.argument("run", metavar="RUN")
-@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
+@json_option
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@engine_option
+@test_option
+@kind_options
 @accepted_option
 @database_option
 def judge_command(
-    run: str, as_json: bool, junit_file: Path | None, accepted: Path | None, database: str
+    run: str,
+    as_json: bool,
+    junit_file: Path | None,
+    engine: str | None,
+    tests: tuple[str, ...],
+    kinds: tuple[str, ...],
+    roles: tuple[str, ...],
+    accepted: Path | None,
+    database: str,
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
@@ -116,12 +162,14 @@ def judge_command(
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
+    from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import idle_entries, judge
 
-    levels = accepted_levels(accepted)
+    levels, run = accepted_levels(accepted), of_engine(engine, run)
     with history_of(database) as history:
         findings = judge(history, run, levels)
         notes = idle_entries(history, run, findings, levels)
+    findings = Choice(tests=tests, kinds=kinds, roles=roles).of_findings(findings)
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -138,43 +186,88 @@ def judge_command(
 @click.argument("test")
 @click.argument("metric", required=False)
 @click.option("--last", default=10, show_default=True, help="Values to list of each series.")
+@engine_option
+@kind_options
+@json_option
 @accepted_option
 @database_option
-def trend(test: str, metric: str | None, last: int, accepted: Path | None, database: str) -> None:
+def trend(
+    test: str,
+    metric: str | None,
+    last: int,
+    engine: str | None,
+    kinds: tuple[str, ...],
+    roles: tuple[str, ...],
+    as_json: bool,
+    accepted: Path | None,
+    database: str,
+) -> None:
     """Show the series of a test over versions: sparkline, change points, last values."""
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_trend import trend_lines
+    from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import trend as told_of
 
     levels = accepted_levels(accepted)
     with history_of(database) as history:
-        for told in told_of(history, test, metric, levels):
-            say("\n".join(trend_lines(told, last)))
-            say()
+        trends = Choice(kinds=kinds, roles=roles).of_trends(told_of(history, test, metric, levels, engine))
+    if as_json:
+        from spook_tracker.tracker.cli.report_json import trend_json
+
+        click.echo(trend_json(trends))
+        return
+    from spook_tracker.tracker.cli.report_trend import summary, trend_lines
+
+    say(summary(trends))
+    for told in trends:
+        say()
+        say("\n".join(trend_lines(told, last)))
 
 
 @click.command("list", epilog=example("tracker list"))
+@test_option
+@json_option
 @source_options
-def list_tests(engine: str, catalogue: str) -> None:
+def list_tests(tests: tuple[str, ...], as_json: bool, engine: str, catalogue: str) -> None:
     """List the scalar tests: what is asked, and against which limit."""
+    from fnmatch import fnmatchcase
+
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import catalogue_table
     from spook_tracker.tracker.measure.run import Questions
 
-    say(catalogue_table(Questions(catalogue=catalogue, engine=engine).tests()))
+    source = Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine))
+    found = {
+        name: test
+        for name, test in source.tests().items()
+        if not tests or any(fnmatchcase(name, pattern) for pattern in tests)
+    }
+    if as_json:
+        from spook_tracker.tracker.cli.report_json import list_json
+
+        click.echo(list_json(found))
+    else:
+        say(catalogue_table(found))
 
 
 @click.command(epilog=example("tracker show pendulum"))
 @click.argument("test")
+@json_option
 @source_options
-def show(test: str, engine: str, catalogue: str) -> None:
+def show(test: str, as_json: bool, engine: str, catalogue: str) -> None:
     """Show one test: question, model, theory, limits and their sources."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import card
     from spook_tracker.tracker.measure.run import Questions, select
 
-    tests = select(Questions(catalogue=catalogue, engine=engine).tests(), [test])
-    say(card(test, tests[test]))
+    tests = select(
+        Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine)).tests(), [test]
+    )
+    if as_json:
+        from spook_tracker.tracker.cli.report_json import show_json
+
+        click.echo(show_json(test, tests[test]))
+    else:
+        say(card(test, tests[test]))
 
 
 @click.command(epilog=example("tracker explain falling_object --cost"))
@@ -182,19 +275,26 @@ def show(test: str, engine: str, catalogue: str) -> None:
 @click.option(
     "--cost", is_flag=True, help="Also measure what each stage takes, and saves where it is left out."
 )
+@json_option
 @source_options
-def explain(test: str, cost: bool, engine: str, catalogue: str) -> None:
+def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -> None:
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import stage_table
     from spook_tracker.tracker.measure.ladder import saved_by_leaving_out, stage_costs
     from spook_tracker.tracker.measure.run import Questions, select
 
-    source = Questions(catalogue=catalogue, engine=engine)
+    source = Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine))
     tests = select(source.tests(), [test])
+    costs = saved = None
     if cost:
         simulate = source.simulate()
         saved = saved_by_leaving_out(tests, simulate).get(test, {})
-        say(stage_table(test, tests[test], source.module(), stage_costs(tests[test], simulate), saved))
+        costs = stage_costs(tests[test], simulate)
+    if as_json:
+        from spook_tracker.tracker.cli.report_json import explain_json
+        from spook_tracker.tracker.measure.cards import explained
+
+        click.echo(explain_json(test, explained(tests[test], source.module()), costs, saved))
     else:
-        say(stage_table(test, tests[test], source.module()))
+        say(stage_table(test, tests[test], source.module(), costs, saved))

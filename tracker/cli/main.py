@@ -7,8 +7,10 @@ from typing import Any
 
 import click
 
+import spook_tracker.tracker.cli.past as past
 import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
+from spook_tracker.tracker.cli.ci import ci
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -16,14 +18,17 @@ from spook_tracker.tracker.cli.options import (
     accepted_option,
     database_option,
     example,
+    executor_option,
     limit_option,
     recorded,
     refuse_unwritable,
     source_options,
     terminated_is_interrupted,
+    website_options,
     with_database_option,
     workers_option,
 )
+from spook_tracker.tracker.cli.settings import present
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
 
 FIRST_STEPS = """\
@@ -74,6 +79,7 @@ def _print_versions() -> None:
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@executor_option
 @workers_option
 @limit_option
 @source_options
@@ -87,6 +93,7 @@ def run_command(
     everything: bool,
     json_file: Path | None,
     junit_file: Path | None,
+    executor: str,
     workers: int,
     time_limit: float,
     engine: str,
@@ -99,7 +106,13 @@ def run_command(
 
     refuse_unwritable(json_file, junit_file)
     request = Request(
-        tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
+        tests=tests,
+        figures=figures,
+        sweep=sweep,
+        stability=stability,
+        workers=workers,
+        time_limit=time_limit,
+        executor=executor,
     )
     names = engine.split(",")
     red = False
@@ -125,6 +138,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
+@executor_option
 @workers_option
 @limit_option
 @click.option(
@@ -134,6 +148,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
 @with_database_option
+@website_options
 @accepted_option
 @source_options
 @database_option
@@ -141,6 +156,9 @@ def nightly(
     out: Path,
     quick: bool,
     with_database: bool,
+    title: str,
+    home_page: str,
+    executor: str,
     workers: int,
     time_limit: float,
     accepted: Path | None,
@@ -162,7 +180,9 @@ def nightly(
     refuse_unusable(out)
     first, *others = engine.split(",")
     for other in others:
-        asked = Request(sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly")
+        asked = Request(
+            sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly", executor=executor
+        )
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:
@@ -184,14 +204,18 @@ def nightly(
             watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
             tell=tell,
             with_database=with_database,
+            title=title,
+            home_page=home_page,
             catalogue=catalogue,
             engine=first,
+            limits=present().limits_of(first),
             limit=limit,
             figures=True,
             sweep=not quick,
             stability=not quick,
             workers=workers,
             time_limit=time_limit,
+            executor=executor,
         )
     for sentence in report.notes:
         say(f"note: {sentence}")
@@ -218,9 +242,12 @@ def engines() -> None:
     "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
 )
 @with_database_option
+@website_options
 @accepted_option
 @database_option
-def publish(out: Path, with_database: bool, accepted: Path | None, database: str) -> None:
+def publish(
+    out: Path, with_database: bool, title: str, home_page: str, accepted: Path | None, database: str
+) -> None:
     """Build the website from what is recorded."""
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.library import History
@@ -228,15 +255,19 @@ def publish(out: Path, with_database: bool, accepted: Path | None, database: str
 
     with History.open(database) as history:
         offered = database if with_database else ""
-        _say_published(build(history, out, accepted_levels(accepted), offered), out)
+        report = build(history, out, accepted_levels(accepted), offered, title, home_page)
+    _say_published(report, out)
 
 
 @main.command(epilog=example("tracker report --pdf night.pdf"))
 @click.option("--pdf", type=click.Path(dir_okay=False, path_type=Path), help="Print the night as PDF (A4).")
 @click.option("--html", type=click.Path(dir_okay=False, path_type=Path), help="Write it as one HTML file.")
+@website_options
 @accepted_option
 @database_option
-def report(pdf: Path | None, html: Path | None, accepted: Path | None, database: str) -> None:
+def report(
+    pdf: Path | None, html: Path | None, title: str, home_page: str, accepted: Path | None, database: str
+) -> None:
     """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
     import tempfile
 
@@ -248,7 +279,7 @@ def report(pdf: Path | None, html: Path | None, accepted: Path | None, database:
     if pdf is None and html is None:
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
     with History.open(database) as history:
-        text = one_file(history, accepted_levels(accepted))
+        text = one_file(history, accepted_levels(accepted), title, home_page)
     if html is not None:
         _write(html, text)
         say(f"wrote {html}")
@@ -291,6 +322,8 @@ def serve(folder: Path, port: int) -> None:
 
 
 for command in (
+    past.bisect,
+    ci,
     releases.backfill,
     releases.releases_command,
     ranking.rank,
@@ -313,7 +346,8 @@ def _measure(request: Any, engine: str, limit: float | None, catalogue: str, dat
     from spook_tracker.tracker.cli.console import watching
     from spook_tracker.tracker.measure.run import Interrupted, Questions, run
 
-    source = Questions(catalogue=catalogue, engine=engine.strip(), limit=limit)
+    engine = engine.strip()
+    source = Questions(catalogue=catalogue, engine=engine, limit=limit, limits=present().limits_of(engine))
     if database is None:
         with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))

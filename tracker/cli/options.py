@@ -17,6 +17,8 @@ from typing import Any, NoReturn, TypeVar
 
 import click
 
+import spook_tracker.tracker.cli.settings as tracker_toml
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 MOST = 600  # characters of a complaint
@@ -55,11 +57,26 @@ def source_options(command: Command) -> Command:
         ),
         click.option(
             "--catalogue",
-            metavar="MODULE:NAME",
+            metavar="NAME[,NAME]",
             envvar="TRACKER_CATALOGUE",
-            default="spook_tracker.scalar_tests.catalogue:CATALOGUE",
-            help="Another table of scalar tests; also TRACKER_CATALOGUE.",
+            default="standard",
+            help="Other tables of scalar tests: module:NAME, with commas between; also TRACKER_CATALOGUE.",
         ),
+    ):
+        command = option(command)
+    return command
+
+
+def website_options(command: Command) -> Command:
+    """--title and --home-page: whose website it is."""
+    for option in (
+        click.option(
+            "--home-page",
+            metavar="URL",
+            default="",
+            help="Address of your project, for the foot of every page.",
+        ),
+        click.option("--title", metavar="TEXT", default="", help="Title of the website."),
     ):
         command = option(command)
     return command
@@ -98,6 +115,17 @@ def workers_option(command: Command) -> Command:
     return command
 
 
+def executor_option(command: Command) -> Command:
+    """--executor NAME: who measures values."""
+    return click.option(
+        "--executor",
+        metavar="NAME",
+        default="process",
+        show_default=True,
+        help="Who measures values: process, dask://HOST:PORT, or module:factory of any executor.",
+    )(command)
+
+
 ACCEPTED = "accepted.toml"
 
 
@@ -123,6 +151,8 @@ class OneLineErrors(click.Group):
         options["standalone_mode"] = False
         _recorded.clear()
         try:
+            settings = tracker_toml.read(Path.cwd())
+            options |= {"default_map": tracker_toml.defaults(self, settings), "obj": settings}
             code = super().main(args, *rest, **options)
         except click.ClickException as error:
             command = (

@@ -15,9 +15,19 @@ KEPT = ".tracker-releases"
 MEGABYTE = 1e6
 
 
-@click.command(epilog=example("tracker backfill --engine mujoco --test resting_stack --budget 20"))
-@click.argument("versions", nargs=-1, metavar="[VERSION]...")
-@click.option("--engine", required=True, metavar="NAME", help="An engine that is released as a package.")
+@click.command(
+    epilog=example(
+        "tracker backfill v0.2.0 v0.3.0 HEAD",
+        "tracker backfill --engine mujoco --test resting_stack --budget 20",
+    )
+)
+@click.argument("versions", nargs=-1, metavar="[REV]...")
+@click.option(
+    "--engine",
+    metavar="NAME",
+    help="An engine that is released as a package: REV are its versions, all if none is named.",
+)
+@click.option("--sweep", is_flag=True, help="Of commits: also measure error against run time.")
 @click.option("--test", "tests", multiple=True, metavar="TEST", help="Only this test; may be repeated.")
 @click.option("--newest", type=click.IntRange(min=1), metavar="N", help="Only the newest N of them.")
 @click.option(
@@ -30,10 +40,8 @@ MEGABYTE = 1e6
     "--keep",
     "folder",
     metavar="DIR",
-    default=KEPT,
-    show_default=True,
     type=click.Path(path_type=Path),
-    help="Where releases are installed.",
+    help=f"Where releases are installed ({KEPT}) or commits built (.tracker-commits).",
 )
 @click.option(
     "--out", metavar="DIR", type=click.Path(path_type=Path), help="Publish the website there afterwards."
@@ -44,11 +52,12 @@ MEGABYTE = 1e6
 @database_option
 def backfill(
     versions: tuple[str, ...],
-    engine: str,
+    engine: str | None,
+    sweep: bool,
     tests: tuple[str, ...],
     newest: int | None,
     budget: float | None,
-    folder: Path,
+    folder: Path | None,
     out: Path | None,
     catalogue: str,
     limit: float | None,
@@ -56,8 +65,12 @@ def backfill(
     time_limit: float,
     database: str,
 ) -> None:
-    """Install released versions of an engine, measure each, and record them in release order.
+    """Measure earlier commits of this project, or released versions of another engine, and record them.
 
+    REV are commits, tags or ranges A..B of the repository one stands in. Each is built in a folder of its own and
+    asked today's questions where it can answer them, else its own; which they were is said.
+
+    With --engine, released versions are installed and measured in release order.
     A release that is recorded already is not measured again, so an interrupted backfill is gone on with by
     calling it again. One that cannot be installed, does not start or gives no answers is named and passed
     over. In the end every change between two releases is named with its release.
@@ -65,6 +78,19 @@ def backfill(
     import spook_tracker.tracker.measure.releases as releases
     from spook_tracker.tracker.cli.console import say
 
+    if engine is None:
+        from spook_tracker.tracker.cli.past import KEPT as COMMITS
+        from spook_tracker.tracker.cli.past import backfill_commits
+
+        if not versions:
+            raise click.UsageError(
+                "name commits to measure, or --engine NAME for the releases of another engine"
+            )
+        asked = [*["--sweep"] * sweep, "--workers", str(workers), "--time-limit", str(time_limit)]
+        asked += [] if limit is None else ["--limit", str(limit)]
+        backfill_commits(versions, tests, asked, folder or Path(COMMITS), database)
+        return
+    folder = folder or Path(KEPT)
     chosen = releases.choose(releases.released(engine), versions, newest)
 
     def measure(version: str) -> Any:

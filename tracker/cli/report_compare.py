@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -11,8 +11,10 @@ from spook_tracker.tracker.cli.console import Column, clean, table, width
 from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.document.wording import page_of
 from spook_tracker.tracker.judge.causes import causes_tonight
+from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
-from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.tonight import Finding, not_compared
+from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import QUIET, WORDS, spaced
 
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
@@ -84,7 +86,8 @@ def red_line(change: Change) -> str:
 def compare_table(document: CompareDocument, everything: bool = False, room: int | None = None) -> str:
     """The comparison for a terminal: what is red in full, the rest in a table, the verdict last."""
     shown = [change for change in document.changes if everything or change.word not in QUIET]
-    lines = [click.style(f"{name_of(document.before)} → {name_of(document.after)}", bold=True), ""]
+    heading = click.style(f"{name_of(document.before)} → {name_of(document.after)}", bold=True)
+    lines = [*_worst(document), heading, ""]
     if shown:
         rows = [
             (
@@ -109,6 +112,16 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
     lines += [f"note: {clean(note)}" for note in document.notes]
     lines.append(_verdict(document))
     return "\n".join(lines)
+
+
+def _worst(document: CompareDocument) -> list[str]:
+    """The sentence over all: how many are worse, and which is the worst; none where nothing is."""
+    worst = worst_change(document)
+    if worst is None:
+        return []
+    reds = sum(change.red for change in document.changes)
+    words = f"✗ {reds} worse; the worst: {clean(worst.series)}, {clean(worst.name or worst.word)}"
+    return [click.style(words, fg="red", bold=True)]
 
 
 def _how(change: Change) -> str:
@@ -177,7 +190,7 @@ def _verdict(document: CompareDocument) -> str:
 def compare_markdown(document: CompareDocument) -> str:
     """The comparison as Markdown; names and sentences from outside are data, never markup."""
     lines = [
-        f"### {_escape(name_of(document.before))} → {_escape(name_of(document.after))}",
+        f"### {escape(name_of(document.before))} → {escape(name_of(document.after))}",
         "",
         f"**{spaced(document.verdict)}**: {counted(document)}",
         "",
@@ -193,7 +206,7 @@ def compare_markdown(document: CompareDocument) -> str:
             _limit(change.limit),
             change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
         )
-        lines.append("| " + " | ".join(_escape(cell) for cell in cells) + " |")
+        lines.append("| " + " | ".join(escape(cell) for cell in cells) + " |")
     if len(shown) > MOST_ROWS:
         lines.append(f"\nand {len(shown) - MOST_ROWS} more")
     moved = _moved(document)
@@ -202,12 +215,12 @@ def compare_markdown(document: CompareDocument) -> str:
         lines += ["|---|---:|---:|"]
     for f in moved[:MOST_ROWS]:
         ratios = [f"{ratio:.3g}" if ratio else "-" for ratio in _ratios(f)[:2]]
-        lines.append(f"| {_escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
-    lines += ["", *(f"- {_escape(note)}" for note in document.notes)]
+        lines.append(f"| {escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
+    lines += ["", *(f"- {escape(note)}" for note in document.notes)]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _escape(text: str) -> str:
+def escape(text: str) -> str:
     """Markdown and HTML signs made harmless."""
     text = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return "".join("\\" + c if c in "\\`*_{}[]#|~!" else c for c in text).replace(
@@ -224,7 +237,15 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
         summary(findings),
         *shared,
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
+        *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
     ]
+
+
+def _verdicts(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
+    """Of what was measured: a sum of work says nothing that its parts do not say."""
+    for finding in findings:
+        if finding.definition is None or finding.definition.kind != "work":
+            yield finding.test, finding.verdict
 
 
 def summary(findings: Sequence[Finding]) -> str:
@@ -241,9 +262,7 @@ def summary(findings: Sequence[Finding]) -> str:
     if words["new"]:
         parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
     if words["not_comparable"]:
-        parts.append(
-            f"{words['not_comparable']} cannot be compared (new definition, float environment, unquiet machine)"
-        )
+        parts.append(f"{words['not_comparable']} cannot be compared")
     return click.style("✓ " + "; ".join(parts), fg="green")
 
 

@@ -16,11 +16,11 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
 )
-from spook_tracker.tracker.judge.standing import HAVE_VALUES, count, is_red, standing
+from spook_tracker.tracker.judge.standing import HAVE_VALUES, against_limit, count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
-NARROW = 100  # columns; below, time step and set point have no column of their own
+NARROW = 100  # columns; below, the set point has no column, and the time step stands above its values
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
 Pair = tuple[SeriesDefinition, Sample]
 
@@ -39,15 +39,15 @@ def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> s
     return f"{number(value, digits)} {_unit(definition)}".rstrip() + said
 
 
-def limit(definition: SeriesDefinition) -> str:
+def limit(definition: SeriesDefinition, digits: int = 6) -> str:
     """The limit in signs: "≤ 0.004 %", "≥ 100", "0.4999 … 0.5001"."""
     if definition.limit is None:
         return "-"
     if isinstance(definition.limit, tuple):
         low, high = definition.limit
-        return f"{number(low)} … {number(high)}"
+        return f"{number(low, digits)} … {number(high, digits)}"
     sign = "≥" if definition.better == "larger" else "≤"
-    return f"{sign} {number(definition.limit)} {_unit(definition)}".rstrip()
+    return f"{sign} {number(definition.limit, digits)} {_unit(definition)}".rstrip()
 
 
 def _unit(definition: SeriesDefinition) -> str:
@@ -90,7 +90,11 @@ def set_point(definition: SeriesDefinition, sample: Sample) -> str:
 
 def word(definition: SeriesDefinition, sample: Sample) -> str:
     """The last column: what a reader looks for first."""
-    mark, said, _ = CLASSES[standing(definition, sample)]
+    shown_only = (
+        definition.role == "reported" and definition.limit is not None
+    )  # of an engine that gates nothing
+    stands = against_limit(definition, sample) if shown_only else standing(definition, sample)
+    mark, said, _ = CLASSES[stands]
     return f"{mark} {said}"
 
 
@@ -139,20 +143,23 @@ def title(run: RunDocument) -> str:
     """Which engine, which commit, which machine."""
     engine = run.engine
     commit = engine.git_hash[:10] + (" with local changes" if engine.dirty else "")
-    words = f"{engine.name} {engine.version} · {commit} · {run.machine.processor} · {run.started[:16]}Z"
-    return click.style(clean(words), bold=True)
+    facts = (f"{engine.name} {engine.version}", commit, run.machine.processor, f"{run.started[:16]}Z")
+    return click.style(clean(" · ".join(filter(None, facts))), bold=True)
 
 
 def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
-    """A heading row for each test, its values beneath; set point and time step where there is room."""
+    """A heading row for each test, its values beneath; the set point where there is room, else the time step above."""
     narrow = room < NARROW
     rows: list[tuple[str, ...]] = []
-    previous = ""
+    previous = step_above = ""
     for definition, sample in shown:
         columns = NARROW_COLUMNS if narrow else WIDE_COLUMNS
+        step = "" if definition.time_step is None else f"h = {number(definition.time_step, 4)} s"
         if definition.test != previous:
-            rows.append((definition.test, *[""] * (len(columns) - 1)))
-        previous = definition.test
+            rows.append((definition.test, step * narrow, *[""] * (len(columns) - 2)))
+        elif narrow and step != step_above:
+            rows.append(("", step, *[""] * (len(columns) - 2)))
+        previous, step_above = definition.test, step
         rows.append(_row(definition, sample, narrow))
     return table(NARROW_COLUMNS if narrow else WIDE_COLUMNS, rows, room, _styles(narrow))
 
@@ -164,8 +171,8 @@ def _row(definition: SeriesDefinition, sample: Sample, narrow: bool) -> tuple[st
     mark = "●" if definition.role == "gate" else " "
     name, room_left = f"{mark} {definition.metric} [{', '.join(facts)}]", margin(definition, sample)
     if narrow:
-        bound = limit(definition).removesuffix(f" {_unit(definition)}")
-        return name, measured(definition, sample, 4), bound, room_left.replace("decades", "dec"), judged
+        left = room_left.replace("decades", "dec")
+        return name, measured(definition, sample, 4), limit(definition, 4), left, judged
     step = "" if definition.time_step is None else number(definition.time_step, 4)
     return name, step, measured(definition, sample), limit(definition), room_left, held, judged
 
@@ -207,7 +214,14 @@ def verdict(run: RunDocument) -> str:
     """The last line: how many limits held."""
     found = count(pairs(run))
     if not found.expected and not found.lost:
-        return "nothing was measured against a limit"
+        shown = [against_limit(*pair) for pair in pairs(run) if pair[0].limit is not None]
+        if "pass" not in shown and "fail" not in shown:
+            return "nothing was measured against a limit"
+        asked = len(shown) - shown.count("none")
+        return (
+            f"· {clean(run.engine.name)} decides nothing here: it keeps {shown.count('pass')} of the {asked} limits it "
+            f"can be asked; {shown.count('none')} are not supported"
+        )
     if not found.red:
         words = (
             f"✓ green: all {found.expected} limits and set points hold; gates (●) among them: {found.gates}"

@@ -9,9 +9,19 @@ import click
 from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.judge.change_points import change_points
+from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of, is_noisy
-from spook_tracker.tracker.judge.vocabulary import STATES, spaced
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, STATES, spaced
+
+
+def summary(trends: Sequence[Told]) -> str:
+    """One sentence over all: how many series are red in their newest night, and which is the worst."""
+    reds = [told for told in trends if told.nights and told.nights[-1].red]
+    if not reds:
+        return click.style(f"✓ {len(trends)} series, none of them red tonight", fg="green")
+    worst = min(reds, key=lambda told: (CLASS_RANK[told.nights[-1].stands], told.definition.role != "gate"))
+    words = f"✗ {len(reds)} of {len(trends)} series red; the worst: {clean(worst.key)}, {name_of(worst.nights[-1])}"
+    return click.style(words, fg="red", bold=True)
 
 
 def trend_lines(told: Told, last: int = 10) -> list[str]:
@@ -55,6 +65,10 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
             f"{j.verdict.sentence}"
             for j in told
         ]
+    from spook_tracker.tracker.judge.change_points import (
+        change_points,
+    )  # NumPy, which most series do not need
+
     values = [j.night.value for j in judged]
     return [
         f"{judged[point.place].night.run.started[:10]} {commit_of(judged[point.place].night.run)}: "

@@ -7,21 +7,48 @@ from typing import Any
 
 import click
 
+from spook_tracker.tracker.cli.filters import json_option
 from spook_tracker.tracker.cli.options import database_option, example
 
 
 @click.command(epilog=example("tracker export latest --out runs/"))
 @click.argument("versions", nargs=-1, metavar="[V]...")
 @click.option(
-    "--out", metavar="DIR", type=click.Path(path_type=Path), help="One file per run; default: print."
+    "--out",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="A folder, for one file per run or month; default: print. The file of a table.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["json", "months", "csv", "parquet"]),
+    default="json",
+    show_default=True,
+    help="months: a compressed file a month; csv, parquet: one table of all values.",
 )
 @database_option
-def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
-    """Write runs (all, or those named) as JSON documents."""
+def export(versions: tuple[str, ...], out: Path | None, form: str, database: str) -> None:
+    """Write runs (all, or those named) as JSON documents, or all values as one table."""
     from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.store.transfer import encoded, export_runs
 
+    if form != "json" and (out is None or (versions and form == "months")):
+        raise click.UsageError(
+            f"--format {form} writes " + ("all runs; name none" if out else "files: say --out")
+        )
     with history_of(database) as history:
+        if form == "months":
+            from spook_tracker.tracker.store.months import export_months
+
+            click.echo(f"{len(export_months(history, Path(str(out))))} files written in {out}")
+            return
+        if form in ("csv", "parquet"):
+            from spook_tracker.tracker.store.table import write_table
+
+            count = write_table(history.to_dataframe(versions), Path(str(out)), form)
+            click.echo(f"{count} values in {out}")
+            return
         if out is not None:
             click.echo(f"{len(export_runs(history, out, versions))} runs in {out}")
             return
@@ -35,14 +62,17 @@ def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
 def import_files(files: tuple[Path, ...], database: str) -> None:
     """Record runs from JSON documents, whole or in short form; what is there already is left as it is."""
     from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.months import import_months, is_month
     from spook_tracker.tracker.store.record import record
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
     short = _short(files)
+    months = [file for file in files if is_month(file)]
     with session_on(database) as session:
-        done = read_in(session, [file for file in files if file not in short])
+        done = read_in(session, [file for file in files if file not in short and file not in months])
         new = sum(record(session, document) for document in short.values())
-    stored, present = len(done.stored) + new, len(done.present) + len(short) - new
+        fresh, known = import_months(session, months)
+    stored, present = len(done.stored) + new + fresh, len(done.present) + len(short) - new + known
     click.echo(f"{stored} runs recorded, {present} were there already")
 
 
@@ -120,8 +150,9 @@ def copy(source: str, target: str) -> None:
 
 
 @db.command(epilog=example("tracker db stats"))
+@json_option
 @database_option
-def stats(database: str) -> None:
+def stats(as_json: bool, database: str) -> None:
     """Say how much is stored."""
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.storage_counts import statistics
@@ -131,6 +162,11 @@ def stats(database: str) -> None:
         found = statistics(opened)
     finally:
         opened.dispose()
+    if as_json:
+        from spook_tracker.tracker.cli.report_json import stats_json
+
+        click.echo(stats_json(found))
+        return
     click.echo(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
     for engine, runs in found.engines.items():
         click.echo(f"  {runs} runs of {engine}")

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import number
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.series_history import Judged, Told, blame
+from spook_tracker.tracker.judge.series_history import Judged, Told, blame, in_lanes
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import badness, half_width
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
@@ -152,10 +152,14 @@ def causes_tonight(findings: Sequence[Finding]) -> list[Cause]:
 
 def hits_of(told: Told) -> list[Hit]:
     """Every worsening of one series, oldest first, each with what became of it."""
+    return [hit for nights, over in in_lanes(told) for hit in _hits_in(told, nights, over)]
+
+
+def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[Hit]:
     found: list[Hit] = []
     open_from = 0  # hits from here on are of the present red stretch
     last: Any = None  # where the series last became worse
-    for judged in told.nights:
+    for judged in nights:
         if judged.red:
             if judged.worse_at is not last or open_from == len(found):
                 found.append(_hit(told.key, told.definition, judged))
@@ -171,6 +175,10 @@ def hits_of(told: Told) -> list[Hit]:
                 replace(hit, standing=_ended(hit, judged), end=end) for hit in found[open_from:]
             ]
             open_from = len(found)
+    if over is not None:
+        found[open_from:] = [
+            replace(hit, standing="recovered", end=over.night.run) for hit in found[open_from:]
+        ]
     return found
 
 

@@ -28,7 +28,7 @@ from spook_tracker.tracker.judge.series_history import (
 )
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
-from spook_tracker.tracker.judge.tonight import map_key
+from spook_tracker.tracker.judge.tonight import map_key, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
 from spook_tracker.tracker.judge.work import FAMILIES
@@ -89,7 +89,8 @@ def known(told: Mapping[str, Told], before: str, after: str) -> Known:
         level, threshold = old.usual
         usual[key] = (_time(old), threshold) if old.red else (level, threshold)
         if new is not None:
-            values[key] = (_time(old), _time(new))
+            confirmed = new.confirms and old.state == "suspected"  # by what both are slower than
+            values[key] = (level if confirmed else _time(old), _time(new))
             if new.state == "suspected":
                 suspected.add(key)
     return Known(usual=usual, values=values, suspected=frozenset(suspected), first_bad=first_bad)
@@ -127,13 +128,13 @@ def compare(
         changes += [_in_history(change, history) for change in run_times(before.samples, after.samples)]
     changes = [_blamed(_accept(change, accepted, after.night), history.first_bad) for change in changes]
     changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
-    verdict = _overall(changes)
+    verdict = overall(changes)
     return CompareDocument(
         schema_version=1,
         before=before.side,
         after=after.side,
         verdict=verdict,
-        exit_code={"regressed": 1, "not_comparable": 3}.get(verdict, 0),  # type: ignore[arg-type]
+        exit_code=exit_code(verdict),
         counts=dict(Counter(change.word for change in changes)),
         changes=tuple(changes),
         frontiers=tuple(frontiers(before.samples, after.samples, same_machine)),
@@ -163,7 +164,7 @@ def compare_in(
     return compare(earlier, later, accepted, known(told, old.id, new.id))
 
 
-def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regressed", "not_comparable"]:
+def overall(changes: Sequence[Change]) -> Literal["identical", "same", "regressed", "not_comparable"]:
     """Red before anything; then whether what decides could be compared at all."""
     if any(change.red for change in changes):
         return "regressed"
@@ -173,6 +174,11 @@ def _overall(changes: Sequence[Change]) -> Literal["identical", "same", "regress
         return "not_comparable"
     told = [change for change in compared if change.kind not in TIMES] or compared
     return "identical" if all(change.word == "identical" for change in told) else "same"
+
+
+def exit_code(verdict: str) -> Literal[0, 1, 3]:
+    """What a command ends with."""
+    return 1 if verdict == "regressed" else 3 if verdict == "not_comparable" else 0
 
 
 def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> list[Change]:
@@ -370,6 +376,13 @@ def _notes(before: ComparedRun, after: ComparedRun, changes: Sequence[Change]) -
         notes.append("values are not compared: the runs are of different float environments")
     if before.side.engine != after.side.engine:
         notes.append(f"different engines: {before.side.engine} and {after.side.engine}")
+    if before.side.float_environment == after.side.float_environment:
+        told = [
+            (change.test, Verdict(word=change.word, sentence=change.sentence))
+            for change in changes
+            if change.kind not in ("work", *TIMES)
+        ]
+        notes += not_compared(told)
     lost = sum(
         change.before_outcome in NO_VALUE and change.after_outcome in NO_VALUE and change.role != "reported"
         for change in changes

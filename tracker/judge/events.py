@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.judge.series_history import Judged, Told
+from spook_tracker.tracker.judge.series_history import Judged, Told, in_lanes
 from spook_tracker.tracker.judge.vocabulary import Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]
@@ -55,9 +55,14 @@ def name_of(judged: Judged) -> str:
 
 def events_of(told: Told) -> list[Event]:
     """The red stretches of one series, oldest first."""
+    return [event for nights, over in in_lanes(told) for event in _events_in(told, nights, over)]
+
+
+def _events_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[Event]:
+    """The red stretches among nights judged against each other; `over` is what ended them."""
     found: list[Event] = []
     stretch: list[Judged] = []
-    for judged in told.nights:
+    for judged in nights:
         if judged.red:
             stretch.append(judged)
         elif stretch and judged.state != "suspected":
@@ -67,7 +72,7 @@ def events_of(told: Told) -> list[Event]:
         elif judged.state == "accepted":
             found.append(_event(told, [judged], "accepted", judged))
     if stretch:
-        found.append(_event(told, stretch, "detected", None))
+        found.append(_event(told, stretch, "recovered" if over else "detected", over))
     return found
 
 

@@ -25,7 +25,8 @@ from spook_tracker.tracker.document.wording import instant
 from spook_tracker.tracker.judge.calibration import ladder_timing
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
-RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings
+RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
+SPARSE = 16  # of those before them one in so many, so that what was lost then is not forgotten
 
 
 class Records(Protocol):
@@ -34,6 +35,7 @@ class Records(Protocol):
     def runs(self, engine: str | None = None) -> Sequence[Any]: ...
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
     def samples(self, run_id: str) -> Samples: ...
+    def samples_of(self, run_ids: Sequence[str], tests: set[str] | None) -> Mapping[str, Samples]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
 
 
@@ -51,6 +53,17 @@ def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
         aside = elsewhere(before, run)
         before = [other for other in before if other.engine.git_hash not in aside]
     return [*before, of_engine[place]]
+
+
+def forked_from(runs: Sequence[Any], run: Any, main_line: set[str]) -> Any:
+    """The nearest measured ancestor of a run on the main line; where that is not known, the run before it.
+
+    None if nothing was measured before.
+    """
+    before = line_of(runs, run)[:-1]
+    on_main = [other for other in before if other.engine.git_hash in main_line]
+    others = [other for other in before if other.engine.git_hash != run.engine.git_hash]
+    return next(reversed(on_main or others), None)
 
 
 def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
@@ -80,7 +93,10 @@ def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
 
 
 def lines(runs: Sequence[Any]) -> list[list[Any]]:
-    """One line of runs per engine, up to its newest; first the engine of the newest run that was not imported."""
+    """One line of runs per engine, up to its newest; first the engine of the newest run that was not imported.
+
+    Runs of other branches stand in no line: they are judged by themselves, against the commit they forked from.
+    """
     if not runs:
         return []
     own = [run for run in runs if run.trigger != "import"] or runs
@@ -95,8 +111,15 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     This is what `latest` and `previous` choose from on the command line.
     """
     newest = max(runs, key=_started)
-    versioned = any(_placed(run) for run in runs)
-    return [run for run in runs if _placed(run) or run is newest or not versioned]
+    placed = [run for run in runs if _placed(run)]
+    if not placed:
+        return list(runs)
+    line = line_of(placed, placed[-1])
+    here = {run.id for run in line}
+    aside = [run for run in placed if run.id not in here]
+    if aside and len(other := line_of(placed, aside[-1])) > len(line):
+        line = other  # a branch that was measured once is not what the history is about
+    return line if _placed(newest) else [*line, newest]
 
 
 def _started(run: Any) -> datetime:
@@ -112,7 +135,9 @@ def histories(
 ) -> dict[str, SeriesHistory]:
     """The histories of all series (or those named) over these runs, the made ones among them."""
     place = {run.id: run for run in runs}
-    recent = {run.id: records.samples(run.id) for run in runs[-RECENT:]}
+    tests = None if keys is None else {key.partition("/")[0] for key in keys}
+    looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
+    recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
     for key, stored in records.series(keys, evidence=False).items():
         points = []
@@ -122,9 +147,19 @@ def histories(
                 points.append(Point(place[run.id], evidence[1] if evidence else sample, version))
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
-    found = with_missing(found, runs[-RECENT:], recent)
-    tests = None if keys is None else {key.partition("/")[0] for key in keys}
-    return found | run_times(found) | work(runs[-RECENT:], recent, tests)
+    found = with_missing(found, [run for run in runs if run.id in recent or _says(run)], recent)
+    return found | run_times(found) | work(looked_at, recent, tests)
+
+
+def looked_at_again(count: int, recent: int) -> list[int]:
+    """Places of the nights that are looked at closely: the last ones, and one in `SPARSE` before them."""
+    dense = max(0, count - recent)
+    return [*range(0, dense, SPARSE), *range(dense, count)]
+
+
+def _says(run: Any) -> bool:
+    """Whether a run tells what it was asked for."""
+    return getattr(run, "asked", None) is not None
 
 
 def work(

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 from spook_tracker.tracker.document.order import time_at_error
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.judge.standing import against_limit
+from spook_tracker.tracker.judge.vocabulary import Class
 
 ERRORS = (1e-2, 1e-4, 1e-6)
 STEP = 1.0 / 60.0  # s
@@ -43,6 +45,45 @@ class Lead:
     unit: str
     ahead: str
     factor: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What one engine says to the question of a gate, in the configuration that it names first."""
+
+    engine: str
+    definition: SeriesDefinition | None  # None: it was not asked
+    sample: Sample | None
+    stands: Class  # for the limit alone
+
+
+def question(definition: SeriesDefinition) -> tuple[object, ...]:
+    """What makes two series of different engines the same question: all but the configuration."""
+    parameters = tuple(sorted(definition.parameters.items()))
+    return definition.test, definition.kind, definition.metric, definition.time_step, parameters
+
+
+def answers(
+    gates: Sequence[SeriesDefinition], engines: Mapping[str, Samples]
+) -> list[tuple[SeriesDefinition, list[Answer]]]:
+    """Every gate with what each engine says to it."""
+    first: dict[str, dict[tuple[object, ...], tuple[SeriesDefinition, Sample]]] = {}
+    for name, samples in engines.items():
+        asked = first.setdefault(name, {})
+        for definition, sample in samples.values():
+            asked.setdefault(question(definition), (definition, sample))
+    return [(gate, [_answer(gate, name, asked) for name, asked in first.items()]) for gate in gates]
+
+
+def _answer(
+    gate: SeriesDefinition, engine: str, asked: Mapping[tuple[object, ...], tuple[SeriesDefinition, Sample]]
+) -> Answer:
+    definition, sample = asked.get(question(gate), (None, None))
+    if definition is None or sample is None:
+        return Answer(engine=engine, definition=None, sample=None, stands="none")
+    return Answer(
+        engine=engine, definition=definition, sample=sample, stands=against_limit(definition, sample)
+    )
 
 
 def standings(engines: Mapping[str, Samples]) -> list[Standing]:

@@ -67,11 +67,16 @@ def visible(change: Change) -> bool:
     """A change of class, or of value beyond rounding; what a busy machine does says nothing here."""
     if change.kind in ("time", "run_time", "work") or change.before is None or change.after is None:
         return False
-    if "timed_out" in (change.before_outcome, change.after_outcome):
+    outcomes = (str(change.before_outcome), str(change.after_outcome))
+    return moved(float(change.before), float(change.after), outcomes)
+
+
+def moved(before: float, after: float, outcomes: tuple[str, str]) -> bool:
+    """Whether a value is another one to a reader of releases: another outcome, or more than rounding."""
+    if "timed_out" in outcomes:
         return False
-    if change.before_outcome != change.after_outcome:
+    if outcomes[0] != outcomes[1]:
         return True
-    before, after = float(change.before), float(change.after)
     if before == after or (before != before and after != after):
         return False
     return not abs(after - before) <= max(SEEN * max(abs(before), abs(after)), NOTHING)

@@ -12,21 +12,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, unquiet
+from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.slower import Usual, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
-from spook_tracker.tracker.judge.verdict import Verdict, judge, same_bits
+from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class, State
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
-NOISY_NIGHTS = 400  # how far back run times are judged again
+NOISY_NIGHTS = 400  # how far back run times are judged again night by night
 LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that is called drift, too
 IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 
@@ -107,7 +108,49 @@ def judge_history(
     taken = [level for level in accepted if level.names(key)]
     if is_noisy(definition):
         return _judge_times(key, definition, history, taken)
-    return list(_judge_values(key, definition, history, taken))
+    lanes = lanes_of(history, _question)
+    if len(lanes) < 2:
+        return list(_judge_values(key, definition, history, taken))
+    found: dict[int, Judged] = {}
+    for places in lanes:
+        told = _judge_values(key, definition, [history[i] for i in places], taken)
+        found |= zip(places, told, strict=True)
+        if (start := places[0]) > 0 and found[start].verdict.word == "new":
+            why = Verdict(word="not_comparable", sentence=_why_not(history[start - 1], history[start]))
+            found[start] = replace(found[start], verdict=why)
+    return [found[place] for place in range(len(history))]
+
+
+def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
+    """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
+    lanes: dict[Hashable, list[int]] = {}
+    for place, night in enumerate(history):
+        lanes.setdefault(lane(night), []).append(place)
+    return list(lanes.values())
+
+
+def _question(night: Point) -> Hashable:
+    """Values are comparable under one definition of the test in one float environment."""
+    return night.test_version, night.run.machine.float_environment
+
+
+def _clock(night: Point) -> Hashable:
+    """Run times are comparable under one definition of the test on one machine."""
+    return night.test_version, night.run.machine.fingerprint
+
+
+def in_lanes(told: Told) -> list[tuple[list[Judged], Judged | None]]:
+    """The nights of a series that were judged against each other, and the night that ended them.
+
+    A lane ends where the definition of the test changes for good.
+    """
+    nights = told.nights
+    lanes = lanes_of([judged.night for judged in nights], _clock if is_noisy(told.definition) else _question)
+    found = []
+    for places in lanes:
+        over = nights[places[-1]].night.test_version != nights[-1].night.test_version
+        found.append(([nights[i] for i in places], nights[places[-1] + 1] if over else None))
+    return found
 
 
 def is_noisy(definition: SeriesDefinition) -> bool:
@@ -301,7 +344,7 @@ def _comparable(before: Point, after: Point) -> bool:
 
 def _why_not(before: Point, after: Point) -> str:
     if before.test_version != after.test_version:
-        return "the definition of the test changed"
+        return NEW_DEFINITION
     return "measured in another float environment"
 
 
@@ -309,18 +352,16 @@ def _judge_times(
     key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> list[Judged]:
     """Run times: each machine and each definition of the test is a history of its own."""
-    lanes: dict[tuple[str, str], list[int]] = {}
-    for place, night in enumerate(history):
-        lanes.setdefault((night.run.machine.fingerprint, night.test_version), []).append(place)
     found: dict[int, Judged] = {}
     old = Verdict(word="same", sentence="too long ago to be judged again")
-    for every in lanes.values():
+    for every in lanes_of(history, _clock):
         loud = {place: why for place in every if (why := unquiet(history[place]))}
-        for place in (*every[:-NOISY_NIGHTS], *loud):
+        again = [every[i] for i in looked_at_again(len(every), NOISY_NIGHTS)]
+        for place in (*sorted(set(every) - set(again)), *loud):
             own = standing(definition, history[place].sample)
             said = Verdict(word="not_comparable", sentence=loud[place]) if place in loud else old
             found[place] = Judged(night=history[place], verdict=said, state="green", stands=own)
-        places = [place for place in every[-NOISY_NIGHTS:] if place not in loud]
+        places = [place for place in again if place not in loud]
         lane = [history[place] for place in places]
         values = engines_own(lane)
         taken = [

@@ -47,6 +47,15 @@ def standing(definition: SeriesDefinition, sample: Sample) -> Class:
     return "pass" if sample.set_point_held or definition.set_point is None else "watch"
 
 
+def against_limit(definition: SeriesDefinition, sample: Sample) -> Class:
+    """What a value is for its limit alone, whoever's it is: engines that decide nothing are shown for what they are."""
+    if sample.outcome == NOT_SUPPORTED:
+        return "none"
+    if not honest(sample).passed:
+        return "fail"
+    return "followed" if definition.limit is None else "pass"
+
+
 def is_red(definition: SeriesDefinition, sample: Sample) -> bool:
     """A broken limit, a set point left, or no value where one is expected."""
     return standing(definition, sample) in ("fail", "watch")

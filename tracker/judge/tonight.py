@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,8 +12,10 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.lane import Records, histories, line_of
 from spook_tracker.tracker.judge.series_history import Judged, Told, blame, commit_of, judge_all
-from spook_tracker.tracker.judge.verdict import Verdict, judge_map
+from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge_map
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
+
+MOST_NAMED = 8  # tests in one sentence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +100,20 @@ def worst_first(findings: Sequence[Finding]) -> list[Finding]:
         return not finding.red, stands, not finding.news, finding.series
 
     return sorted(findings, key=rank)
+
+
+def not_compared(verdicts: Iterable[tuple[str, Verdict]]) -> list[str]:
+    """A sentence for each reason why series of some tests could be compared with nothing: how many, and of which."""
+    counts: dict[str, Counter[str]] = {}
+    for test, verdict in verdicts:
+        if verdict.word == "not_comparable":
+            counts.setdefault(verdict.sentence.partition(",")[0], Counter())[test] += 1
+    said = []
+    for why, tests in sorted(counts.items()):
+        named = ", ".join(sorted(tests)[:MOST_NAMED]) + (" …" if len(tests) > MOST_NAMED else "")
+        ask = "; to compare, put today's to the old commit: tracker backfill COMMIT" * (why == NEW_DEFINITION)
+        said.append(f"not compared, {tests.total()} series of {len(tests)} tests ({named}): {why}{ask}")
+    return said
 
 
 def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Finding]:

@@ -41,6 +41,7 @@ LAST_BITS = 16  # doubles apart: a limit crossed by so few is a matter of roundi
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
 ROUNDING = {"ladder": 1e-10}  # of the reference or of 1: what is rounding where no limit gives a scale
 ROUNDING_ELSE = 1e-12
+NEW_DEFINITION = "the definition of the test changed"
 CELL_RANK = {"settled": 0, "bounded": 1, "growing": 2, "diverged": 3, "not_finite": 4}
 
 
@@ -71,7 +72,7 @@ def judge(
 ) -> Verdict:
     """Compare two samples of a series without noise. `definition` is the later one's."""
     if not same_definition:
-        return _incomparable("the definition of the test changed")
+        return _incomparable(NEW_DEFINITION)
     if not same_environment:
         return _incomparable("measured in another float environment")
     if "not_supported" in (before.outcome, after.outcome):

@@ -8,7 +8,7 @@ from typing import Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.run_document import EngineVersion, StageChoice, TestCard
-from spook_tracker.tracker.measure.commit import subject_and_author
+from spook_tracker.tracker.measure.commit import changed_since, subject_and_author
 from spook_tracker.tracker.measure.question import ask, sentence
 from spook_tracker.tracker.measure.scene_drawing import drawing
 
@@ -58,16 +58,14 @@ def explained(test: ScalarTest, engine: Any) -> Any:
 def engine_version(engine: Any) -> EngineVersion:
     """The engine's own account of what it was built from."""
     info = engine.build_info
-    here = [
-        Path.cwd(),
-        *map(Path, getattr(engine, "__path__", ())),
-    ]  # an editable build lies in its repository
-    subject, author = subject_and_author(info.git_hash, here)
+    own = [*map(Path, getattr(engine, "__path__", ()))]  # an editable build lies in its repository
+    subject, author = subject_and_author(info.git_hash, [Path.cwd(), *own])
+    moved = not info.dirty and changed_since(info.git_hash, own)
     return EngineVersion(
         name=info.name,
-        version=info.version,
+        version=info.version + (("+", ".")["+" in info.version] + "dirty") * moved,
         git_hash=info.git_hash,
-        dirty=bool(info.dirty),
+        dirty=bool(info.dirty) or moved,
         commit_time=info.commit_time,
         parents=tuple(info.parents),
         compiler=info.compiler,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from collections.abc import Iterable
@@ -48,6 +49,24 @@ def tags(repository: Path) -> dict[str, str]:
         direct, peeled, name = line.split(" ", 2)
         found[name] = peeled or direct
     return found
+
+
+def fork_point(repository: Path, commit: str) -> set[str]:
+    """The commits of the main line that a commit builds on; empty where git cannot tell.
+
+    The main line is the branch a pull request is for (GITHUB_BASE_REF), else main or master.
+    """
+    asked = os.environ.get("GITHUB_BASE_REF", "")
+    names = [f"origin/{asked}", asked] if asked else ["origin/main", "main", "origin/master", "master"]
+    for name in names:
+        base = (
+            _git(repository, "merge-base", "--end-of-options", name, commit)
+            if HASH.fullmatch(commit)
+            else None
+        )
+        if base and HASH.fullmatch(base.strip()):
+            return set((_git(repository, "rev-list", base.strip()) or "").split())
+    return set()
 
 
 def order(repository: Path, hashes: Iterable[str]) -> list[str]:

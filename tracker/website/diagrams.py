@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
 from spook_tracker.tracker.document.wording import (
@@ -90,7 +90,11 @@ def grid_view(grid: Grid) -> View:
 
 
 def trend_chart(
-    trend: Trend, nights: Sequence[Night], events: Sequence[Event] = (), title: str = ""
+    trend: Trend,
+    nights: Sequence[Night],
+    events: Sequence[Event] = (),
+    title: str = "",
+    each: Literal["night", "version"] = "night",
 ) -> Chart:
     """A series over versions, with its limit, set point, reference, and where it became worse."""
     definition = trend.definition
@@ -143,7 +147,7 @@ def trend_chart(
     return Chart(
         name=f"v-{slug(definition.key)}",
         title=(f"{title}: " if title else "") + f"{named(definition)[0]} ({conditions(definition)})",
-        x_label="night",
+        x_label=each,
         y_label=f"{magnitude}value" + (f" [{definition.unit}]" if definition.unit != "1" else ""),
         lines=tuple(lines),
         y_scale=scale,
@@ -342,11 +346,14 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
                         f"{configuration}, the night before", before, of, colour, definition.unit
                     )
                     lines.append(_ghost(line))
-            if axis == "seconds":
-                lines += _peer_lines(peers, name, definition.unit, len(points))
+            everybody = [r for found in points.values() for r in found]
+            if axis == "seconds":  # what one engine counts, another does not
+                beside = _peer_rungs(peers, name)
+                lines += _peer_lines(beside, definition.unit, len(points))
+                everybody += [r for _, found in beside for _, r in found]
             if not any(line.x for line in lines):
                 continue
-            lines.append(_front([r for found in points.values() for r in found], of))
+            lines.append(_front(everybody, of))
             charts.append(
                 Chart(
                     name=f"{prefix}l-{slug(name)}-{axis}",
@@ -363,13 +370,40 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
     return charts
 
 
-def _peer_lines(peers: Peers, ladder: str, unit: str, colour: int) -> list[Line]:
-    """The ladders of other engines, after ours."""
+def _peer_rungs(peers: Peers, ladder: str) -> list[tuple[str, list[tuple[str, Rung]]]]:
+    """The ladders of other engines: engine, and its points with the configuration of each."""
+    return [
+        (
+            engine,
+            [
+                (configuration, rung)
+                for configuration, trends in ladders(test).get(ladder, {}).items()
+                for rung in rungs(trends, lambda t: t.latest)
+            ],
+        )
+        for engine, test in peers
+    ]
+
+
+def _peer_lines(
+    beside: Sequence[tuple[str, Sequence[tuple[str, Rung]]]], unit: str, colour: int
+) -> list[Line]:
+    """One line for each other engine, after ours: the points that no other configuration of it beats."""
     lines = []
-    for engine, test in peers:
-        for configuration, trends in ladders(test).get(ladder, {}).items():
-            found = rungs(trends, lambda t: t.latest)
-            lines.append(_ladder_line(f"{engine}: {configuration}", found, lambda r: r.seconds, colour, unit))
+    for engine, found in beside:
+        best, kept = math.inf, []
+        timed = [(c, r) for c, r in found if math.isfinite(r.seconds) and math.isfinite(r.error)]
+        for configuration, rung in sorted(timed, key=lambda one: one[1].seconds):
+            if abs(rung.error) < best:
+                best = abs(rung.error)
+                kept.append((configuration, rung))
+        if kept:
+            line = _ladder_line(engine, [r for _, r in kept], lambda r: r.seconds, colour, unit)
+            notes = tuple(
+                note.replace(engine, f"{engine}: {configuration}", 1)
+                for note, (configuration, _) in zip(line.notes, kept, strict=True)
+            )
+            lines.append(replace(line, notes=notes))
             colour += 1
     return lines
 

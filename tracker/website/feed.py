@@ -20,7 +20,7 @@ MOST_ENTRIES = 100
 COLOURS = {"pass": ("#00694d", "brightgreen"), "watch": ("#8a6100", "yellow"), "fail": ("#a93f00", "red")}
 
 
-def atom(book: Book, causes: Sequence[Cause]) -> bytes:
+def atom(book: Book, causes: Sequence[Cause], publisher: str = "SPOOK tracker") -> bytes:
     """One entry for every cause, and one more when the last of its series came back or was accepted."""
     ElementTree.register_namespace("", ATOM)
     feed = ElementTree.Element(f"{{{ATOM}}}feed")
@@ -29,7 +29,7 @@ def atom(book: Book, causes: Sequence[Cause]) -> bytes:
     _put(feed, "updated", _moment(book.tonight))
     ElementTree.SubElement(feed, f"{{{ATOM}}}link", {"href": "regressions.html"})
     author = ElementTree.SubElement(feed, f"{{{ATOM}}}author")
-    _put(author, "name", "SPOOK tracker")
+    _put(author, "name", publisher)
     news: list[tuple[Night, str, Cause]] = [(cause.bad, "red", cause) for cause in causes]
     for cause in causes:
         ends = [hit.end for hit in cause.hits if hit.end is not None]

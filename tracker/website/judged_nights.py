@@ -14,13 +14,13 @@ from typing import Any
 
 from spook_tracker.tracker.document.json_form import boxed
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
-from spook_tracker.tracker.document.wording import clean, conditions, named, page_of
+from spook_tracker.tracker.document.wording import clean, conditions, named, page_of, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off
 from spook_tracker.tracker.judge.work import Samples, with_work
 from spook_tracker.tracker.website.folder import digest
-from spook_tracker.tracker.website.nights import Book, Night, Records
+from spook_tracker.tracker.website.nights import Book, Chapter, Night, Records
 
 BLOCK = 32  # nights in a file
 OUTCOMES = (
@@ -136,24 +136,31 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
     return found
 
 
+def file_stem(chapter: Chapter, book: Book) -> str:
+    """What the files of an engine's nights are called, before their number."""
+    return "nights" if chapter is book else f"{slug(chapter.name)}-nights"
+
+
 def files(history: Records, book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
     """The files of the page: path, what each is made from, and how."""
-    told = {t.definition.key: t.told for test in book.tests for t in test.trends}
-    marks = all_marks(told)
-    for number in range(0, len(book.nights), BLOCK):
-        nights = book.nights[number : number + BLOCK]
-        facts = [
-            (night.id, night.started, night.trigger, repr(night.asked), marks.get(night.id))
-            for night in nights
-        ]
-        yield (
-            f"compare/nights-{number // BLOCK}.js",
-            digest(repr(facts).encode("utf-8", "replace")).encode(),
-            partial(_block, history, number // BLOCK, nights, marks),
-        )
+    for chapter in book.engines:
+        told = {t.definition.key: t.told for test in chapter.tests for t in test.trends}
+        marks = all_marks(told)
+        for number in range(0, len(chapter.nights), BLOCK):
+            nights = chapter.nights[number : number + BLOCK]
+            facts = [
+                (night.id, night.started, night.trigger, repr(night.asked), marks.get(night.id))
+                for night in nights
+            ]
+            name = f"{file_stem(chapter, book)}-{number // BLOCK}"
+            yield (
+                f"compare/{name}.js",
+                digest(repr(facts).encode("utf-8", "replace")).encode(),
+                partial(_block, history, name, nights, marks),
+            )
 
 
-def _block(history: Records, number: int, nights: Sequence[Night], marks: Mapping[str, Marks]) -> bytes:
+def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[str, Marks]) -> bytes:
     texts = Texts()
     rows: dict[str, list[Row]] = {}
     last: dict[str, Row] = {}
@@ -172,18 +179,20 @@ def _block(history: Records, number: int, nights: Sequence[Night], marks: Mappin
                 last[key] = row
     definitions = [json.loads(text) for text in texts.definitions]
     whole = {"texts": list(texts.texts), "definitions": definitions, "nights": sides, "rows": rows}
-    return f"comparedNights({number},{_json(whole)});\n".encode()
+    return f"comparedNights({_json(name)},{_json(whole)});\n".encode()
 
 
 def described(book: Book) -> dict[str, list[str]]:
-    """Title, words and page of every series."""
+    """Title, words and page of every series; another engine's under the title and page of our test."""
+    ours = {test.name: test for test in book.tests}
     return {
         t.definition.key: [
-            clean(test.card.title),
+            clean(ours.get(test.name, test).card.title),
             clean(f"{named(t.definition)[0]} ({conditions(t.definition)})"),
-            page_of(test.name),
+            page_of(test.name) if test.name in ours else "engines.html",
         ]
-        for test in book.tests
+        for chapter in reversed(book.engines)
+        for test in chapter.tests
         for t in test.trends
     }
 

@@ -120,28 +120,44 @@ class TestHistory:
 
 
 @dataclass
-class Book:
-    """All that the website tells: the nights of one engine in order, and its tests."""
+class Chapter:
+    """One engine: its nights in order, at least one, and its tests."""
 
     nights: list[Night]
     tests: list[TestHistory]
-    others: list[tuple[Night, list[TestHistory]]] = field(default_factory=list)  # other engines, newest night
-
-    def peers(self, test: str) -> list[tuple[str, TestHistory]]:
-        """The same test put to other engines, where it ran on the machine of tonight."""
-        machine = self.tonight.machine.fingerprint if self.nights else ""
-        return [
-            (f"{night.engine.name} {version(night.engine)}", found)
-            for night, tests in self.others
-            if night.machine.fingerprint == machine
-            for found in tests
-            if found.name == test
-        ]
 
     @property
     def tonight(self) -> Night:
         """The newest night."""
         return self.nights[-1]
+
+    @property
+    def name(self) -> str:
+        """The engine's."""
+        return self.tonight.engine.name
+
+
+@dataclass
+class Book(Chapter):
+    """All that the website tells: the engine it is about, and beside it the others."""
+
+    others: list[Chapter] = field(default_factory=list)
+
+    @property
+    def engines(self) -> list[Chapter]:
+        """Every engine, ours first."""
+        return [self, *self.others]
+
+    def peers(self, test: str) -> list[tuple[str, TestHistory]]:
+        """The same test put to other engines, where it ran on the machine of tonight."""
+        machine = self.tonight.machine.fingerprint if self.nights else ""
+        return [
+            (f"{chapter.name} {version(chapter.tonight.engine)}", found)
+            for chapter in self.others
+            if chapter.tonight.machine.fingerprint == machine
+            for found in chapter.tests
+            if found.name == test
+        ]
 
 
 class Records(Protocol):
@@ -150,6 +166,9 @@ class Records(Protocol):
     def runs(self, engine: str | None = None) -> Sequence[Any]: ...
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
     def samples(self, run_id: str) -> Mapping[str, tuple[SeriesDefinition, Sample]]: ...
+    def samples_of(
+        self, run_ids: Sequence[str], tests: set[str] | None
+    ) -> Mapping[str, Mapping[str, tuple[SeriesDefinition, Sample]]]: ...
     def cards(self, run_id: str) -> Sequence[TestCard]: ...
     def figures(self, run_id: str) -> Sequence[FigureData]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
@@ -162,9 +181,8 @@ def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
     if not runs:
         return Book([], [])
     first, *others = lines(runs)
-    nights, tests = _chapter(history, first, accepted)
     chapters = [_chapter(history, line, accepted) for line in others]
-    return Book(nights, tests, [(found[-1], their_tests) for found, their_tests in chapters])
+    return Book(*_chapter(history, first, accepted), [Chapter(*chapter) for chapter in chapters])
 
 
 def _chapter(

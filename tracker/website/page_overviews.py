@@ -22,7 +22,7 @@ from spook_tracker.tracker.website.diagrams import (
 )
 from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
-from spook_tracker.tracker.website.judged_nights import BLOCK
+from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
 from spook_tracker.tracker.website.page_rows import Page, address, row
@@ -113,17 +113,17 @@ def compare(told: Comparisons, book: Book) -> Page:
             "changes": pair["changes"][:MOST_CHANGES],
             "left_out": max(0, len(pair["changes"]) - MOST_CHANGES),
         }
-    nights = [*book.nights, *(night for night, _ in book.others)]
-    names = [f"{clean(night.engine.name)} " for night in nights]
-    names[: len(book.nights)] = [""] * len(book.nights)
-    choices = [
-        [night.id, name + choice(night)["label"], choice(night)["hash"]]
-        for night, name in zip(nights, names, strict=True)
-    ]
+    choices = []
+    for chapter in book.engines:
+        name = "" if chapter is book else f"{clean(chapter.name)} "
+        for night in chapter.nights:
+            made = choice(night)
+            choices.append([night.id, name + made["label"], made["hash"]])
+    engines = [[file_stem(chapter, book), len(chapter.nights)] for chapter in book.engines]
     context = {
         "versions": choices,
         "first": first,
-        "choices": {"nights": choices, "own": len(book.nights), "block": BLOCK},
+        "choices": {"nights": choices, "engines": engines, "block": BLOCK},
     }
     return Page("compare.html", "compare.html", "Compare two versions", "Two versions side by side.", context)
 
@@ -155,7 +155,6 @@ def versions(book: Book) -> Page:
             {"machine": machine, "anchor": slug(machine.fingerprint), "nights": count}
             for machine, count in machines.most_common()
         ],
-        "others": [(night, len(tests)) for night, tests in book.others],
     }
     return Page("versions.html", "versions.html", "Versions and machines", "What ran where.", context)
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from spook_tracker.tracker.document.wording import clean
 from spook_tracker.tracker.judge.causes import Cause
-from spook_tracker.tracker.website import page_overviews
+from spook_tracker.tracker.website import page_engines, page_overviews
 from spook_tracker.tracker.website.comparisons import Comparisons
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.live_module import live_page
@@ -22,6 +22,7 @@ NAVIGATION = (
     ("error-time.html", "Error and run time"),
     ("stability.html", "Stability"),
     ("live.html", "Live"),
+    ("engines.html", "Engines"),
     ("compare.html", "Compare"),
     ("regressions.html", "Regressions"),
     ("versions.html", "Versions"),
@@ -56,6 +57,10 @@ def pages(
     yield Planned("error-time.html", "Error against run time", partial(page_overviews.error_time, book))
     yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, events))
     yield Planned("live.html", "Live", partial(live_page, module))
+    yield Planned("engines.html", "Engines", partial(page_engines.engines, book))
+    for chapter in book.others:
+        path = page_engines.engine_address(chapter.name)
+        yield Planned(path, clean(chapter.name), partial(page_engines.engine_page, book, chapter))
     yield Planned("compare.html", "Compare", lambda: page_overviews.compare(compared(), book))
     yield Planned("regressions.html", "Regressions", partial(page_overviews.regressions, book, causes))
     yield Planned("versions.html", "Versions", partial(page_overviews.versions, book))

@@ -23,11 +23,13 @@ class PrintError(TrackerError):
     """The document cannot be printed here."""
 
 
-def one_file(history: Records, accepted: Sequence[Accepted] = ()) -> str:
+def one_file(
+    history: Records, accepted: Sequence[Accepted] = (), title: str = "", home_page: str = ""
+) -> str:
     """The newest night's document as one HTML file: style inside, no script, no reference to another file."""
     with tempfile.TemporaryDirectory() as folder:
         site = Path(folder) / "site"
-        publish(history, site, accepted)
+        publish(history, site, accepted, None, title, home_page)
         document = site / "document.html"
         if not document.exists():
             raise PrintError("no night is recorded yet; record one with: tracker run")

@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 
 from spook_tracker.tracker.document.json_form import plain
-from spook_tracker.tracker.document.wording import clean, slug
+from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
@@ -59,7 +59,14 @@ ASSETS = {  # name in templates: file under site/static
     "live_engine": "live-engine.js",
     "live": "live.js",
 }
-PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt", "three-LICENSE.txt")
+TITLE = "SPOOK tracker"  # of the website, unless a team says otherwise
+PLAIN_ASSETS = (
+    "icon.svg",
+    "formulas.woff2",
+    "formulas-LICENSE.txt",
+    "plotly-LICENSE.txt",
+    "three-LICENSE.txt",
+)
 
 
 @dataclass(frozen=True)
@@ -78,12 +85,17 @@ class Report:
 
 
 def publish(
-    history: Records, out: Path, accepted: Sequence[Accepted] = (), database: bytes | None = None
+    history: Records,
+    out: Path,
+    accepted: Sequence[Accepted] = (),
+    database: bytes | None = None,
+    title: str = "",
+    home_page: str = "",
 ) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
-    the file of the database, where readers shall be able to load it. What cannot be made says so in its place,
+    the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is. What cannot be made says so in its place,
     and everything else is published.
     """
     site = resource("site")
@@ -94,6 +106,7 @@ def publish(
     made = environment(templates)
     told = book(history, accepted)
     failed: list[str] = []
+    whose = {"site_title": clean(title) or TITLE, "home_page": web_address(home_page)}
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
@@ -112,7 +125,7 @@ def publish(
 
         def render(page: Page) -> tuple[str, bytes]:
             """The page and what it is made from."""
-            context = _context(page, names, night) | {"database": database is not None}
+            context = _context(page, names, night) | {"database": database is not None} | whose
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
             if folder.unchanged(page.path, source):
                 return source, b""
@@ -127,7 +140,7 @@ def publish(
                 context = {"what": planned.title, "reason": reason}
                 source, text = render(Page(planned.path, "failed.html", planned.title, "", context))
             folder.add(planned.path, source, partial(bytes, text))
-        files = _data(told, events, causes)
+        files = _data(told, events, causes, str(whose["site_title"]))
         if told.nights:
             files = chain(
                 files, _stored(compared, levels, told, accepted), judged_nights.files(history, told)
@@ -164,7 +177,7 @@ def _stored(
     yield "compare/newest.js", script, partial(bytes, script)
 
 
-def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause]) -> Iterator[File]:
+def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: str) -> Iterator[File]:
     """Files of numbers."""
     if not told.nights:
         return
@@ -191,7 +204,7 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause]) -> Itera
         )
         yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
         yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
-    news = feed.atom(told, causes)
+    news = feed.atom(told, causes, author)
     yield "feed.xml", news, partial(bytes, news)
     state, found = health(told)
     words = feed.badge_words(found)

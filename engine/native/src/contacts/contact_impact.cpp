@@ -50,7 +50,7 @@ void ContactStage::impact(MixedSystem& system) {
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         if (point.bounce < 0.0 || (successive && !(point.approach < -point.rounding))) continue;
-        RowBlock block = row_block(point, point.material.friction > 0.0);
+        RowBlock block = row_block(point, point.material.friction > 0.0 ? 3 : 1);
         for (int i = 0; i < block.size; ++i) pushed_by_motion = pushed_by_motion || block.right[i] != 0.0;
         block.right[0] += std::max(0.0, -point.bounce * point.approach);
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;

@@ -33,9 +33,10 @@ void ContactStage::hand_over() {
         row.normal_before = point.before;
         row.impulse[0] = std::max(0.0, point.before);
         std::copy_n(point.tangent_before, 2, row.impulse + 1);
-        if (row.first < 0 || row.second < 0) {
+        if (conveys_ || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, cross(row.normal, row.tangent)};
             for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
+            for (int i = 1; i < 3; ++i) row.right[i] -= carried(point, directions[i]);
         }
         row.right[0] += resting_right(point);
         sweeps_.add(row);
@@ -49,8 +50,10 @@ bool ContactStage::find_more() {
         next_[b] = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
     if (outrun(next_)) find_open();
     const std::size_t known = points_.size();
-    if (open_.empty() || find_strikes(next_, true) == 0) return false;
-    take_back_strikes(known, next_);
+    const bool turned = find_turned(next_);
+    const std::size_t taken = points_.size();
+    if (find_strikes(next_, true) > 0) take_back_strikes(taken, next_);
+    else if (!turned) return false;
     counters_.contacts += points_.size() - known;
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];

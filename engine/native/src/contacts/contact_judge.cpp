@@ -34,24 +34,24 @@ double bounded_residual(const RowBlock& block, int i, double own, const std::vec
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                            FrictionModel model) {
     RowsResidual worst;
-    std::vector<const FrictionPoint*> friction(system.rows.size(), nullptr);
-    for (const FrictionPoint& point : points) friction[point.block] = &point;
+    std::size_t next = 0;
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         double residual = 0.0;
-        const FrictionPoint* point = friction[k];
-        for (int i = 0; i < (point ? 1 : block.size); ++i) {
+        const bool rubs = next < points.size() && points[next].block == static_cast<int>(k);
+        for (int i = 0; i < (rubs ? 1 : block.size); ++i) {
             const double own = own_inertia(system, block, i);
             if (own > 0.0) residual = std::max(residual, bounded_residual(block, i, own, system.velocity));
         }
-        if (point) {
-            const double own = own_inertia(system, block, 1) + own_inertia(system, block, 2);
-            const double nu =
-                std::max(0.0, model == FrictionModel::box ? point->normal : block.multiplier[0]);
-            const double bound = point->coefficient * nu;
-            const double b1 = block.multiplier[1], b2 = block.multiplier[2];
-            const double s1 = slip(block, *point, 1, system.velocity),
-                         s2 = slip(block, *point, 2, system.velocity);
+        for (; next < points.size() && points[next].block == static_cast<int>(k); ++next) {
+            const FrictionPoint& point = points[next];
+            const int one = point.row, two = one + point.size - 1;  // of an interval both are its one row
+            const double own = own_inertia(system, block, one) + own_inertia(system, block, two);
+            const double nu = std::max(0.0, model == FrictionModel::box ? point.normal : block.multiplier[0]);
+            const double bound = point.coefficient * nu;
+            const double b1 = block.multiplier[one], b2 = one == two ? 0.0 : block.multiplier[two];
+            const double s1 = slip(block, point, one, system.velocity),
+                         s2 = one == two ? 0.0 : slip(block, point, two, system.velocity);
             double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
             bool sticks = true;
             if (model == FrictionModel::cone) {

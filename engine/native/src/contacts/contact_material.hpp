@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/vec.hpp"
+
 namespace spook {
 
 struct SurfaceMaterial {
@@ -12,13 +14,20 @@ struct SurfaceMaterial {
     double compliance = 0.0;       // eps, m/N per contact point
     double damping = 0.0;          // tau, s
     double slip_compliance = 0.0;  // gamma, m/(N s)
+    double rolling = 0.0;          // rho, m: the torque that rolling meets, over the normal force
+    double torsional = 0.0;        // sigma, m: the same of turning about the normal
+    Vec3 surface_velocity;  // of the surface along itself, body axes, m/s; a body's own, never combined
+
+    bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }
 };
 
-/// Friction by the geometric mean, restitution and damping by the larger, compliances by the sum.
+/// Friction by the geometric mean, restitution, damping, rolling and torsional friction by the larger, compliances by
+/// the sum.
 inline SurfaceMaterial combined(const SurfaceMaterial& a, const SurfaceMaterial& b) noexcept {
-    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution),
-            a.compliance + b.compliance, std::max(a.damping, b.damping),
-            a.slip_compliance + b.slip_compliance};
+    return {std::sqrt(a.friction * b.friction),    std::max(a.restitution, b.restitution),
+            a.compliance + b.compliance,           std::max(a.damping, b.damping),
+            a.slip_compliance + b.slip_compliance, std::max(a.rolling, b.rolling),
+            std::max(a.torsional, b.torsional),    {}};
 }
 
 }  // namespace spook

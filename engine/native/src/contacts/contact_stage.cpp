@@ -27,6 +27,10 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
         solver->floor = options.floor;
         solver->refinements = options.refinements;
     }
+    for (const SurfaceMaterial& material : materials_) {
+        conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
+        resists_turning_ = resists_turning_ || material.resists_turning();
+    }
     const std::size_t bodies = unknown_.size();
     margin_.assign(bodies, 0.0);
     prescribed_.assign(bodies, Vec6{});
@@ -52,21 +56,61 @@ double ContactStage::relative(const Point& point, Vec3 direction, const std::vec
     return total;
 }
 
-RowBlock ContactStage::row_block(const Point& point, bool tangents) const {
+/// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
+double ContactStage::carried(const Point& point, Vec3 direction) const noexcept {
+    if (!conveys_) return 0.0;
+    const int a = point.contact.first, b = point.contact.second;
+    return dot(direction, poses_[a].rotation * materials_[a].surface_velocity -
+                              poses_[b].rotation * materials_[b].surface_velocity);
+}
+
+/// The first `rows` of normal, tangents and turning: 1, 3 or 6.
+RowBlock ContactStage::row_block(const Point& point, int rows) const {
     const Contact& contact = point.contact;
     RowBlock block;
     block.first = unknown_[contact.first];
     block.second = unknown_[contact.second];
-    block.size = tangents ? 3 : 1;
+    block.size = std::min(rows, 3);
     const Vec3 directions[3] = {contact.point.normal, point.tangent,
                                 cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
         block.right[i] = -relative(point, directions[i], prescribed_, true);
+        if (i > 0) block.right[i] -= carried(point, directions[i]);
     }
     block.lower[0] = 0.0;
+    if (rows == 6) add_turning_rows(point, block);
     return block;
+}
+
+/// Rolling about both tangents and turning about the normal, as speeds at the larger body's radius: what is left of
+/// them then compares with that of other rows.
+void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
+    const double scale = size(point.contact);
+    const Vec3 n = point.contact.point.normal;
+    const Vec3 axes[3] = {point.tangent, cross(n, point.tangent), n};
+    for (int i = 0; i < 3; ++i) {
+        const Vec3 axis = scale * axes[i];
+        const Vec6 row{0.0, 0.0, 0.0, axis.x, axis.y, axis.z};
+        if (block.first >= 0) block.first_jacobian[3 + i] = row;
+        if (block.second >= 0) block.second_jacobian[3 + i] = {0.0, 0.0, 0.0, -axis.x, -axis.y, -axis.z};
+        block.right[3 + i] = -dot(
+            axis, angular(prescribed_[point.contact.first]) - angular(prescribed_[point.contact.second]));
+        block.lower[3 + i] = block.upper[3 + i] = 0.0;  // until its friction bounds it
+    }
+    block.size = 6;
+}
+
+/// The rows of a block that friction bounds.
+void ContactStage::add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const {
+    const SurfaceMaterial& material = point.material;
+    const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
+    if (material.friction > 0.0) friction.push_back({block, material.friction, soft, point.before});
+    if (material.rolling > 0.0)
+        friction.push_back({block, material.rolling / scale, 0.0, point.before, 3, 2});
+    if (material.torsional > 0.0)
+        friction.push_back({block, material.torsional / scale, 0.0, point.before, 5, 1});
 }
 
 FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
@@ -133,22 +177,26 @@ bool ContactStage::is_pressed(const Point& point) const noexcept {
 RowBlock ContactStage::resting_row(Point& point) const {
     const double h = options_.time_step;
     const SurfaceMaterial& material = point.material;
-    RowBlock block = row_block(point, material.friction > 0.0);
+    const bool turning = material.resists_turning();
+    RowBlock block = row_block(point, turning ? 6 : material.friction > 0.0 ? 3 : 1);
+    if (turning && !(material.friction > 0.0))
+        for (int i = 1; i <= 2; ++i) block.lower[i] = block.upper[i] = 0.0;
     block.right[0] += resting_right(point);
     block.softness[0] = regularise(material.compliance, material.damping, h).softness;
     block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
     block.multiplier[0] = std::max(0.0, point.before);
-    if (block.size == 3) {
+    if (material.friction > 0.0) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
         for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangent_before[i - 1];
     }
+    for (int i = 3; i < block.size; ++i) block.multiplier[i] = point.turning_before[i - 3];
     return block;
 }
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
-    if (options_.solver == SolverKind::iterative) return solve_by_sweeps(system);
+    if (options_.solver == SolverKind::iterative && !resists_turning_) return solve_by_sweeps(system);
     std::vector<FrictionPoint> friction;
     std::vector<Vec6> next;
     FrictionReport report;
@@ -157,9 +205,8 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         friction.clear();
         for (Point& point : points_) {
             system.rows.push_back(resting_row(point));
-            if (system.rows.back().size == 3)
-                friction.push_back({static_cast<int>(system.rows.size()) - 1, point.material.friction,
-                                    point.material.slip_compliance / options_.time_step, point.before});
+            if (system.rows.back().size > 1)
+                add_friction(point, static_cast<int>(system.rows.size()) - 1, friction);
         }
         if (round == 0) {  // at rest, the velocities before are those after
             system.velocity.resize(system.mass.size());
@@ -171,8 +218,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         move_on(system, next);
         const std::size_t known = points_.size();
         if (outrun(next)) find_open();
-        if (open_.empty() || find_strikes(next, true) == 0) break;
-        take_back_strikes(known, next);
+        const bool turned = find_turned(next);
+        const std::size_t taken = points_.size();
+        if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
+        else if (!turned) break;
         counters_.contacts += points_.size() - known;
         order_points();
     }
@@ -182,11 +231,21 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const RowBlock& block = system.rows[joints + k];
         Vec3 along;
+        Vec3 turning;
         for (int i = 1; i < block.size;
-             ++i)  // the solver may have turned the tangents: read them from the rows
-            along += block.multiplier[i] *
-                     (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
-        record(points_[k], block.multiplier[0], along);
+             ++i) {  // the solver may have turned the tangents: read them from the rows
+            const Vec6 row = block.first >= 0 ? block.first_jacobian[i] : block.second_jacobian[i];
+            const double sign = block.first >= 0 ? block.multiplier[i] : -block.multiplier[i];
+            if (i < 3) along += sign * linear(row);
+            else turning += sign * angular(row);
+        }
+        Touch& touch = record(points_[k], block.multiplier[0], along);
+        if (block.size < 6) continue;
+        const Vec3 n = points_[k].contact.point.normal, t = points_[k].tangent;
+        const double scale = 1.0 / size(points_[k].contact);
+        touch.turning[0] = scale * dot(turning, t);
+        touch.turning[1] = scale * dot(turning, cross(n, t));
+        touch.turning[2] = scale * dot(turning, n);
     }
     if (report.finite) {
         part_overlaps(system, joints);
@@ -196,7 +255,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
 }
 
 /// Takes down what a point did: its normal impulse, and that along the surface.
-void ContactStage::record(const Point& point, double normal, Vec3 along) {
+ContactStage::Touch& ContactStage::record(const Point& point, double normal, Vec3 along) {
     Touch& touch = touches_.emplace_back();
     const Vec3 n = point.contact.point.normal;
     touch.contact = point.contact;
@@ -206,6 +265,7 @@ void ContactStage::record(const Point& point, double normal, Vec3 along) {
     touch.tangent[0] = dot(along, point.tangent);
     touch.tangent[1] = dot(along, cross(n, point.tangent));
     touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
+    return touch;
 }
 
 void ContactStage::mark_held(const MixedSystem& system) {
@@ -273,7 +333,7 @@ void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) 
             if (!below && !above) block.lower[i] = block.upper[i] = 0.0;
         }
     for (std::size_t k = 0; k < points_.size(); ++k) {
-        RowBlock block = row_block(points_[k], false);
+        RowBlock block = row_block(points_[k], 1);
         const double gap = points_[k].contact.point.gap;
         const double ahead =
             gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);

@@ -122,6 +122,7 @@ public:
         double normal = 0.0;             // nu of the resting stage, N s
         double impact = 0.0;             // normal impulse of the impact, N s
         double tangent[2] = {0.0, 0.0};  // of the resting stage along world tangents, for a warm start
+        double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
         double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
         bool active = false;             // pushes, or closed
     };
@@ -172,7 +173,7 @@ private:
         double bounce = -1.0;        // psi' if the point takes part in the impact, else −1
         double rounding = 0.0;       // approaches slower than this are none, m/s
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
-        double tangent_before[2] = {0.0, 0.0};
+        double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
         double parting_before = 0.0;
         double impact = 0.0;
         Vec3 impact_impulse;
@@ -186,6 +187,8 @@ private:
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void find_open();
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
+    bool find_turned(const std::vector<Vec6>& velocity);
+    bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
     bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
                     const std::vector<Vec6>& velocity, bool late);
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
@@ -194,7 +197,10 @@ private:
     void measure_points();
     void set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other);
     bool reachable(const Contact& contact) const;
-    RowBlock row_block(const Point& point, bool tangents) const;
+    RowBlock row_block(const Point& point, int rows) const;
+    void add_turning_rows(const Point& point, RowBlock& block) const;
+    void add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const;
+    double carried(const Point& point, Vec3 direction) const noexcept;
     double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                     bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
@@ -209,7 +215,7 @@ private:
     double resting_right(Point& point) const;
     bool is_pressed(const Point& point) const noexcept;
     RowBlock resting_row(Point& point) const;
-    void record(const Point& point, double normal, Vec3 along);
+    Touch& record(const Point& point, double normal, Vec3 along);
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
     bool find_more();
@@ -233,12 +239,14 @@ private:
     ContactOptions options_;
     std::vector<IndexPair> joints_;
     std::vector<char> jointed_;  // bodies with rows of joints
-    std::vector<char> ball_;     // bodies whose only surface is a sphere round their centre
+    bool conveys_ = false;       // some surface moves along itself
+    bool resists_turning_ = false;
+    std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
     ContactSweeps sweeps_, parting_sweeps_;
     MixedSystem parting_;
-    std::vector<Vec6> next_;  // velocities between sweeps, per body of the scene
-    std::size_t handed_over_ = 0;
+    std::vector<Vec6> next_;                     // velocities between sweeps, per body of the scene
+    std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with

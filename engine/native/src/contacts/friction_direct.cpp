@@ -22,8 +22,8 @@ constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr int quick_rounds = 4;         // what rests or moves on as it did is found within these, exactly
 constexpr int longest_wait = 16;        // solves
 
-void bound_tangents(RowBlock& block, double bound) noexcept {
-    for (int i = 1; i <= 2; ++i) {
+void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexcept {
+    for (int i = point.row; i < point.row + point.size; ++i) {
         block.lower[i] = -bound;
         block.upper[i] = bound;
     }
@@ -35,19 +35,21 @@ void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPo
     for (std::size_t b = 0; b < system.mass.size(); ++b)
         solve_six(factor_six(system.mass[b]), free_velocity[b]);
     for (const FrictionPoint& point : points) {
+        if (point.size != 2) continue;
         RowBlock& block = system.rows[point.block];
-        const double s1 = row_velocity(block, 1, free_velocity) - block.right[1];
-        const double s2 = row_velocity(block, 2, free_velocity) - block.right[2];
+        const int one = point.row, two = point.row + 1;
+        const double s1 = row_velocity(block, one, free_velocity) - block.right[one];
+        const double s2 = row_velocity(block, two, free_velocity) - block.right[two];
         const double speed = length(s1, s2);
-        if (speed > 0.0) turn_tangents(block, s1 / speed, s2 / speed);
+        if (speed > 0.0) turn_tangents(block, point, s1 / speed, s2 / speed);
     }
 }
 
-/// Σ over the two tangent rows of (G M⁻¹ Gᵀ)ᵢᵢ + gamma/h: an upper bound of the block's largest eigenvalue.
+/// Σ over the two rows of (G M⁻¹ Gᵀ)ᵢᵢ + gamma/h: an upper bound of the block's largest eigenvalue.
 double tangent_scale(const RowBlock& block, const FrictionPoint& point,
                      const std::vector<Mat6>& mass_factor) {
     double sum = 0.0;
-    for (int i = 1; i <= 2; ++i) {
+    for (int i = point.row; i < point.row + point.size; ++i) {
         sum += point.slip_softness;
         Vec6 x = block.first_jacobian[i];
         if (block.first >= 0) solve_six(mass_factor[block.first], x), sum += dot(block.first_jacobian[i], x);
@@ -66,24 +68,25 @@ struct Law {
 /// Measures the disc law at one point; if it does not hold, prepares the point's next Newton step.
 Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double bound, double accepted,
               double reluctant, const std::vector<Vec6>& velocity) {
-    const double s1 = slip(block, point, 1, velocity), s2 = slip(block, point, 2, velocity);
-    const double b1 = block.multiplier[1], b2 = block.multiplier[2];
+    const int one = point.row, two = point.row + 1;
+    const double s1 = slip(block, point, one, velocity), s2 = slip(block, point, two, velocity);
+    const double b1 = block.multiplier[one], b2 = block.multiplier[two];
     const double d1 = b1 - s1 / scale, d2 = b2 - s2 / scale, reach = length(d1, d2);
     const double shrink = reach > bound ? bound / reach : 1.0;
     Law law;
     law.residual = length(b1 - shrink * d1, b2 - shrink * d2);
     if (law.residual <= accepted) return law;
-    const double old_softness = block.softness[2];
-    block.softness[1] = block.softness[2] = point.slip_softness;
+    const double old_softness = block.softness[two];
+    block.softness[one] = block.softness[two] = point.slip_softness;
     if (reach > bound) {
-        turn_tangents(block, -d1 / reach, -d2 / reach);
-        if (bound > 0.0) block.softness[2] += std::max(length(s1, s2) / bound, reluctant * scale);
-        block.state[1] = RowState::at_lower;  // beta_1 = −mu nu: against the slip
-        block.state[2] = RowState::free;
+        turn_tangents(block, point, -d1 / reach, -d2 / reach);
+        if (bound > 0.0) block.softness[two] += std::max(length(s1, s2) / bound, reluctant * scale);
+        block.state[one] = RowState::at_lower;  // beta_1 = −mu nu: against the slip
+        block.state[two] = RowState::free;
         law.moved = true;
     } else {
-        block.state[1] = block.state[2] = RowState::free;
-        law.moved = block.softness[2] != old_softness;
+        block.state[one] = block.state[two] = RowState::free;
+        law.moved = block.softness[two] != old_softness;
     }
     return law;
 }
@@ -115,6 +118,8 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
 bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
     if (model != FrictionModel::cone && !points.empty()) return false;
     if (system.rows.size() <= few_blocks) return false;
+    if (std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.row != 1; }))
+        return false;  // it knows no friction of turning
     // Rigid joints need the factor of the whole, not a relief.
     return std::all_of(system.rows.begin(), system.rows.end(),
                        [](const RowBlock& block) { return block.lower[0] == 0.0; });
@@ -151,12 +156,13 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     const bool some_unknown =
         std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
     if (some_unknown) {  // no step before: the normal forces without friction are the first guess
-        for (const FrictionPoint& point : points) bound_tangents(system.rows[point.block], 0.0);
+        for (const FrictionPoint& point : points) bound_rows(system.rows[point.block], point, 0.0);
         if (!solve(false)) return false;
         for (FrictionPoint& point : points)
             if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
         for (const FrictionPoint& point : points)
-            for (int i = 1; i <= 2; ++i) system.rows[point.block].state[i] = RowState::free;
+            for (int i = point.row; i < point.row + point.size; ++i)
+                system.rows[point.block].state[i] = RowState::free;
     }
     std::vector<Mat6> mass_factor;
     std::vector<double> scale(points.size(), 1.0);
@@ -181,7 +187,7 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     } restore{solver, round_limit};
     for (int round = 0; round < (quick ? quick_rounds : max_rounds); ++round) {
         for (const FrictionPoint& point : points)
-            bound_tangents(system.rows[point.block], point.coefficient * std::max(0.0, point.normal));
+            bound_rows(system.rows[point.block], point, point.coefficient * std::max(0.0, point.normal));
         if (!solve(same_matrix)) return false;
         same_matrix = true;
 
@@ -199,7 +205,7 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             const double now = std::max(0.0, block.multiplier[0]);
             if (model != FrictionModel::box)
                 change = std::max(change, point.coefficient * std::abs(now - point.normal));
-            if (model == FrictionModel::cone) {
+            if (model == FrictionModel::cone && point.size == 2) {
                 const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
                 const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
                                           accepted * point.coefficient * largest, reluctant, system.velocity);

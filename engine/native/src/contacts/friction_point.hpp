@@ -13,12 +13,14 @@ namespace spook {
 /// scaled_box: the box with the normal force of this step.
 SPOOK_NAMED_ENUM(FrictionModel, cone, box, scaled_box)
 
-/// A block of three rows of one contact: 0 the normal, 1 and 2 the tangents.
+/// Rows of one contact's block that its normal, row 0, bounds: 1 and 2 the tangents; where turning meets friction, too,
+/// 3 and 4 rolling about the tangents, and 5 alone the turning about the normal. Points of one block follow each other.
 struct FrictionPoint {
     int block = 0;               // in MixedSystem::rows
     double coefficient = 0.0;    // mu
     double slip_softness = 0.0;  // gamma / h, of both tangent rows
     double normal = -1.0;        // nu of the step before; then of this step, N s; negative: unknown
+    int row = 1, size = 2;       // which rows: two obey a disc (or box), one an interval
 };
 
 struct FrictionReport {
@@ -39,25 +41,26 @@ struct RowsResidual {
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                            FrictionModel model);
 
-/// Slip velocity along tangent i (1 or 2), with what slip compliance gives way: D v + (gamma/h) beta.
+/// Slip velocity of row i, with what slip compliance gives way: D v + (gamma/h) beta.
 inline double slip(const RowBlock& block, const FrictionPoint& point, int i,
                    const std::vector<Vec6>& velocity) noexcept {
     return row_velocity(block, i, velocity) - block.right[i] + point.slip_softness * block.multiplier[i];
 }
 
-/// Turns both tangents of the block so that the first points along c t₁ + s t₂ (c² + s² = 1).
-inline void turn_tangents(RowBlock& block, double c, double s) noexcept {
+/// Turns both rows of the point so that the first points along c t₁ + s t₂ (c² + s² = 1).
+inline void turn_tangents(RowBlock& block, const FrictionPoint& point, double c, double s) noexcept {
+    const int one = point.row, two = point.row + 1;
     auto turn = [c, s](double& x, double& y) noexcept {
         const double first = c * x + s * y;
         y = c * y - s * x;
         x = first;
     };
     for (int a = 0; a < 6; ++a) {
-        turn(block.first_jacobian[1][a], block.first_jacobian[2][a]);
-        turn(block.second_jacobian[1][a], block.second_jacobian[2][a]);
+        turn(block.first_jacobian[one][a], block.first_jacobian[two][a]);
+        turn(block.second_jacobian[one][a], block.second_jacobian[two][a]);
     }
-    turn(block.right[1], block.right[2]);
-    turn(block.multiplier[1], block.multiplier[2]);
+    turn(block.right[one], block.right[two]);
+    turn(block.multiplier[one], block.multiplier[two]);
 }
 
 }  // namespace spook

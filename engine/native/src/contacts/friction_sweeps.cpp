@@ -51,7 +51,8 @@ FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& poi
     for (int round = 0; round < iterations; ++round) {
         for (const FrictionPoint& point : points) {
             RowBlock& block = system.rows[point.block];
-            for (int i = 1; i <= 2; ++i) block.lower[i] = block.upper[i] = block.multiplier[i];
+            for (int i = point.row; i < point.row + point.size; ++i)
+                block.lower[i] = block.upper[i] = block.multiplier[i];
         }
         const PivotReport pivots = solver.solve(system, same_matrix);
         same_matrix = true;

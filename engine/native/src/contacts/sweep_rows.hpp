@@ -23,11 +23,11 @@ struct SweepRow {
 /// One block of rows, and what is solved together in it.
 struct SweepBlock {
     enum class Kind : unsigned char { bilateral, bounded, contact } kind = Kind::bounded;
-    int first = 0, second = 0;  // bodies
-    int row = 0, size = 0;      // rows_[row] … rows_[row + size)
-    int point = -1;             // its friction point
-    int factor = -1;            // of a bilateral block, in factors_
-    double step = 0.0;          // of a contact: 1/lambda_max of the tangents' part
+    int first = 0, second = 0;   // bodies
+    int row = 0, size = 0;       // rows_[row] … rows_[row + size)
+    int point = -1, end = -1;    // its friction points, one behind the other
+    int factor = -1;             // of a bilateral block, in factors_
+    double step[3] = {0, 0, 0};  // of these: 1/lambda_max of their own part
 };
 
 /// Lays a system out for sweeping: rows one behind the other, velocities in one array. Memory is kept from use to
@@ -48,9 +48,13 @@ public:
         rows_.clear();
         factors_.clear();
         blocks_.assign(system.rows.size(), {});
-        for (std::size_t k = 0; k < points.size(); ++k) blocks_[points[k].block].point = static_cast<int>(k);
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            SweepBlock& block = blocks_[points[k].block];
+            if (block.point < 0) block.point = static_cast<int>(k);
+            block.end = static_cast<int>(k) + 1;
+        }
         for (std::size_t k = 0; k < blocks_.size(); ++k)
-            add(system.rows[k], blocks_[k], static_cast<int>(bodies));
+            add(system.rows[k], points, blocks_[k], static_cast<int>(bodies));
         for (const SweepBlock& block : blocks_)
             for (int i = 0; i < block.size; ++i)
                 push(block, rows_[block.row + i], rows_[block.row + i].multiplier);
@@ -62,7 +66,8 @@ public:
         for (const SweepBlock& block : blocks_) {
             if (block.kind == SweepBlock::Kind::contact) {
                 if (!friction_only) change = std::max(change, update_row(block, rows_[block.row]));
-                change = std::max(change, update_tangents(block, points[block.point]));
+                for (int k = block.point; k < block.end; ++k)
+                    change = std::max(change, update_rubbing(block, points[k], block.step[k - block.point]));
             } else if (!friction_only) {
                 change = std::max(change, update_joint(block));
             }
@@ -89,7 +94,7 @@ public:
     }
 
 private:
-    void add(const RowBlock& given, SweepBlock& block, int spare) {
+    void add(const RowBlock& given, const std::vector<FrictionPoint>& points, SweepBlock& block, int spare) {
         block.first = given.first >= 0 ? given.first : spare;
         block.second = given.second >= 0 ? given.second : spare;
         block.row = static_cast<int>(rows_.size());
@@ -115,9 +120,12 @@ private:
         }
         if (block.point >= 0) {
             block.kind = SweepBlock::Kind::contact;
-            const double a = rows_[block.row + 1].own, b = rows_[block.row + 2].own;
-            const double c = schur(rows_[block.row + 1], rows_[block.row + 2]);
-            block.step = 1.0 / (0.5 * (a + b) + length(0.5 * (a - b), c));
+            for (int k = block.point; k < block.end; ++k) {
+                if (points[k].size != 2) continue;
+                const SweepRow &one = rows_[block.row + points[k].row], &two = (&one)[1];
+                block.step[k - block.point] =
+                    1.0 / (0.5 * (one.own + two.own) + length(0.5 * (one.own - two.own), schur(one, two)));
+            }
         } else if (bilateral) {
             block.kind = SweepBlock::Kind::bilateral;
             Mat6 whole{};
@@ -181,26 +189,26 @@ private:
         return largest;
     }
 
-    double update_tangents(const SweepBlock& block, const FrictionPoint& point) noexcept {
-        SweepRow &one = rows_[block.row + 1], &two = rows_[block.row + 2];
+    double update_rubbing(const SweepBlock& block, const FrictionPoint& point, double step) noexcept {
+        SweepRow &one = rows_[block.row + point.row], &two = rows_[block.row + point.row + point.size - 1];
         const double normal = model_ == FrictionModel::box ? point.normal : rows_[block.row].multiplier;
         const double bound = point.coefficient * std::max(0.0, normal);
-        if (model_ != FrictionModel::cone) {
+        if (model_ != FrictionModel::cone || point.size != 2) {
             one.lower = two.lower = -bound;
             one.upper = two.upper = bound;
             const double change = update_row(block, one);
-            return std::max(change, update_row(block, two));
+            return point.size != 2 ? change : std::max(change, update_row(block, two));
         }
         const double b1 = one.multiplier, b2 = two.multiplier;
-        double d1 = b1 - block.step * residual(block, one);
-        double d2 = b2 - block.step * residual(block, two);
+        double d1 = b1 - step * residual(block, one);
+        double d2 = b2 - step * residual(block, two);
         const double reach = length(d1, d2);
         if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
         one.multiplier = d1;
         two.multiplier = d2;
         push(block, one, d1 - b1);
         push(block, two, d2 - b2);
-        return length(d1 - b1, d2 - b2) / block.step;
+        return length(d1 - b1, d2 - b2) / step;
     }
 
     FrictionModel model_ = FrictionModel::cone;

@@ -47,7 +47,9 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
             case Stage::collision:
             case Stage::impact:
             case Stage::tangents:
-            case Stage::friction: return leave_out(no_contacts);
+            case Stage::friction:
+            case Stage::move_surfaces:
+            case Stage::roll: return leave_out(no_contacts);
             case Stage::apply_gravity:
                 return choose_if(!is_zero(scene.gravity), "uniform gravity acts", "gravity is zero");
             case Stage::apply_central_gravity:

@@ -9,7 +9,7 @@ namespace {
 
 /// What the choice of a stage depends on.
 struct Facts {
-    bool joints, bounded, contacts, rubbing, iterative, turning, moving, loaded;
+    bool joints, bounded, contacts, rubbing, conveying, rolling, iterative, turning, moving, loaded;
     int with_surface = 0;
 };
 
@@ -23,6 +23,8 @@ Facts facts_of(const RigidScene& scene) {
         dynamic.push_back(body.motion == Motion::dynamic);
         facts.with_surface += surface[i];
         rubbing += surface[i] && body.material.friction > 0.0;
+        facts.conveying = facts.conveying || (surface[i] && !is_zero(body.material.surface_velocity));
+        facts.rolling = facts.rolling || (surface[i] && body.material.resists_turning());
         facts.moving = facts.moving || body.motion != Motion::fixed;
         facts.turning = facts.turning || (!body.particle && body.motion != Motion::fixed);
         facts.loaded = facts.loaded || !is_zero(body.force) || !is_zero(body.torque);
@@ -33,6 +35,8 @@ Facts facts_of(const RigidScene& scene) {
                                 [](const JointSpec& joint) { return can_let_go(joint); });
     facts.contacts = Detection(scene.colliders, dynamic, scene.no_contact).possible();
     facts.rubbing = facts.contacts && rubbing >= 2;
+    facts.conveying = facts.rubbing && facts.conveying;
+    facts.rolling = facts.contacts && facts.rolling;
     facts.iterative = scene.method.solver == SolverKind::iterative && (facts.joints || facts.contacts);
     return facts;
 }
@@ -109,6 +113,12 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                               : no_rows);
             case Stage::friction:
                 return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
+            case Stage::move_surfaces:
+                return choose_if(is.conveying, "a surface moves along itself and takes along what rubs on it",
+                                 is.rubbing ? "no surface moves along itself" : smooth);
+            case Stage::roll:
+                return choose_if(is.rolling, "rolling or turning on the spot meets friction",
+                                 is.contacts ? "no surface resists rolling or turning" : no_contact);
             case Stage::string_stiffness:
                 return choose_if(method.string_stiffness && is.joints,
                                  "the method treats the geometric stiffness of loaded joints implicitly",

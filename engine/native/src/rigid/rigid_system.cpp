@@ -75,6 +75,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             dynamic.push_back(spec.motion == Motion::dynamic);
             materials.push_back(spec.material);
             if (!stages_.runs(Stage::friction)) materials.back().friction = 0.0;
+            if (!stages_.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
+            if (!stages_.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
         }
         const SolverKind solver = stages_.runs(Stage::solve_iterative)   ? SolverKind::iterative
                                   : method_.solver == SolverKind::hybrid ? SolverKind::hybrid
@@ -98,7 +100,9 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     const bool joints = !scene.joints.empty();
     if (stages_.take(Stage::collision)) {
         stages_.take(Stage::impact);
-        if (stages_.take(Stage::tangents)) stages_.take(Stage::friction);
+        if (stages_.take(Stage::tangents) && stages_.take(Stage::friction))
+            stages_.take(Stage::move_surfaces);
+        stages_.take(Stage::roll);
     }
     if (stages_.take(Stage::assemble_rows)) {
         const bool block = stages_.take(Stage::solve_block), iterative = stages_.take(Stage::solve_iterative);

@@ -1,0 +1,87 @@
+// The contact stage's part for pairs that touch and turn: features that swing in within the step.
+//
+// A manifold tells where two bodies touch at the start of a step. While they turn on it, an edge or a corner that was
+// far away may come down elsewhere; no row of that manifold knows of it. So the velocities a solve found are tried:
+// both bodies are led to the end of the step, and what lies deep there gets a row for the step itself. Its gap is the
+// one that to first order closes to the depth found, so the row holds the feature out and nothing before it.
+#include <algorithm>
+#include <cmath>
+
+#include "collision/sweep.hpp"
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int feature_bits = 16;
+constexpr std::uint64_t swung_in = 1u << 15;  // marks a point whose feature has one in the manifold already
+constexpr double deep = 2e-3;                 // of the larger body's radius: what curved paths may overlap
+constexpr double same_place = 0.1;            // of it: points of one feature
+constexpr double same_way = 0.95;             // cosine of their normals
+
+/// Two of these touch at one point, wherever they turn.
+bool is_single(const Primitive& shape) noexcept {
+    return shape.kind == ShapeKind::sphere || shape.kind == ShapeKind::plane;
+}
+
+}  // namespace
+
+/// Whether the point is one of the pair's: of those in order in [from, end), or of those found since.
+bool ContactStage::is_known(const Contact& contact, std::size_t from, std::size_t end, double size,
+                            bool& named) const {
+    const auto same = [&](const Point& point) {
+        const Contact& old = point.contact;
+        named = named || old.key == contact.key;
+        return old.key >> feature_bits == contact.key >> feature_bits &&
+               dot(old.point.normal, contact.point.normal) > same_way &&
+               norm(old.point.position - contact.point.position) < same_place * size;
+    };
+    const auto at = [this](std::size_t k) { return points_.begin() + static_cast<std::ptrdiff_t>(k); };
+    return std::any_of(at(from), at(end), same) || std::any_of(at(ordered_), points_.end(), same);
+}
+
+/// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
+bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
+    const double h = options_.time_step;
+    const std::size_t known = points_.size();
+    for (std::size_t from = 0, end = 0; from < ordered_; from = end) {
+        const std::uint64_t key = points_[from].contact.key >> feature_bits;
+        double depth = 0.0;
+        for (; end < ordered_ && points_[end].contact.key >> feature_bits == key; ++end)
+            depth = std::max(depth, -points_[end].contact.point.gap);
+        const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
+        const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
+        if (points_[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
+        const int a = one.body, b = two.body;
+        const double size = std::max(detection_.radius()[a], detection_.radius()[b]);
+        const double turning = norm(angular(velocity[a])) * detection_.radius()[a] +
+                               norm(angular(velocity[b])) * detection_.radius()[b];
+        const double sliding = norm(linear(velocity[a]) - linear(velocity[b]));
+        if (h * (sliding + turning) < deep * size) continue;
+        const Mover first{one.shape, one.part, poses_[a], linear(velocity[a]), angular(velocity[a])};
+        const Mover second{two.shape, two.part, poses_[b], linear(velocity[b]), angular(velocity[b])};
+        const Pose first_end = first.body_at(h), second_end = second.body_at(h);
+        scratch_.clear();
+        detection_.touch(pair, first_end, second_end, 0.0, scratch_);
+        for (Contact& contact : scratch_) {
+            if (contact.point.gap >= -(depth + deep * size)) continue;
+            // Back to where both surfaces were at the start, half-way between them.
+            const Vec3 q = contact.point.position;
+            const Vec3 on_first = apply(poses_[a], local(first_end.rotation, q - first_end.position));
+            const Vec3 on_second = apply(poses_[b], local(second_end.rotation, q - second_end.position));
+            contact.point.position = 0.5 * (on_first + on_second);
+            bool named = false;
+            if (is_known(contact, from, end, size, named)) continue;
+            if (named) contact.key |= swung_in;
+            add_point(contact, poses_[a], poses_[b], h);
+            Point& point = points_.back();
+            const double closing = -relative(point, contact.point.normal, velocity, false);
+            point.contact.point.gap = std::max(0.0, contact.point.gap + h * closing);
+        }
+    }
+    return points_.size() > known;
+}
+
+}  // namespace spook

@@ -1,0 +1,116 @@
+"""What engines that are stepped from Python share: the loop with its clock, and arrays that fill up as it goes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine.protocol import Task
+from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.result import Array
+
+BLOCK = 1000  # steps between two looks at the clock where nothing is recorded between, at most
+LOOK = 0.05  # s after which it is looked at again, or sooner
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """What an engine writes past Python, to standard output or error, goes nowhere; its outcome says it."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        for number, whole in enumerate(kept, start=1):
+            os.dup2(whole, number)
+            os.close(whole)
+        os.close(nowhere)
+
+
+class Kept:
+    """One row a sample."""
+
+    def __init__(self, count: int, n: int) -> None:
+        self.count, self.length = 0, count
+        self.positions, self.velocities = np.empty((count, n, 3)), np.zeros((count, n, 3))
+        self.spins, self.orientations = np.zeros((count, n, 3)), np.empty((count, n, 4))
+        self.contacts, self.depths = np.zeros(count), np.zeros(count)
+        self.forces: dict[str, list[Any]] = {}
+        self.pairs: dict[tuple[str, str], Array] = {}
+
+    def pair(self, pair: tuple[str, str]) -> Array:
+        """Contact forces [N] on the first of two bodies, a row a sample."""
+        if pair not in self.pairs:
+            self.pairs[pair] = np.zeros((self.length, 3))
+        return self.pairs[pair]
+
+
+def stepped(
+    task: Task,
+    step: Callable[[int], None],
+    read: Callable[[Kept, int, int], None],
+    setup: float,
+    health: Callable[[], str] = lambda: "",
+) -> Recording:
+    """Take all steps of a task: `step(n)` takes n, `read(kept, row, sample)` keeps the state of now.
+
+    `health` says in words what went wrong in the engine, or nothing. Only the steps are timed.
+    """
+    samples = range(task.steps + 1) if task.every_step else (0, task.steps)
+    kept = Kept(len(samples), len(task.scene.bodies))
+    done, failure, status, spent, block = 0, "", "completed", 0.0, 1
+    entered = time.perf_counter()
+    read(kept, 0, 0)
+    kept.count = 1
+    for row, sample in enumerate(samples[1:], start=1):
+        while done < sample and status == "completed":
+            taken = min(block, sample - done)
+            began = time.perf_counter()
+            try:
+                step(taken)
+            except RuntimeError as error:  # what the engine could not do is an outcome
+                status, failure = "diverged", " ".join(str(error).split())[:200]
+                break
+            took = time.perf_counter() - began
+            spent += took
+            done += taken
+            block = min(2 * block, BLOCK) if took < LOOK else max(block // 2, 1)
+            failure = health()
+            if failure:
+                status, failure = "diverged", f"{failure} by step {done}"
+            elif task.time_limit is not None and time.perf_counter() - entered > task.time_limit:
+                status = "timed_out"
+                failure = f"the time limit of {task.time_limit:g} s was reached before step {done + 1}"
+        if status != "completed":
+            break
+        read(kept, row, sample)
+        kept.count = row + 1
+        if not (np.isfinite(kept.positions[row]).all() and np.isfinite(kept.velocities[row]).all()):
+            status, failure = "not_finite", f"a value is not finite by step {done}"
+            break
+    count = kept.count
+    return Recording(
+        samples=np.array(samples[:count], dtype=np.int64),
+        positions=kept.positions[:count],
+        orientations=kept.orientations[:count],
+        velocities=kept.velocities[:count],
+        angular_velocities=kept.spins[:count],
+        steps=done,
+        seconds=spent,
+        setup_seconds=setup,
+        constraint_forces={name: np.array(values) for name, values in kept.forces.items()},
+        contact_forces={pair: kept.pair(pair)[:count] for pair in kept.pairs},
+        contact_count=kept.contacts[:count],
+        penetration=kept.depths[:count],
+        status=status,  # type: ignore[arg-type]
+        failure=failure,
+    )

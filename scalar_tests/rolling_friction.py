@@ -1,0 +1,223 @@
+"""Does a ball with rolling friction stop where it must, stand on the slope it may, and spin down in time?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    AngularVelocity,
+    Final,
+    Material,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+GRAVITY = 10.0  # m/s²
+FRICTION = 0.5
+ROLLING, TORSIONAL = 0.004, 0.002  # m
+RADIUS, MASS = 0.1, 2.0  # m, kg
+SPEED, SPIN = 0.5, 6.0  # m/s, rad/s
+TIME_STEP = 1.0 / 60.0  # s
+AWAY = math.radians(35.0)  # direction of the ball's way
+BRAKE = 5.0 / 7.0 * ROLLING / RADIUS * GRAVITY  # m/s²
+SLOWING = TORSIONAL * GRAVITY / (0.4 * RADIUS**2)  # rad/s²
+STOPPED = SPEED / BRAKE  # s
+
+
+def scene(speed: float = SPEED, spin: float = 0.0, slope: float = 0.0) -> Scene:
+    """A ball that rolls, or spins on the spot; gravity is tilted by atan(slope) towards the ball's way."""
+    way = (math.cos(AWAY), math.sin(AWAY))
+    ground = RigidBody(
+        name="ground",
+        motion="static",
+        shape=Plane(),
+        position=(0.0, 0.0, 0.0),
+        material=Material(friction=FRICTION),
+    )
+    ball = RigidBody(
+        name="ball",
+        mass=MASS,
+        shape=Sphere(RADIUS),
+        position=(0.0, 0.0, RADIUS),
+        velocity=(speed * way[0], speed * way[1], 0.0),
+        angular_velocity=(-speed * way[1] / RADIUS, speed * way[0] / RADIUS, spin),
+        material=Material(friction=FRICTION, rolling_friction=ROLLING, torsional_friction=TORSIONAL),
+    )
+    tilt = math.atan(slope)
+    pull = GRAVITY * math.sin(tilt)
+    return Scene(bodies=(ground, ball), gravity=(pull * way[0], pull * way[1], -GRAVITY * math.cos(tilt)))
+
+
+def roll(simulate: Simulate) -> dict[str, float]:
+    """A ball that rolls until it stands."""
+    observe = {"v": Trace(quantity=Velocity("ball"))}
+    result = simulate(scene(), time_step=TIME_STEP, duration=1.5 * STOPPED, observe=observe)
+    along = result["v"][:, 0] * math.cos(AWAY) + result["v"][:, 1] * math.sin(AWAY)
+    across = result["v"][:, 1] * math.cos(AWAY) - result["v"][:, 0] * math.sin(AWAY)
+    exact = np.maximum(0.0, SPEED - BRAKE * TIME_STEP * np.arange(len(along)))
+    return {"speed_error": float(np.abs(along - exact).max()), "sideways": float(np.abs(across).max())}
+
+
+def turn(simulate: Simulate) -> dict[str, float]:
+    """A ball that spins on the spot until it stands."""
+    observe = {"w": Trace(quantity=AngularVelocity("ball")), "x": Final(quantity=Position("ball"))}
+    result = simulate(scene(0.0, SPIN), time_step=TIME_STEP, duration=2.0, observe=observe)
+    exact = np.maximum(0.0, SPIN - SLOWING * TIME_STEP * np.arange(len(result["w"])))
+    return {
+        "spin_error": float(np.abs(result["w"][:, 2] - exact).max()),
+        "walked": float(np.hypot(result["x"][0], result["x"][1])),
+    }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Way until it stands against v²/(2 a) [m]."""
+    observe = {"x": Final(quantity=Position("ball"))}
+    result = simulate(scene(), time_step=time_step, duration=2.0, method=method, observe=observe)
+    return float(np.hypot(result["x"][0], result["x"][1])) - 0.5 * SPEED**2 / BRAKE
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same ball with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=2.0, method=method)
+
+
+def stands(simulate: Simulate, slope: float) -> bool:
+    """Whether a ball put down on the slope still stands after a second."""
+    observe = {"v": Final(quantity=Velocity("ball"))}
+    result = simulate(scene(0.0, 0.0, slope), time_step=TIME_STEP, steps=60, observe=observe)
+    return result.completed and float(np.abs(result["v"]).max()) < 1e-6
+
+
+def steepest(simulate: Simulate) -> BreakPoint:
+    """The steepest slope it stands on."""
+    top = ROLLING / RADIUS
+    return break_point(lambda slope: stands(simulate, slope), 0.2 * top, 5.0 * top, resolution=1e-3)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Speed of the ball against time."""
+    observe = {"v": Trace(quantity=Velocity("ball"))}
+    result = simulate(scene(), time_step=TIME_STEP, duration=1.5 * STOPPED, observe=observe)
+    time, speed = result.sample_times["v"], np.hypot(result["v"][:, 0], result["v"][:, 1])
+    exact = np.maximum(0.0, SPEED - BRAKE * time)
+    return Drawing(
+        curves=(line("ball", time, speed, "points"), line("v − (5/7) ρ g t/r", time, exact, "reference")),
+        x_label="time [s]",
+        y_label="speed [m/s]",
+        note=f"It stands after {told(STOPPED, 3)} s; the run is at most {told(float(np.abs(speed - exact).max()))} m/s off.",
+    )
+
+
+ROUNDED = "constant torque is exact in a step; the solver stops at 1e-10 of the load"
+
+TEST = ScalarTest(
+    title="Rolling friction",
+    question="Does a ball with rolling friction stop where it must, stand on the slope it may and spin down in time?",
+    why="Without rolling friction a ball on the floor never stops, and no heap of balls has a slope.",
+    model="A ball of 2 kg rolls, or spins on the spot, on a rough level floor, and is put down on slopes. The torque "
+    "against rolling is at most ρ N, against turning on the spot at most σ N.",
+    parameters=(
+        ("time step", "1/60 s"),
+        ("ball", "radius 0.1 m, 2 kg"),
+        ("friction", "µ = 0.5, ρ = 4 mm, σ = 2 mm"),
+        ("start", "0.5 m/s, 35° from x; or 6 rad/s on the spot"),
+        ("gravity", "10 m/s²"),
+    ),
+    theory=(
+        "Rolling: F r − ρ N = I a/r and −F = m a, so a = −(5/7) ρ g/r; the way is v²/(2 a).",
+        "On the spot: I w' = −σ m g. On a slope it stands while tan θ ≤ ρ/r.",
+        "Both torques are constant until they hold: each step's speed is exact, the way is v h/2 short.",
+    ),
+    reference="Closed forms.",
+    conclusion="Green: the contact takes torques up to their bounds, in any direction, and no further. Red: a ball that "
+    "never stops, creeps down a slope, or stops too soon.",
+    source="ours; a wish of the thesis, section 5.4",
+    measurements=(
+        ask(
+            roll,
+            (
+                error(
+                    "speed_error",
+                    "largest difference of the speed to v − (5/7) ρ g t/r, then zero",
+                    "m/s",
+                    1e-9,
+                    ROUNDED,
+                ),
+                error("sideways", "largest speed across", "m/s", 1e-9, ROUNDED, "companion"),
+            ),
+            "rolling until it stands",
+            TIME_STEP,
+        ),
+        ask(
+            turn,
+            (
+                error(
+                    "spin_error",
+                    "largest difference of the spin to w − σ m g t/I, then zero",
+                    "rad/s",
+                    1e-8,
+                    ROUNDED,
+                ),
+                error("walked", "way of a ball that only spins", "m", 1e-9, ROUNDED, "companion"),
+            ),
+            "spinning on the spot",
+            TIME_STEP,
+            "spin",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP, duration=1.5 * STOPPED),
+    stability=(
+        StabilityStudy(
+            name="slope",
+            title="Steepest slope on which a ball stands",
+            configuration="plain",
+            definition="put down at rest, it moves slower than 1e-6 m/s after a second",
+            study=steepest,
+            unit="1",
+            expected=(0.998 * ROLLING / RADIUS, ROLLING / RADIUS),
+            expected_source="tan θ = ρ/r = 0.04, to the resolution of the search",
+        ),
+    ),
+    figures=(Figure(name="speed", title="Speed against time", draw=draw),),
+    ladders=(
+        Ladder(
+            name="way",
+            description="way until it stands, against v²/(2 a)",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (32, 64, 128, 256, 512)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.002,
+            target_seconds=0.01,
+        ),
+    ),
+)

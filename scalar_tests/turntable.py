@@ -1,0 +1,253 @@
+"""Does a ball on a turntable circle at 2/7 of its rate, and which boxes does the turntable throw off?"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    Box,
+    Final,
+    Material,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+)
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+GRAVITY = 9.81  # m/s²
+FRICTION = 0.5
+RATE = 3.0  # rad/s
+RADIUS, MASS = 0.05, 0.5  # m, kg
+START, PUSH = (0.3, 0.0), (0.1, 0.2)  # m, m/s
+TIME_STEP = 1.0 / 240.0  # s
+CIRCLE = 2.0 / 7.0 * RATE  # rad/s
+TURN = 2.0 * math.pi / CIRCLE  # s
+STEPS = round(TURN / TIME_STEP)
+THROWN = FRICTION * GRAVITY / RATE**2  # m, where boxes begin to slide
+BOX = (0.06, 0.06, 0.02)  # m
+
+ROUGH = Material(friction=FRICTION)
+
+
+def table() -> RigidBody:
+    """A level plane that turns about the z axis."""
+    return RigidBody(
+        name="table",
+        motion="kinematic",
+        shape=Plane(),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, RATE),
+        material=ROUGH,
+    )
+
+
+def rolling() -> Scene:
+    """A ball that rolls on the table without slip from the start: v + r n × w = Ω × x."""
+    (x, y), (vx, vy) = START, PUSH
+    slip = (-RATE * y - vx, RATE * x - vy)  # r n × w = r (−w_y, w_x)
+    ball = RigidBody(
+        name="ball",
+        mass=MASS,
+        shape=Sphere(RADIUS),
+        position=(x, y, RADIUS),
+        velocity=(vx, vy, 0.0),
+        angular_velocity=(slip[1] / RADIUS, -slip[0] / RADIUS, 0.0),
+        material=ROUGH,
+    )
+    return Scene(bodies=(table(), ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def riding(radius: float) -> Scene:
+    """A box that moves with the table, so far from its axis."""
+    box = RigidBody(
+        name="box",
+        mass=1.0,
+        shape=Box(BOX),
+        position=(radius, 0.0, 0.5 * BOX[2]),
+        velocity=(0.0, RATE * radius, 0.0),
+        angular_velocity=(0.0, 0.0, RATE),
+        material=ROUGH,
+    )
+    return Scene(bodies=(table(), box), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def recursion(time_step: float, steps: int) -> Any:
+    """Places of the ball as complex numbers: x₊ = x + h v, v₊ = v + (2/7) i Ω h v: the table is felt where it stood."""
+    x, v = complex(*START), complex(*PUSH)
+    places = [x]
+    for _ in range(steps):
+        x += time_step * v
+        v += 1j * CIRCLE * time_step * v
+        places.append(x)
+    return np.array(places)
+
+
+def circle(time: Any) -> Any:
+    """The circle itself, about x₀ + i v₀/(2/7 Ω)."""
+    centre = complex(*START) + 1j * complex(*PUSH) / CIRCLE
+    return centre + (complex(*START) - centre) * np.exp(1j * CIRCLE * np.asarray(time))
+
+
+def roll(simulate: Simulate) -> dict[str, float]:
+    """One whole circle."""
+    observe = {"x": Trace(quantity=Position("ball"))}
+    result = simulate(rolling(), time_step=TIME_STEP, steps=STEPS, observe=observe)
+    places = result["x"][:, 0] + 1j * result["x"][:, 1]
+    speeds = np.diff(places)
+    phase = float(np.unwrap(np.angle(speeds))[-1] - np.angle(speeds[0]))
+    return {
+        "rate_error": phase / ((STEPS - 1) * TIME_STEP * CIRCLE) - 1.0,
+        "path_error": float(np.abs(places - recursion(TIME_STEP, STEPS)).max()),
+        "height_error": float(np.abs(result["x"][:, 2] - RADIUS).max()),
+    }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Distance from the circle after 2 s [m]."""
+    observe = {"x": Final(quantity=Position("ball"))}
+    result = simulate(rolling(), time_step=time_step, duration=2.0, method=method, observe=observe)
+    return abs(complex(result["x"][0], result["x"][1]) - complex(circle(2.0)))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same ball with nothing observed."""
+    return simulate(rolling(), time_step=time_step, duration=2.0, method=method)
+
+
+def stays(simulate: Simulate, radius: float) -> bool:
+    """Whether a box moves with the table for one step: what friction can bend its way by is h µ g."""
+    observe = {"x": Final(quantity=Position("box"))}
+    result = simulate(riding(radius), time_step=TIME_STEP, steps=2, observe=observe)
+    if not result.completed:
+        return False
+    place = complex(result["x"][0], result["x"][1])
+    carried = radius * (1.0 + 1j * RATE * TIME_STEP) ** 2
+    return abs(place - carried) < 1e-3 * RATE**2 * radius * TIME_STEP**2
+
+
+def farthest(simulate: Simulate) -> BreakPoint:
+    """The largest radius at which boxes stay."""
+    return break_point(lambda radius: stays(simulate, radius), 0.3 * THROWN, 3.0 * THROWN, resolution=1e-3)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """The ball's way over one circle, from above."""
+    observe = {"x": Trace(quantity=Position("ball"))}
+    result = simulate(rolling(), time_step=TIME_STEP, steps=STEPS, observe=observe)
+    exact = circle(result.sample_times["x"])
+    apart = float(np.abs(result["x"][:, 0] + 1j * result["x"][:, 1] - exact).max())
+    return Drawing(
+        curves=(
+            line("ball", result["x"][:, 0], result["x"][:, 1]),
+            line("circle", exact.real, exact.imag, "reference"),
+        ),
+        x_label="x [m]",
+        y_label="y [m]",
+        note=f"The table turns {told(3.5, 2)} times while the ball circles once; the run leaves the circle by "
+        f"{told(apart)} m, half a step of its turn.",
+    )
+
+
+TEST = ScalarTest(
+    title="Turntable",
+    question="Does a ball on a turntable circle at 2/7 of its rate, and does the table throw off what it must?",
+    why="The ball's circle is a classic that no engine gets by chance: rolling, spin and a moving surface must all be "
+    "right. Sorting tables rest on the radius at which friction loses.",
+    model="A solid ball rolls without slip on a rough table that turns at 3 rad/s. Boxes ride on the same table.",
+    parameters=(
+        ("time step", "1/240 s"),
+        ("table", "3 rad/s, µ = 0.5"),
+        ("ball", "radius 0.05 m, 0.5 kg"),
+        ("box", "0.06 × 0.06 × 0.02 m"),
+        ("gravity", "9.81 m/s²"),
+    ),
+    theory=(
+        "Rolling: v + r n × w = Ω × x. With I = ⅖ m r² the friction gives (7/2) v' = Ω × v: a circle at (2/7) Ω.",
+        "One step: x₊ = x + h v, v₊ = v + (2/7) h Ω × v. The speed grows by (1 + (2 Ω h/7)²)^½ a step, the turn is "
+        "arctan(2 Ω h/7): the rate is (2 Ω h/7)²/3 too low.",
+        "A box rides along while Ω² R ≤ µ g; a step asks h Ω² R of at most h µ g, so the radius is exact.",
+    ),
+    reference="Closed forms; the recursion of one step.",
+    conclusion="Green: friction ties the ball's spin, its way and the table together. Red: the moving surface or the "
+    "spin is lost in the contact.",
+    source="ours; E. Soodak and M. S. Tiersten, American Journal of Physics 64 (1996), 289, for the circle",
+    measurements=(
+        ask(
+            roll,
+            (
+                error(
+                    "rate_error",
+                    "rate of the circle over 2/7 of the table's, minus one",
+                    "1",
+                    5e-6,
+                    "the discrete turn is (2 Ω h/7)²/3 = 4.25e-6 too small",
+                ),
+                error(
+                    "path_error",
+                    "largest difference to the recursion of one step over a circle",
+                    "m",
+                    1e-8,
+                    "the same sums in another order; the solver stops at 1e-10 of the load, h g of speed, in each of 1760 steps",
+                    "companion",
+                ),
+                error(
+                    "height_error", "how far the ball leaves the table", "m", 1e-9, "it rests", "companion"
+                ),
+            ),
+            "one circle of the ball",
+            TIME_STEP,
+        ),
+    ),
+    example=lambda: Example(scene=rolling(), time_step=TIME_STEP, duration=TURN),
+    stability=(
+        StabilityStudy(
+            name="thrown",
+            title="Largest radius at which a box rides along",
+            configuration="plain",
+            definition="after two steps the box is where the table carried it",
+            study=farthest,
+            unit="m",
+            expected=(0.998 * THROWN, 1.002 * THROWN),
+            expected_source="µ g/Ω² = 0.545 m, to the resolution of the search and of what counts as carried",
+        ),
+    ),
+    figures=(Figure(name="circle", title="The ball's way from above", draw=draw),),
+    ladders=(
+        Ladder(
+            name="place",
+            description="distance from the circle after 2 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.005,
+            target_seconds=0.05,
+        ),
+    ),
+)

@@ -1,0 +1,179 @@
+"""Rolling and torsional friction: torques up to a bound in every contact, by every solver, in any direction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    AngularMomentum,
+    AngularVelocity,
+    Box,
+    Capsule,
+    Final,
+    KineticEnergy,
+    Material,
+    Method,
+    Plane,
+    RigidBody,
+    Scene,
+    SceneError,
+    Sphere,
+    Trace,
+    Velocity,
+    compile,
+    explain,
+    simulate,
+)
+
+H = 1.0 / 60.0
+DOWN = (0.0, 0.0, -10.0)
+RADIUS = 0.1
+
+
+def floor(mu: float = 0.5) -> RigidBody:
+    return RigidBody(
+        name="floor", motion="static", shape=Plane(), position=(0, 0, 0), material=Material(friction=mu)
+    )
+
+
+def ball(name: str = "ball", height: float = RADIUS, mu: float = 0.5, **fields: object) -> RigidBody:
+    given = {"mass": 2.0, "shape": Sphere(RADIUS), "position": (0, 0, height)}
+    surface = {k: fields.pop(k) for k in ("rolling_friction", "torsional_friction") if k in fields}
+    return RigidBody(name=name, material=Material(friction=mu, **surface), **(given | fields))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
+@pytest.mark.parametrize("away", [0.0, 0.4, 2.1, -1.3])
+def test_a_ball_slows_down_alike_in_every_direction(solver: str, away: float) -> None:
+    c, s = math.cos(away), math.sin(away)
+    rolling = ball(
+        rolling_friction=0.01, velocity=(c, s, 0.0), angular_velocity=(-s / RADIUS, c / RADIUS, 0.0)
+    )
+    v = simulate(
+        Scene(bodies=(floor(), rolling), gravity=DOWN),
+        time_step=H,
+        steps=120,
+        method=Method(solver=solver),  # type: ignore[arg-type]
+        observe={"v": Trace(quantity=Velocity("ball"))},
+    )["v"]
+
+    exact = np.maximum(0.0, 1.0 - 5.0 / 7.0 * 0.01 / RADIUS * 10.0 * H * np.arange(121))
+    np.testing.assert_allclose(v[:, 0], exact * c, atol=1e-9)
+    np.testing.assert_allclose(v[:, 1], exact * s, atol=1e-9)
+
+
+def test_without_friction_a_spinning_ball_still_feels_the_torque() -> None:
+    """No tangential force: the spin about a level axis falls by ρ m g h/I a step and nothing moves on."""
+    spinning = ball(mu=0.0, rolling_friction=0.01, angular_velocity=(20.0, 0.0, 0.0))
+    found = simulate(
+        Scene(bodies=(floor(0.0), spinning), gravity=DOWN),
+        time_step=H,
+        steps=10,
+        observe={"w": Trace(quantity=AngularVelocity("ball")), "v": Final(quantity=Velocity("ball"))},
+    )
+
+    slowing = 0.01 * 10.0 / (0.4 * RADIUS**2)
+    np.testing.assert_allclose(found["w"][:, 0], 20.0 - slowing * H * np.arange(11), atol=1e-9)
+    assert not found["v"][:2].any()
+
+
+def test_two_balls_that_turn_against_each_other_keep_their_angular_momentum() -> None:
+    bodies = (
+        ball(
+            "left",
+            height=0.0,
+            position=(-RADIUS, 0, 0),
+            torsional_friction=0.02,
+            angular_velocity=(9.0, 0, 0),
+        ),
+        ball("right", height=0.0, position=(RADIUS, 0, 0), torsional_friction=0.02, velocity=(-1.0, 0, 0)),
+    )
+    observe = {
+        "momentum": Trace(quantity=AngularMomentum()),
+        "energy": Trace(quantity=KineticEnergy()),
+        "w": Final(quantity=AngularVelocity("right")),
+    }
+    found = simulate(Scene(bodies=bodies), time_step=H, steps=3, observe=observe)
+
+    np.testing.assert_allclose(found["momentum"], np.tile(found["momentum"][0], (4, 1)), atol=1e-14)
+    assert np.all(np.diff(found["energy"]) <= 1e-14)
+    # A plastic blow of reduced mass 1 kg at 1 m/s: the torque's impulse is at most σ times 1 N s.
+    assert found["w"][0] == pytest.approx(0.02 * 1.0 / (0.4 * 2.0 * RADIUS**2), abs=1e-9)
+
+
+def test_a_box_and_a_capsule_take_it_at_every_point() -> None:
+    """Torsional friction of four points is that of one with the whole load."""
+    spins = {}
+    for shape in (Box((0.2, 0.2, 0.2)), Capsule(0.1, 0.2)):
+        body = ball(
+            mu=0.0, torsional_friction=0.003, shape=shape, angular_velocity=(0.0, 0.0, 4.0), height=RADIUS
+        )
+        if isinstance(shape, Capsule):  # on its side: its axis is level
+            half = math.sqrt(0.5)
+            body = ball(
+                mu=0.0,
+                torsional_friction=0.003,
+                shape=shape,
+                orientation=(half, 0.0, half, 0.0),
+                angular_velocity=(0.0, 0.0, 4.0),
+                inertia=(0.02, 0.02, 0.02),
+            )
+        else:
+            body = ball(
+                mu=0.0,
+                torsional_friction=0.003,
+                shape=shape,
+                angular_velocity=(0.0, 0.0, 4.0),
+                inertia=(0.02, 0.02, 0.02),
+            )
+        found = simulate(
+            Scene(bodies=(floor(0.0), body), gravity=DOWN),
+            time_step=H,
+            steps=30,
+            observe={"w": Final(quantity=AngularVelocity("ball"))},
+        )
+        spins[type(shape)] = float(found["w"][2])
+
+    exact = 4.0 - 0.003 * 2.0 * 10.0 / 0.02 * 30 * H
+    assert spins == pytest.approx(dict.fromkeys(spins, exact), abs=1e-7)
+
+
+def test_a_heap_with_rolling_friction_comes_to_rest_on_a_slope() -> None:
+    """Twelve balls side by side on a slope they would roll down."""
+    tilt = math.atan(0.05)
+    balls = [
+        ball(f"ball {i}", position=(0.3 * (i % 4), 0.3 * (i // 4), RADIUS), rolling_friction=0.01)
+        for i in range(12)
+    ]
+    found = simulate(
+        Scene(bodies=(floor(), *balls), gravity=(10.0 * math.sin(tilt), 0.0, -10.0 * math.cos(tilt))),
+        time_step=H,
+        steps=60,
+        observe={"energy": Final(quantity=KineticEnergy())},
+    )
+
+    assert found["energy"] < 1e-20
+
+
+def test_the_stage_is_left_out_with_a_reason_where_nothing_resists() -> None:
+    for body, kept, reason in (
+        (ball(rolling_friction=0.01), True, "meets friction"),
+        (ball(torsional_friction=0.01), True, "meets friction"),
+        (ball(), False, "no surface resists rolling"),
+    ):
+        (choice,) = [
+            c for c in explain(Scene(bodies=(floor(), body), gravity=DOWN), time_step=H) if c.stage == "roll"
+        ]
+        assert choice.kept == kept and reason in choice.reason
+    assert "roll" not in compile(Scene(bodies=(floor(), ball())), time_step=H).stages
+
+
+@pytest.mark.parametrize("field", ["rolling_friction", "torsional_friction"])
+@pytest.mark.parametrize("value", [-1e-3, math.nan, math.inf, "soft"])
+def test_a_friction_that_cannot_be_is_refused_in_a_sentence(field: str, value: object) -> None:
+    with pytest.raises(SceneError, match=field) as caught:
+        Material(**{field: value})  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,170 @@
+"""Engines beside each other: one matrix, one table at equal error, and a page for every other engine."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from spook_tracker.tracker.website.publish import publish
+from tests.browser import arrive, wait_for
+from tests.synthetic_history import (
+    HOSTILE,
+    MACHINE,
+    DocumentHistory,
+    history,
+    rival,
+    with_rival,
+)
+
+
+class Tables(HTMLParser):
+    """Every table of a page: lines of cells, as a reader without a pointer has them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: dict[str, list[list[str]]] = {}
+        self.caption, self.cell, self.inside = "", "", ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("caption", "th", "td"):
+            self.inside, self.cell = tag, ""
+        if tag == "tr" and self.caption:
+            self.found[self.caption].append([])
+
+    def handle_endtag(self, tag: str) -> None:
+        words = " ".join(self.cell.split())
+        if tag == "caption":
+            self.caption = words
+            self.found[words] = []
+        elif tag in ("th", "td"):
+            self.found[self.caption][-1].append(words)
+        self.inside = "" if tag == self.inside else self.inside
+
+    def handle_data(self, data: str) -> None:
+        if self.inside:
+            self.cell += data + " "
+
+
+def lines(site: Path, page: str, caption: str) -> list[list[str]]:
+    """The table whose caption starts so."""
+    tables = Tables((site / page).read_text(encoding="utf-8").replace("\u202f", " ")).found
+    return next(found for name, found in tables.items() if name.startswith(caption))
+
+
+def table(site: Path, page: str, caption: str) -> dict[str, list[str]]:
+    """Its lines by their first words."""
+    return {line[0]: line[1:] for line in lines(site, page, caption)}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("engines") / "public"
+    publish(with_rival(history(3)), out)
+    return out
+
+
+def test_every_gate_shows_what_each_engine_says_in_the_configuration_it_names_first(site: Path) -> None:
+    told = table(site, "engines.html", "A line for each gate")
+
+    assert told["Test"] == ["Limit", "spook 0.1.2", "rival 3.3"]
+    assert told["Pendulum Largest pendulum deviation"][1:] == ["kept: 9.3×10⁻⁴ %"] * 2
+    assert told["Door on hinges Largest door deviation"][2] == "kept: 0.0125 %"
+    assert told["Friction Largest friction deviation"][1:] == ["kept: 0.5", "not supported"]
+
+
+def test_whoever_is_first_at_an_error_stands_out_and_ours_is_not_spared(site: Path) -> None:
+    """By hand: ours of order 2 is 0.3 h² in 4.04e-6/h s, theirs 0.3 h⁴ in 2e-5/h s, between the steps by powers."""
+    scene = "Pendulum length [%]"
+    one, middle, fine = (
+        table(site, "engines.html", f"Run time to an error of 10{e}") for e in ("⁻²", "⁻⁴", "⁻⁶")
+    )
+
+    assert one[scene] == ["40.4 µs", "200 µs 5 times the best"]
+    assert middle[scene] == ["221 µs 1.1 times the best", "200 µs"]
+    assert fine[scene] == ["not reached", "468 µs"]
+    behind = lines(site, "engines.html", "Scenes and errors that another engine reaches first")
+    assert behind[1:] == [
+        ["Pendulum length", "10⁻⁶ %", "rival 3.3", "468 µs", "never", ""],
+        ["Pendulum length", "10⁻⁴ %", "rival 3.3", "200 µs", "221 µs", "1.1 ×"],
+    ]
+    page = (site / "engines.html").read_text(encoding="utf-8")
+    assert len(re.findall('class="num best"', page)) == 3  # one a column that anybody fills
+
+
+def test_scenes_that_one_engine_alone_was_asked_are_no_race(site: Path) -> None:
+    fine = table(site, "engines.html", "Run time to an error of 10⁻⁴")
+
+    assert [scene for scene in fine if scene != "Scene"] == ["Pendulum length [%]"]
+
+
+def test_the_page_of_an_engine_has_all_its_configurations_and_names_the_release_of_a_change(
+    site: Path,
+) -> None:
+    gates = table(site, "engines/rival.html", "The value, and whether the limit is kept")
+    releases = table(site, "engines/rival.html", "The newest first")
+
+    assert gates["Test"] == ["Limit", "rk4", "euler"]
+    assert gates["Door on hinges Largest door deviation"][1:] == ["kept: 0.0125 %", "not kept: 0.0375 %"]
+    assert releases["3.3"][1:3] == ["2", releases["3.3"][2]]
+    assert "door (2)" in releases["3.3"][2]
+    assert "0.5 % to 0.0125 %" in releases["3.3"][2]
+    assert releases["3.2"][1] == "0"
+    assert releases["3.1"][1] == "the first"
+
+
+def test_run_times_of_another_machine_are_not_set_beside_ours(tmp_path: Path) -> None:
+    elsewhere = msgspec.structs.replace(MACHINE, fingerprint="another")
+    ours = history(2).documents.values()
+    publish(DocumentHistory([*ours, rival("3.1", machine=elsewhere)]), tmp_path / "public")
+
+    coarse = table(tmp_path / "public", "engines.html", "Run time to an error of 10⁻²")
+
+    assert coarse["Pendulum length [%]"][1] == "another machine"
+    assert "rival 3.1 ran on another" in (tmp_path / "public" / "engines.html").read_text(encoding="utf-8")
+
+
+def test_one_engine_alone_is_told_how_others_are_asked(tmp_path: Path) -> None:
+    publish(history(2), tmp_path / "public")
+
+    text = (tmp_path / "public" / "engines.html").read_text(encoding="utf-8")
+
+    assert "tracker nightly --engine spook,mujoco" in text
+    assert "<table" not in text
+
+
+def test_a_hostile_name_of_an_engine_is_text_and_a_file_within_the_folder(tmp_path: Path) -> None:
+    publish(DocumentHistory([*history(2).documents.values(), rival("1", name=HOSTILE)]), tmp_path / "public")
+
+    pages = list((tmp_path / "public" / "engines").iterdir())
+
+    assert len(pages) == 1
+    assert "<img src=x" not in pages[0].read_text(encoding="utf-8")
+    assert "<img src=x" not in (tmp_path / "public" / "engines.html").read_text(encoding="utf-8")
+
+
+def test_two_versions_of_another_engine_can_be_compared_in_the_page(driver: Any, site: Path) -> None:
+    def told(before: str, after: str) -> str:
+        arrive(
+            driver, f"{(site / 'compare.html').as_uri()}#after=run-rival-{after}&before=run-rival-{before}"
+        )
+        places = {"3.1": 3, "3.2": 4, "3.3": 5}
+        shown = f"{places[before]},{places[after]}"
+        wait_for(driver, "document.getElementById('told').dataset.shown === arguments[0]", shown)
+        return str(driver.find_element("id", "told").text)
+
+    assert "32 identical, 2 same" in told("3.1", "3.2")
+    changed = told("3.2", "3.3")
+    assert "Door on hinges" in changed and "0.0125" in changed
+    assert "Pendulum" not in changed
+
+
+def test_two_engines_are_not_held_to_each_other_s_values(driver: Any, site: Path) -> None:
+    arrive(driver, f"{(site / 'compare.html').as_uri()}#after=run-rival-3.3&before=run-spook-0001")
+
+    wait_for(driver, "document.querySelector('#told a[href=\"engines.html\"]')")

@@ -1,0 +1,198 @@
+"""Earlier commits: the first bad one is found wherever ways part and meet, and old commits join the history."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from msgspec.structs import replace
+
+import spook_tracker.tracker.measure.commits as commits
+import spook_tracker.tracker.past as past
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.judge.choice import Choice
+from tests.test_tracker_one_judge import night, one
+
+
+class Repository:
+    """A git repository in which each commit gives one value."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.values: dict[str, float] = {}
+        self.asked: list[str] = []
+        self.git("init", "-q", "-b", "main")
+        (folder / "engine" / "native").mkdir(parents=True)
+        (folder / "engine" / "native" / "CMakeLists.txt").write_text("")
+        self.git("add", "-A")
+
+    def git(self, *arguments: str) -> str:
+        who = ("-c", "user.name=A", "-c", "user.email=a@example.org")
+        return subprocess.run(
+            ["git", "-C", str(self.folder), *who, *arguments], capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    def commit(self, value: float) -> str:
+        self.git("commit", "-q", "--allow-empty", "-m", f"Let it be {value} {len(self.values)}")
+        return self.has(value)
+
+    def merge(self, branch: str, value: float) -> str:
+        self.git("merge", "-q", "--no-ff", "-m", f"Merge {len(self.values)}", branch)
+        return self.has(value)
+
+    def has(self, value: float) -> str:
+        head = self.git("rev-parse", "HEAD")
+        self.values[head] = value
+        return head
+
+    def measure(self, commit: str) -> RunDocument:
+        self.asked.append(commit)
+        value = self.values[commit]
+        if value < 0.0:
+            raise commits.CommitError(f"{commit[:12]} does not build")
+        found = night(0, one(value))
+        return replace(
+            found, id=commit, idempotency_key=commit, engine=replace(found.engine, git_hash=commit)
+        )
+
+    def bisect(self, good: str, bad: str, **asked: Any) -> past.Blamed:
+        return past.bisect(self.folder, good, bad, self.measure, **asked)
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Repository:
+    folder = tmp_path / "repository"
+    folder.mkdir()
+    return Repository(folder)
+
+
+def test_the_first_bad_commit_is_found_in_few_steps(repository: Repository) -> None:
+    made = [repository.commit(0.1 if n < 11 else 0.3) for n in range(16)]
+    found = repository.bisect(made[0], made[-1])
+
+    assert found.commits == (made[11],)
+    assert len(found.steps) <= 4
+    assert {step.word for step in found.steps} == {"good", "bad"}
+    assert [change.series for change in found.reds] == [one(0.1)[0][0].key]
+
+
+def test_a_bad_commit_of_a_branch_is_blamed_and_not_its_merge(repository: Repository) -> None:
+    start = repository.commit(0.1)
+    repository.git("checkout", "-q", "-b", "side")
+    repository.commit(0.1)
+    bad = repository.commit(0.3)
+    repository.commit(0.3)
+    repository.git("checkout", "-q", "main")
+    repository.commit(0.1)
+    repository.merge("side", 0.3)
+    last = repository.commit(0.3)
+
+    assert repository.bisect(start, last).commits == (bad,)
+
+
+def test_commits_that_do_not_build_are_passed_over_and_named_where_they_hide_the_bad_one(
+    repository: Repository,
+) -> None:
+    made = [repository.commit(value) for value in (0.1, -1.0, 0.1, 0.3, -1.0, 0.3)]
+    assert repository.bisect(made[0], made[-1]).commits == (made[3],)
+
+    hidden = [repository.commit(value) for value in (0.1, -1.0, -1.0, 0.4)]
+    found = repository.bisect(hidden[0], hidden[-1])
+    assert set(found.commits) == set(hidden[1:])
+
+
+def test_another_test_that_became_worse_on_the_way_leads_nowhere(repository: Repository) -> None:
+    made = [repository.commit(0.1 if n < 3 else 0.3) for n in range(6)]
+
+    with pytest.raises(TrackerError, match="nothing of it is worse"):
+        repository.bisect(made[0], made[-1], choice=Choice(tests=("another",)))
+
+
+def test_ends_that_say_nothing_are_refused(repository: Repository) -> None:
+    made = [repository.commit(value) for value in (0.1, 0.1, 0.3)]
+
+    with pytest.raises(TrackerError, match="nothing of it is worse"):
+        repository.bisect(made[0], made[1])
+    with pytest.raises(TrackerError, match="no ancestor"):
+        repository.bisect(made[2], made[0])
+    with pytest.raises(TrackerError, match="git knows no commit"):
+        repository.bisect("nobody", made[0])
+
+
+def test_commits_are_named_one_by_one_or_as_a_range(repository: Repository) -> None:
+    made = [repository.commit(0.1) for _ in range(5)]
+
+    assert commits.commits_named(repository.folder, [made[3], made[1]]) == [made[1], made[3]]
+    assert commits.commits_named(repository.folder, [f"{made[1]}..{made[3]}"]) == made[2:4]
+
+
+def test_old_commits_join_the_history_once(
+    repository: Repository, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = [repository.commit(value) for value in (0.1, -1.0, 0.3)]
+    monkeypatch.chdir(repository.folder)
+    monkeypatch.setattr(commits, "built", lambda where, commit, folder: Path(commit))
+    monkeypatch.setattr(
+        commits,
+        "ask_commit",
+        lambda place, tests, *options: (repository.measure(str(place)), "its own questions"),
+    )
+    asked = ["backfill", *reversed(made), "--db", f"sqlite:///{tmp_path}/t.db"]
+    first, second = (CliRunner().invoke(main, asked) for _ in range(2))
+
+    assert first.exit_code == 0
+    assert next(x for x in first.output.splitlines() if "recorded as run" in x).startswith("[1/3]")
+    assert f"{made[0][:12]} answers its own questions" in first.output
+    assert "does not build" in first.output
+    assert second.output.count("recorded already") == 2
+
+
+def test_what_the_history_blames_is_where_a_search_begins(
+    repository: Repository, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from spook_tracker.tracker.library import record
+
+    made = [repository.commit(0.1 if n < 5 else 0.3) for n in range(9)]
+    database = f"sqlite:///{tmp_path}/t.db"
+    for place, number in enumerate((0, 2, 7)):  # nights between which nobody measured
+        found = repository.measure(made[number])
+        engine = replace(found.engine, commit_time=f"2026-01-0{place + 1}T00:00:00+00:00", parents=())
+        record(replace(found, engine=engine, started=f"2026-01-0{place + 1}T00:00:00+00:00"), database)
+    monkeypatch.chdir(repository.folder)
+    monkeypatch.setattr(commits, "built", lambda where, commit, folder: Path(commit))
+    monkeypatch.setattr(
+        commits,
+        "ask_commit",
+        lambda place, tests, *options: (repository.measure(str(place)), "today's questions"),
+    )
+    repository.asked.clear()
+    shown = CliRunner().invoke(main, ["bisect", "t", "--db", database])
+
+    assert shown.exit_code == 1
+    assert f"first bad commit {made[5][:12]}: Let it be 0.3 5 (A)" in shown.output
+    assert repository.asked[:2] == [made[2], made[7]]
+
+
+def test_a_folder_without_the_engine_is_no_place_to_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shown = CliRunner().invoke(main, ["bisect", "pendulum", "--good", "a", "--bad", "b"])
+
+    assert shown.exit_code == 2
+    assert "is in no repository of the engine" in shown.stderr
+    assert "name commits to measure" in CliRunner().invoke(main, ["backfill"]).stderr
+
+
+def test_todays_questions_are_put_to_the_engine_of_then(tmp_path: Path) -> None:
+    (tmp_path / "engine").mkdir()
+    package = commits._with_todays_questions(tmp_path) / commits.PACKAGE
+
+    assert (package / "engine").resolve() == (tmp_path / "engine").resolve()
+    assert (package / "scalar_tests" / "catalogue.py").exists()
+    assert not (package / "scalar_tests").resolve().is_relative_to(tmp_path)

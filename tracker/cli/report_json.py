@@ -1,0 +1,113 @@
+"""What commands print for programs: `--json` of trend, list, show, explain and db stats."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.document.json_form import Number, readable
+from spook_tracker.tracker.judge.series_history import Judged, Told
+
+
+def trend_json(trends: Iterable[Told]) -> str:
+    """A list with an object for each series: its definition, and every night with its verdict, oldest first."""
+    return readable(
+        [
+            {"series": told.key, "definition": told.definition, "nights": [_night(j) for j in told.nights]}
+            for told in trends
+        ]
+    )
+
+
+def _night(judged: Judged) -> dict[str, Any]:
+    run = judged.night.run
+    return {
+        "run": run.id,
+        "started": run.started,
+        "version": run.engine.version,
+        "commit": run.engine.git_hash,
+        "value": judged.night.sample.value,
+        "outcome": judged.night.sample.outcome,
+        "word": judged.verdict.word,
+        "name": judged.verdict.name,
+        "sentence": judged.verdict.sentence,
+        "state": judged.state,
+        "stands": judged.stands,
+        "news": judged.news,
+        "first_bad": judged.first_bad.run.engine.git_hash if judged.first_bad else "",
+        "last_good": judged.last_good.run.engine.git_hash if judged.last_good else "",
+        "accepted": judged.accepted,
+    }
+
+
+def list_json(tests: Mapping[str, ScalarTest]) -> str:
+    """A list with an object for each test: its question and what is measured."""
+    return readable([_test(name, test) for name, test in tests.items()])
+
+
+def _test(name: str, test: ScalarTest) -> dict[str, Any]:
+    return {
+        "test": name,
+        "title": test.title,
+        "question": test.question,
+        "seven": test.seven,
+        "metrics": [
+            {
+                "metric": metric.name,
+                "configuration": measurement.configuration,
+                "time_step": measurement.time_step,
+                "role": metric.role,
+                "unit": metric.unit,
+                "better": metric.better,
+                "limit": _limit(metric.limit),
+                "limit_source": metric.limit_source,
+                "set_point": _limit(metric.set_point),
+                "set_point_source": metric.set_point_source,
+                "description": metric.description,
+            }
+            for measurement, metric in test.metrics()
+        ],
+    }
+
+
+def _limit(limit: float | tuple[float, float] | None) -> Any:
+    if limit is None:
+        return None
+    return tuple(map(Number, limit)) if isinstance(limit, tuple) else Number(limit)
+
+
+def show_json(name: str, test: ScalarTest) -> str:
+    """One test in full: an object of `list --json` and all that its page says."""
+    words = ("why", "model", "parameters", "theory", "reference", "conclusion", "source", "misprints")
+    return readable(_test(name, test) | {word: getattr(test, word) for word in words})
+
+
+def explain_json(
+    name: str,
+    choices: Iterable[Any],
+    costs: Mapping[str, float] | None = None,
+    saved: Mapping[str, float] | None = None,
+) -> str:
+    """The stages of a test's scene in order; `seconds_per_step` is what one takes or, left out, saves."""
+    told = []
+    for choice in choices:
+        measured = (costs or {}) if choice.kept else (saved or {})
+        told.append(
+            {
+                "stage": choice.stage,
+                "kept": choice.kept,
+                "reason": choice.reason,
+                "seconds_per_step": measured.get(choice.stage),
+            }
+        )
+    return readable({"test": name, "stages": told})
+
+
+def stats_json(found: Any) -> str:
+    """How much is stored: bytes, rows by table, runs by engine."""
+    told = {name: getattr(found, name) for name in ("database", "revision", "size", "rows", "engines")}
+    ends = {
+        end: getattr(found, end).isoformat() if getattr(found, end) else None for end in ("first", "last")
+    }
+    return readable(told | ends)

@@ -1,0 +1,137 @@
+"""`tracker.toml`: what a team says once, in its repository, and every command reads.
+
+    engine = "tracking.adapter"          # as --engine
+    catalogue = "standard,tracking.questions"
+    database = "sqlite:///history.db"    # as --db; a file is looked for beside tracker.toml
+    accepted = "accepted.toml"
+    title = "Pebble, every night"        # of the website
+    home_page = "https://example.org/pebble"
+
+    [limits]                             # what your engine owes you, by series
+    "falling_object/default/velocity_error/*" = 1e-9
+
+It is looked for where one stands and in the folders above, up to the root of the repository and no further.
+What a command line or an environment variable says goes before it.
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import click
+
+from spook_tracker.tracker.document.errors import TrackerError
+
+FILE = "tracker.toml"
+KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an option: what it may be
+    "engine": (str,),
+    "catalogue": (str,),
+    "database": (str,),
+    "accepted": (str,),
+    "out": (str,),
+    "title": (str,),
+    "home_page": (str,),
+    "executor": (str,),
+    "workers": (int,),
+    "limit": (int, float),
+    "time_limit": (int, float),
+}
+WORDS = {str: "a text", int: "a whole number", float: "a number"}
+NOT_MEANT = {"backfill": {"engine", "catalogue", "out"}, "export": {"out"}, "rank": {"engine"}} | {
+    name: {"engine"} for name in ("compare", "judge", "trend")
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What tracker.toml says; empty without one."""
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+    limits: tuple[tuple[str, Any], ...] = ()
+
+    def limits_of(self, engine: str) -> tuple[tuple[str, Any], ...]:
+        """They are the team's own engine's; another one that is asked beside it is not held to them."""
+        return self.limits if engine == self.values.get("engine", "spook").split(",")[0] else ()
+
+
+class SettingsError(TrackerError):
+    """tracker.toml cannot be read, or says something that is not understood."""
+
+
+def present() -> Settings:
+    """Those of the command that is running."""
+    context = click.get_current_context(silent=True)
+    return (context.find_object(Settings) if context else None) or Settings()
+
+
+def read(here: Path) -> Settings:
+    """The settings that hold in the folder `here`. SettingsError names the file and what is wrong with it."""
+    file = _file(here)
+    if file is None:
+        return Settings()
+    try:
+        said = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SettingsError(f"{file} cannot be read: {error}") from None
+    limits = said.pop("limits", {})
+    for name, value in said.items():
+        if name not in KINDS:
+            raise SettingsError(f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits")
+        if type(value) not in KINDS[name]:
+            raise SettingsError(f"{file}: {name} must be {WORDS[KINDS[name][-1]]}, not {value!r}")
+    folder = str(file.parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)  # engine and catalogue are modules of that folder
+    return Settings(_placed(said, file.parent, here), _limits(file, limits))
+
+
+def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:
+    """The same as click wants it: for every command, its options' defaults."""
+    found: dict[str, Any] = {}
+    for name, command in group.commands.items():
+        if isinstance(command, click.Group):
+            found[name] = defaults(command, settings)
+        else:
+            known = {p.name for p in command.params} - NOT_MEANT.get(name, set())
+            found[name] = {key: value for key, value in settings.values.items() if key in known}
+    return found
+
+
+def _file(here: Path) -> Path | None:
+    """Above the folder one stands in only inside a repository: what lies higher is somebody else's."""
+    above = [here, *here.parents]
+    root = next((place for place, folder in enumerate(above) if (folder / ".git").exists()), 0)
+    return next((folder / FILE for folder in above[: root + 1] if (folder / FILE).is_file()), None)
+
+
+def _placed(said: dict[str, Any], folder: Path, here: Path) -> dict[str, Any]:
+    """Files beside tracker.toml, wherever in the repository one stands."""
+    if folder == here:
+        return said
+    placed = dict(said)
+    for name in ("accepted", "out"):
+        if name in said:
+            placed[name] = str(folder / said[name])
+    url = said.get("database", "")
+    if url.startswith("sqlite:///") and not url.startswith("sqlite:////"):
+        placed["database"] = f"sqlite:///{folder / url.removeprefix('sqlite:///')}"
+    elif url and "://" not in url:
+        placed["database"] = str(folder / url)
+    return placed
+
+
+def _limits(file: Path, said: Any) -> tuple[tuple[str, Any], ...]:
+    if not isinstance(said, dict):
+        raise SettingsError(f"{file}: limits must be a table of series and limits")
+    found = []
+    for series, limit in said.items():
+        numbers = limit if isinstance(limit, list) else [limit]
+        if not all(type(n) in (int, float) and n == n for n in numbers) or len(numbers) not in (1, 2):
+            raise SettingsError(f"{file}: the limit of {series!r} must be a number or two, not {limit!r}")
+        found.append((series, tuple(map(float, limit)) if isinstance(limit, list) else float(limit)))
+    return tuple(found)

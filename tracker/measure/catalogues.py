@@ -1,0 +1,65 @@
+"""A catalogue by its name: ours, one a package announces, module:NAME, or several with commas between.
+
+    standard                   ours, which needs SciPy
+    any other word             what an installed package announces as an entry point "spook_tracker.catalogues"
+    my_tests, my_tests:NAME    a module with a table name → ScalarTest, called CATALOGUE or NAME
+
+The folder one stands in is looked at, too: a team's own questions need no installation.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.document.errors import TrackerError
+
+STANDARD = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
+GROUP = "spook_tracker.catalogues"
+
+
+class CatalogueError(TrackerError):
+    """There is no such catalogue, or it is none; one sentence that names the way out."""
+
+
+def find(names: str) -> Mapping[str, ScalarTest]:
+    """The tests of the catalogues named, in that order. A test that two of them have is refused."""
+    found: dict[str, ScalarTest] = {}
+    owner: dict[str, str] = {}
+    for name in [part.strip() for part in names.split(",")]:
+        for test, asked in _one(name).items():
+            if test in found:
+                raise CatalogueError(f"{owner[test]} and {name} both have a test {test!r}; rename one")
+            found[test], owner[test] = asked, name
+    return found
+
+
+def _one(name: str) -> Mapping[str, ScalarTest]:
+    try:
+        found = _loaded(STANDARD if name == "standard" else name)
+    except (ImportError, AttributeError) as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "scipy":
+            raise CatalogueError(
+                f"the catalogue {name!r} needs SciPy; install it with: pip install 'spook-tracker[standard]', "
+                "or name tests of your own with --catalogue or in tracker.toml"
+            ) from None
+        raise CatalogueError(f"there is no catalogue {name!r} ({error}); name one as module:NAME") from None
+    if not isinstance(found, Mapping) or not all(isinstance(test, ScalarTest) for test in found.values()):
+        raise CatalogueError(f"{name!r} is no catalogue: a mapping from name to ScalarTest")
+    return found
+
+
+def _loaded(name: str) -> Any:
+    for point in () if ":" in name else entry_points(group=GROUP):
+        if point.name == name:
+            return point.load()
+    module, _, attribute = name.partition(":")
+    here = str(Path.cwd())
+    if not module.startswith("spook_tracker.") and here not in sys.path:
+        sys.path.insert(0, here)  # the console script does not look where one stands
+    return getattr(importlib.import_module(module), attribute or "CATALOGUE")

@@ -1,0 +1,171 @@
+"""Earlier commits of this project's own engine, each built in a folder of its own and asked.
+
+A commit is checked out into a clone that shares the repository's objects; the repository itself is left alone.
+Where the engine of then can answer today's questions it is asked those, because only equal questions have comparable
+answers; else it is asked its own.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Sequence
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+import spook_tracker
+from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.json_form import decode
+from spook_tracker.tracker.document.run_document import RunDocument
+
+PACKAGE = "spook_tracker"
+NATIVE = Path("engine/native")
+WORKS = "works"  # a file in a commit's folder, once its engine is built
+OURS = ("engine", "scalar_tests", "tracker", "migrations", "site")
+
+
+class CommitError(TrackerError):
+    """A commit cannot be found, built or asked; one sentence that says which and why."""
+
+
+def repository_at(folder: Path) -> Path:
+    """The repository around a folder that holds this project's engine. Raises CommitError."""
+    done = _run(["git", "-C", str(folder), "rev-parse", "--show-toplevel"])
+    place = Path(done.stdout.strip()) if done.returncode == 0 else None
+    if place is None or not (place / NATIVE / "CMakeLists.txt").exists():
+        raise CommitError(f"{folder} is in no repository of the engine; call this inside a clone of it")
+    return place
+
+
+def full_hash(repository: Path, name: str) -> str:
+    """The commit a name stands for. Raises CommitError."""
+    done = _run(
+        [
+            "git",
+            "-C",
+            str(repository),
+            "rev-parse",
+            "--verify",
+            "-q",
+            "--end-of-options",
+            f"{name}^{{commit}}",
+        ]
+    )
+    if done.returncode:
+        raise CommitError(f"git knows no commit {name!r}; name a hash, a tag or a branch")
+    return done.stdout.strip()
+
+
+def commits_named(repository: Path, names: Sequence[str]) -> list[str]:
+    """The commits that names and ranges (A..B) stand for, ancestors first. Raises CommitError."""
+    found: set[str] = set()
+    for name in names:
+        start, dots, end = name.partition("..")
+        if not dots:
+            found.add(full_hash(repository, name))
+            continue
+        ends = [full_hash(repository, end or "HEAD"), "^" + full_hash(repository, start)]
+        found.update(_run(["git", "-C", str(repository), "rev-list", *ends]).stdout.split())
+    listed = (
+        _run(["git", "-C", str(repository), "rev-list", "--topo-order", "--reverse", *sorted(found)])
+        if found
+        else None
+    )
+    return [commit for commit in (listed.stdout.split() if listed else ()) if commit in found]
+
+
+def subject(repository: Path, commit: str) -> str:
+    """The first line of a commit's message, and who wrote it."""
+    return _run(["git", "-C", str(repository), "show", "-s", "--format=%s (%an)", commit]).stdout.strip()
+
+
+def built(repository: Path, commit: str, folder: Path) -> Path:
+    """The folder with that commit and its engine, built; what is there already is used again. Raises CommitError."""
+    place = folder / commit[:12]
+    if (place / WORKS).exists():
+        return place
+    shutil.rmtree(place, ignore_errors=True)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    clone = ["git", "clone", "-q", "--shared", "--no-checkout", str(repository), str(place)]
+    for command in (clone, ["git", "-C", str(place), "checkout", "-q", "--detach", commit]):
+        _must(command, f"commit {commit[:12]} cannot be checked out")
+    build_in_place(place)
+    (place / WORKS).touch()
+    return place
+
+
+def build_in_place(place: Path) -> None:
+    """Build the engine of a checkout, so that Python finds it there. Raises CommitError."""
+    if not (place / NATIVE / "CMakeLists.txt").exists():
+        raise CommitError(f"{place.name} has no {NATIVE}: it is from before the engine")
+    beside = Path(sys.executable).with_name("cmake")
+    cmake = str(beside) if beside.exists() else shutil.which("cmake")
+    if cmake is None:
+        raise CommitError("building a commit needs cmake; install the tools of development: make develop")
+    source, output = str(place / NATIVE), str(place / "build")
+    configure = [cmake, "-S", source, "-B", output, f"-DPython_EXECUTABLE={sys.executable}"]
+    for command in (configure, [cmake, "--build", output, "-j2"]):
+        _must(command, f"{place.name} does not build")
+    modules = [file for file in (place / "build").iterdir() if file.name.endswith(tuple(EXTENSION_SUFFIXES))]
+    if not modules:
+        raise CommitError(f"{place.name} builds, but without a module for Python")
+    for module in modules:
+        module.replace(place / "engine" / module.name)
+
+
+def ask_commit(place: Path, tests: Sequence[str], *options: str) -> tuple[RunDocument, str]:
+    """What the engine of a checkout answers, and whose questions these were, in words. Raises CommitError.
+
+    `options` are those of `tracker run`.
+    """
+    reasons = []
+    for whose, search in (("today's questions", _with_todays_questions(place)), ("its own questions", place)):
+        file = place / "run.json"
+        file.unlink(missing_ok=True)
+        done = call(search, "run", *tests, "--no-record", "--json", str(file), *options)
+        if done.returncode in (0, 1) and file.exists():
+            return decode(file.read_bytes(), RunDocument), whose
+        reasons.append(f"{whose}: {_last(done.stderr)}")
+    raise CommitError(f"{place.name} gives no answers; " + "; ".join(reasons))
+
+
+def call(search: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """The tracker of a folder with that folder's engine, in a process of its own."""
+    # -S leaves out the finder of an editable install, here and in the worker processes it starts.
+    path = os.pathsep.join([str(search), sysconfig.get_path("purelib")])
+    environment = {**os.environ, "PYTHONPATH": path}
+    return _run([sys.executable, "-S", "-m", PACKAGE, *arguments], cwd=search, env=environment)
+
+
+def _with_todays_questions(place: Path) -> Path:
+    """A folder in which the package is today's, but for the engine."""
+    today = Path(spook_tracker.__file__).parent
+    mixed = place / "today"
+    package = mixed / PACKAGE
+    shutil.rmtree(mixed, ignore_errors=True)
+    package.mkdir(parents=True)
+    for file in today.glob("*.py"):
+        shutil.copy(file, package)
+    for name in OURS:
+        (package / name).symlink_to((place / name if name == "engine" else today / name).resolve())
+    return mixed
+
+
+def _must(command: list[str], complaint: str) -> None:
+    done = _run(command)
+    if done.returncode:
+        raise CommitError(f"{complaint}: {_last(done.stderr or done.stdout)}")
+
+
+def _run(command: list[str], **where: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, **where)  # type: ignore[call-overload,no-any-return]
+
+
+def _last(text: str) -> str:
+    """The line in which a program says what is wrong: the last with the word error, else the last."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    telling = [line for line in lines if "error" in line.lower()] or lines
+    return telling[-1][:200] if telling else "it said nothing"

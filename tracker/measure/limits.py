@@ -1,0 +1,57 @@
+"""Limits a team sets its own engine, by series: they take the place of a test's, and what has one gates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+from spook_tracker.scalar_tests.case import Measurement, Metric, ScalarTest
+from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.measure.question import series_key
+
+Limit = float | tuple[float, float]
+Limits = tuple[tuple[str, Limit], ...]  # pattern of series keys (* matches anything), limit
+SOURCE = "tracker.toml"
+
+
+class LimitError(TrackerError):
+    """A limit that cannot be applied; one sentence that names it."""
+
+
+def held_to(tests: Mapping[str, ScalarTest], limits: Limits) -> dict[str, ScalarTest]:
+    """The tests with these limits; of two that match, the later one counts. LimitError if one matches nothing."""
+    used: set[str] = set()
+    found = {
+        name: replace(
+            test,
+            measurements=tuple(
+                replace(m, metrics=tuple(_metric(name, m, metric, limits, used) for metric in m.metrics))
+                for m in test.measurements
+            ),
+        )
+        for name, test in tests.items()
+    }
+    for pattern, _ in limits:
+        if pattern not in used:
+            raise LimitError(
+                f"{SOURCE}: no series is called {pattern!r}; `tracker run --no-record --json FILE` names them all"
+            )
+    return found
+
+
+def _metric(
+    test: str, measurement: Measurement, metric: Metric, limits: Sequence[tuple[str, Limit]], used: set[str]
+) -> Metric:
+    key = series_key(
+        test, measurement.configuration, metric.name, measurement.time_step, measurement.parameters
+    )
+    for pattern, limit in limits:
+        if not fnmatchcase(key, pattern):
+            continue
+        used.add(pattern)
+        if isinstance(limit, tuple) != (metric.better == "inside"):
+            wanted = "two numbers" if metric.better == "inside" else "one number"
+            raise LimitError(f"{SOURCE}: the limit of {key} is {wanted}, not {limit!r}")
+        metric = replace(metric, limit=limit, limit_source=SOURCE, role="gate")
+    return metric

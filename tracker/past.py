@@ -1,0 +1,140 @@
+"""What earlier commits of this project answer: a history measured afterwards, and the first bad commit found.
+
+Commits are built and asked by tracker/measure/commits.py and judged by tracker/judge/; git says which commit to try
+next, also where ways part and meet again, and where one cannot be built.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
+from spook_tracker.tracker.judge.choice import Choice
+from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
+from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.measure.commits import CommitError, full_hash
+
+FIRST_BAD = re.compile(r"^([0-9a-f]{40,64}) is the first bad commit", re.MULTILINE)
+Measure = Callable[[str], RunDocument]
+Word = Literal["good", "bad", "skip"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One commit that was tried."""
+
+    commit: str
+    word: Word
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blamed:
+    """Where it became worse: one commit, or several of which none could be measured."""
+
+    commits: tuple[str, ...]
+    reds: tuple[Change, ...]  # what is worse in the bad commit than in the good one
+    steps: tuple[Step, ...]
+
+
+def compare_documents(before: RunDocument, after: RunDocument) -> CompareDocument:
+    """What changed from one run to another, neither of which is recorded."""
+    old, new = (
+        ComparedRun(side=side_of(run), samples=with_work(_samples(run), run.engine), maps=run.maps)
+        for run in (before, after)
+    )
+    return compare(old, new)
+
+
+def _samples(run: RunDocument) -> dict[str, tuple[SeriesDefinition, Sample]]:
+    definitions = {definition.key: definition for definition in run.series}
+    return {sample.series: (definitions[sample.series], sample) for sample in run.samples}
+
+
+def bisect(
+    repository: Path,
+    good: str,
+    bad: str,
+    measure: Measure,
+    choice: Choice | None = None,
+    watch: Callable[[Step], None] = lambda step: None,
+) -> Blamed:
+    """The first commit after `good` that is worse than it in what `bad` is worse in. Raises TrackerError.
+
+    `measure` gives the run of a commit; where it raises CommitError the commit is passed over.
+    """
+    first, last = full_hash(repository, good), full_hash(repository, bad)
+    if _git(repository, "merge-base", "--is-ancestor", first, last).returncode or first == last:
+        raise TrackerError(f"{good} is no ancestor of {bad}; name a good commit that the bad one builds on")
+    sound = measure(first)
+    worse = _reds(sound, measure(last), choice or Choice())
+    if not worse:
+        raise TrackerError(
+            f"nothing of it is worse at {last[:12]} than at {first[:12]}; look at other commits"
+        )
+    wanted = {change.series for change in worse}
+    steps: list[Step] = []
+    with tempfile.TemporaryDirectory(prefix="bisect-") as folder:
+        clone = Path(folder) / "clone"
+        _git(repository, "clone", "-q", "--shared", "--no-checkout", str(repository), str(clone))
+        said = _git(clone, "bisect", "start", "--no-checkout", last, first).stdout
+        while True:
+            if found := FIRST_BAD.search(said):
+                return Blamed(commits=(found[1],), reds=tuple(worse), steps=tuple(steps))
+            if "only 'skip'ped commits left" in said:
+                left = re.findall(r"^[0-9a-f]{40,64}$", said, re.MULTILINE)
+                return Blamed(commits=tuple(left), reds=tuple(worse), steps=tuple(steps))
+            commit = _git(clone, "rev-parse", "BISECT_HEAD").stdout.strip()
+            step = _tried(commit, sound, measure, wanted)
+            steps.append(step)
+            watch(step)
+            done = _git(clone, "bisect", step.word)
+            said = done.stdout + done.stderr
+            if not said.strip():
+                raise TrackerError("git bisect said nothing; try it by hand: git bisect start")
+
+
+def _tried(commit: str, sound: RunDocument, measure: Measure, wanted: set[str]) -> Step:
+    try:
+        document = compare_documents(sound, measure(commit))
+    except CommitError as error:
+        return Step(commit=commit, word="skip", why=str(error))
+    told = {change.series: change for change in document.changes if change.series in wanted}
+    reds = [change for change in told.values() if change.red]
+    if reds:
+        why = f"{reds[0].series}: {reds[0].sentence}"
+        return Step(commit=commit, word="bad", why=why + (f"; and {len(reds) - 1} more" * (len(reds) > 1)))
+    if not told or all(change.word == "not_comparable" for change in told.values()):
+        why = next((change.sentence for change in told.values()), "it does not answer this")
+        return Step(commit=commit, word="skip", why=f"cannot be compared: {why}")
+    return Step(commit=commit, word="good", why="no worse than the good commit")
+
+
+def _reds(before: RunDocument, after: RunDocument, choice: Choice) -> list[Change]:
+    document = compare_documents(before, after)
+    return [
+        change
+        for change in document.changes
+        if change.red and choice.takes(change.test, change.kind, change.role)
+    ]
+
+
+def _git(repository: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        ["git", "-C", str(repository), *arguments],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if done.returncode and arguments[0] in ("clone",):
+        raise TrackerError(f"git {arguments[0]} failed: {done.stderr.strip()[-200:]}")
+    return done

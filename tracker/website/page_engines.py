@@ -1,0 +1,390 @@
+"""Engines beside each other, and a page for each of the others: nothing here is red, somebody is ahead."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby, pairwise
+from typing import Any
+
+import msgspec
+
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.document.wording import (
+    clean,
+    conditions,
+    day,
+    limit,
+    named,
+    number,
+    page_of,
+    quantity,
+    seconds,
+    slug,
+    version,
+)
+from spook_tracker.tracker.judge.rank import ERRORS, Answer, Samples, Standing, answers, question, standings
+from spook_tracker.tracker.judge.release_notes import moved
+from spook_tracker.tracker.judge.standing import against_limit
+from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart, view
+from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
+from spook_tracker.tracker.website.page_rows import Page
+
+MOST_RELEASES = 200  # in the table of an engine's versions
+MOST_CHARTS = 24  # of series that changed over the versions
+MOST_CHANGES = 6  # named for one version
+STEADY = ("time", "work")  # kinds whose changes say nothing about an engine's answers
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One engine on one question, or on one scene at one error."""
+
+    text: str
+    stands: Class
+    what: str = ""  # for a pointer that rests on it
+    best: bool = False
+
+
+def engine_address(name: str, root: str = "") -> str:
+    """Where the page of another engine is."""
+    return f"{root}engines/{slug(name)}.html"
+
+
+def samples_of(chapter: Chapter, *, timed: bool = True) -> dict[str, tuple[SeriesDefinition, Sample]]:
+    """The newest sample of every series of an engine, in the order of its document."""
+    ordered = sorted(
+        (t for test in chapter.tests for t in test.trends if t.latest is not None), key=lambda t: t.order
+    )
+    return {
+        t.definition.key: (t.definition, t.latest if timed else _untimed(t.latest))
+        for t in ordered
+        if t.latest is not None
+    }
+
+
+def _untimed(sample: Sample) -> Sample:
+    return msgspec.structs.replace(sample, timing=None)
+
+
+def engines(book: Book) -> Page:
+    """Who answers what, and who is ahead at equal error."""
+    machine = book.tonight.machine.fingerprint
+    asked: dict[str, Samples] = {
+        _title(chapter): samples_of(chapter, timed=chapter.tonight.machine.fingerprint == machine)
+        for chapter in book.engines
+    }
+    gates = [(test, trend.definition) for test in book.tests for trend in test.gates()]
+    told = answers([definition for _, definition in gates], asked)
+    found = standings(asked)
+    untimed = [_title(c) for c in book.others if c.tonight.machine.fingerprint != machine]
+    context = {
+        "engines": [_card(chapter, book, told, found) for chapter in book.engines],
+        "matrix": [
+            _line(test, definition, of_gate)
+            for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
+        ],
+        "ranks": list(_ranks(found, book, untimed)),
+        "behind": _behind(found, _title(book), book),
+        "elsewhere": untimed,
+    }
+    return Page("engines.html", "engines.html", "Engines", "The same questions to other engines.", context)
+
+
+def _title(chapter: Chapter) -> str:
+    return clean(f"{chapter.name} {version(chapter.tonight.engine)}")
+
+
+def _card(chapter: Chapter, book: Book, told: Sequence[Any], found: Sequence[Standing]) -> dict[str, Any]:
+    """One engine: what it answers, and how often nobody is quicker."""
+    name = _title(chapter)
+    mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
+    supported = [a for a in mine if a.sample is not None and a.sample.outcome != "not_supported"]
+    first = Counter(error for error, engine in _winners(found) if engine == name)
+    reached = Counter(error for error, _ in _winners(found))
+    return {
+        "name": name,
+        "address": "index.html" if chapter is book else engine_address(chapter.name),
+        "measured": day(chapter.tonight.started),
+        "nights": len(chapter.nights),
+        "kept": sum(a.stands == "pass" for a in mine),
+        "supported": len(supported),
+        "asked": len(told),
+        "first": [(number(error), first[error], reached[error]) for error in ERRORS if reached[error]],
+    }
+
+
+def _winners(found: Sequence[Standing]) -> Iterator[tuple[float, str]]:
+    """For every scene and error that somebody reaches: who reaches it first."""
+    for group in _scenes(found):
+        for place, error in enumerate(ERRORS):
+            times = [(t, one.engine) for one in group if (t := one.seconds[place]) is not None]
+            if times:
+                yield error, min(times)[1]
+
+
+def _scenes(found: Sequence[Standing]) -> list[list[Standing]]:
+    """The standings of each scene that at least two engines were asked."""
+    groups: dict[tuple[str, str, str], list[Standing]] = {}
+    for one in found:
+        groups.setdefault((one.test, one.ladder, one.unit), []).append(one)
+    return [group for group in groups.values() if sum(one.outcome != "not asked" for one in group) > 1]
+
+
+def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> dict[str, Any]:
+    return {
+        "title": test.card.title,
+        "address": page_of(test.name),
+        "what": named(gate)[0],
+        "limit": limit(gate),
+        "seven": test.card.seven,
+        "cells": [_answered(answer) for answer in told],
+    }
+
+
+def _answered(answer: Answer) -> Cell:
+    definition, sample = answer.definition, answer.sample
+    if definition is None or sample is None:
+        return Cell("not asked", "none")
+    return Cell(_value(definition, sample), answer.stands, _told(definition, sample))
+
+
+def _value(definition: SeriesDefinition, sample: Sample) -> str:
+    if not math.isfinite(sample.value):
+        return sample.outcome.replace("_", " ")
+    return quantity(sample.value, definition.unit, 3)
+
+
+def _told(definition: SeriesDefinition, sample: Sample) -> str:
+    return clean(f"{conditions(definition)}{': ' + sample.failure if sample.failure else ''}")[:300]
+
+
+def _ranks(found: Sequence[Standing], book: Book, untimed: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """A line for every scene: its errors at h = 1/60, and the run times to each error."""
+    titles = {test.name: test.card.title for test in book.tests}
+    for group in _scenes(found):
+        first = group[0]
+        lacks = [one.outcome.replace("_", " ") for one in group]
+        columns = [_cells([one.error for one in group], lacks, partial(_error, first.unit))]
+        late = [
+            "another machine" if one.engine in untimed
+            else lack if lack in ("not asked", "not supported") else "not reached"
+            for one, lack in zip(group, lacks, strict=True)
+        ]  # fmt: skip
+        for place in range(len(ERRORS)):
+            columns.append(_cells([one.seconds[place] for one in group], late, seconds))
+        if any(cell.best for column in columns for cell in column):
+            yield {
+                "title": titles.get(first.test, first.test),
+                "address": page_of(first.test) if first.test in titles else "",
+                "what": first.ladder.replace("_", " "),
+                "unit": "" if first.unit == "1" else first.unit,
+                "columns": columns,
+            }
+
+
+def _error(unit: str, value: float) -> str:
+    return quantity(value, unit, 2)
+
+
+def _cells(values: Sequence[float | None], lacks: Sequence[str], say: Callable[[float], str]) -> list[Cell]:
+    """The best of a line stands out; the others say how many times as much they take."""
+    best = min((v for v in values if v is not None), default=math.nan)
+    cells = []
+    for value, lack in zip(values, lacks, strict=True):
+        if value is None:
+            cells.append(Cell(lack, "none"))
+        else:
+            times = value / best if best > 0.0 else math.nan
+            behind = f"{number(times, 2)} times the best" if times > 1.0 else ""
+            cells.append(Cell(say(value), "pass", behind, value == best))
+    return cells
+
+
+def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[dict[str, Any]]:
+    """Where another engine reaches an error before ours does, the largest factor first."""
+    titles = {test.name: test.card.title for test in book.tests}
+    places = []
+    for group in _scenes(found):
+        for place, error in enumerate(ERRORS):
+            times = {one.engine: t for one in group if (t := one.seconds[place]) is not None}
+            if not times or ours not in {one.engine for one in group}:
+                continue
+            ahead = min(times, key=times.__getitem__)
+            mine = times.get(ours, math.inf)
+            if ahead != ours and mine > times[ahead]:
+                first = group[0]
+                places.append(
+                    {
+                        "title": titles.get(first.test, first.test),
+                        "address": page_of(first.test),
+                        "what": first.ladder.replace("_", " "),
+                        "error": quantity(error, first.unit),
+                        "ahead": ahead,
+                        "theirs": seconds(times[ahead]),
+                        "mine": "never" if math.isinf(mine) else seconds(mine),
+                        "times": mine / times[ahead],
+                        "factor": "" if math.isinf(mine) else f"{number(mine / times[ahead], 2)} ×",
+                    }
+                )
+    return sorted(places, key=lambda one: -one["times"])
+
+
+def engine_page(book: Book, chapter: Chapter) -> Page:
+    """One other engine: its answers in every configuration, and what its versions changed."""
+    ours = {test.name: test for test in book.tests}
+    gates = {question(t.definition): t.definition for test in book.tests for t in test.gates()}
+    cells: dict[tuple[object, ...], dict[str, Cell]] = {place: {} for place in gates}
+    for definition, sample in samples_of(chapter).values():
+        if (place := question(definition)) in gates:
+            cells[place][definition.configuration] = Cell(
+                _value(definition, sample), against_limit(definition, sample), _told(definition, sample)
+            )
+    names = list(dict.fromkeys(name for of_gate in cells.values() for name in of_gate))
+    rows = [
+        {
+            "title": ours[gate.test].card.title,
+            "address": page_of(gate.test),
+            "what": named(gate)[0],
+            "limit": limit(gate),
+            "cells": [cells[place].get(name) for name in names],
+        }
+        for place, gate in gates.items()
+        if cells[place]
+    ]
+    steps = _steps(chapter)
+    night = chapter.tonight
+    context = {
+        "engine": night.engine,
+        "shown": _title(chapter),
+        "measured": night.started,
+        "machine": night.machine,
+        "nights": len(chapter.nights),
+        "configurations": names,
+        "rows": rows,
+        "counts": [
+            _counts(name, [of_gate[name] for of_gate in cells.values() if name in of_gate]) for name in names
+        ],
+        "ladders": [
+            view(chart, table=False)
+            for test in chapter.tests
+            for chart in ladder_charts(retitled(ours, test), f"{slug(test.name)}-")
+            if chart.name.endswith("-seconds")
+        ],
+        "versions": _folded(list(reversed(_versions(chapter, steps))))[:MOST_RELEASES],
+        "trends": [
+            view(trend_chart(trend, chapter.nights, (), ours_title(ours, trend), "version"))
+            for trend in _moving(chapter, steps)
+        ],
+    }
+    path = engine_address(chapter.name)
+    return Page(path, "engine.html", _title(chapter), "Another engine's answers.", context, plotly=True)
+
+
+def _counts(name: str, answered: Sequence[Cell]) -> tuple[str, int, int, int]:
+    """Of one configuration: gates kept, gates it supports, gates asked."""
+    kept = sum(cell.stands == "pass" for cell in answered)
+    return name, kept, sum(cell.stands != "none" for cell in answered), len(answered)
+
+
+def retitled(tests: dict[str, TestHistory], test: TestHistory) -> TestHistory:
+    """A test of another engine under the title it has in our catalogue."""
+    known = tests.get(test.name)
+    return replace(test, card=known.card) if known else test
+
+
+def ours_title(tests: dict[str, TestHistory], trend: Trend) -> str:
+    """The title of a test, from our catalogue where it is one of ours."""
+    known = tests.get(trend.definition.test)
+    return known.card.title if known else trend.definition.test
+
+
+Steps = dict[int, list[tuple[Trend, int]]]  # night -> series that changed with it, and their place there
+
+
+def _steps(chapter: Chapter) -> Steps:
+    """What each version changed, to a reader of releases."""
+    found: Steps = {}
+    for test in chapter.tests:
+        for trend in test.trends:
+            if trend.definition.kind in STEADY:
+                continue
+            for i, j in pairwise(range(len(trend.nights))):
+                outcomes = (trend.outcomes[i], trend.outcomes[j])
+                if moved(trend.values[i], trend.values[j], outcomes):
+                    found.setdefault(trend.nights[j], []).append((trend, j))
+    return found
+
+
+def _versions(chapter: Chapter, steps: Steps) -> list[dict[str, Any]]:
+    """Every version in order, with what it changed."""
+    told = []
+    for night in chapter.nights:
+        changes = steps.get(night.index, [])
+        tests = Counter(trend.definition.test for trend, _ in changes)
+        told.append(
+            {
+                "version": version(night.engine),
+                "measured": day(night.started),
+                "first": night.index == 0,
+                "count": len(changes),
+                "tests": ", ".join(f"{clean(name)} ({n})" for name, n in tests.most_common(MOST_CHANGES))
+                + (f" and {len(tests) - MOST_CHANGES} more tests" if len(tests) > MOST_CHANGES else ""),
+                "changes": [
+                    _change(trend, place)
+                    for trend, place in sorted(changes, key=_size, reverse=True)[:MOST_CHANGES]
+                ],
+            }
+        )
+    return told
+
+
+def _folded(told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Neighbours that changed nothing are one line."""
+    folded: list[dict[str, Any]] = []
+    for quiet, group in groupby(told, key=lambda one: not one["count"] and not one["first"]):
+        found = list(group)
+        if quiet and len(found) > 1:
+            names = f"{found[-1]['version']} … {found[0]['version']}"
+            days = " … ".join(dict.fromkeys((found[-1]["measured"], found[0]["measured"])))
+            folded.append({**found[0], "version": names, "measured": days, "tests": f"{len(found)} versions"})
+        else:
+            folded += found
+    return folded
+
+
+def _size(change: tuple[Trend, int]) -> tuple[bool, float]:
+    """Another outcome before another value, then by decades."""
+    trend, j = change
+    before, after = trend.values[j - 1], trend.values[j]
+    if trend.outcomes[j - 1] != trend.outcomes[j]:
+        return True, 0.0
+    smallest, largest = sorted((abs(before), abs(after)))
+    return False, math.log10(largest / smallest) if smallest > 0.0 else math.inf
+
+
+def _change(trend: Trend, j: int) -> str:
+    def said(place: int) -> str:
+        value, unit = trend.values[place], trend.definition.unit
+        return quantity(value, unit, 5) if math.isfinite(value) else trend.outcomes[place].replace("_", " ")
+
+    d = trend.definition
+    return clean(f"{d.test}, {named(d)[0]} ({conditions(d)}): {said(j - 1)} to {said(j)}")
+
+
+def _moving(chapter: Chapter, steps: Steps) -> list[Trend]:
+    """The scalars that changed in most versions, for charts."""
+    if len(chapter.nights) < 2:
+        return []
+    count: Counter[str] = Counter()
+    trends: dict[str, Trend] = {}
+    for changes in steps.values():
+        for trend, _ in changes:
+            if trend.definition.kind == "scalar":
+                trends[trend.definition.key] = trend
+                count[trend.definition.key] += 1
+    return [trends[key] for key, _ in count.most_common(MOST_CHARTS)]
