@@ -96,7 +96,8 @@ class _Run:
         scene = self.scene = task.scene
         self.nodes = grown(scene) if task.configuration.options["joints"] else alone(scene)
         self.normal = plane_of_motion(scene)
-        self.friction, self.restitution = one_friction(scene, "dart"), one_restitution(scene, "dart")
+        self.friction = one_friction(scene, "dart") if scene.contacts else 0.0
+        self.restitution = one_restitution(scene, "dart")
         self.pushes = Pushes(scene)
         self.bodies: dict[str, Any] = {}
         self.world = dart.simulation.World()

@@ -139,6 +139,7 @@ class _Run:
         options = task.configuration.options
         self.nodes = grown(scene) if options["joints"] else alone(scene)
         self.normal = plane_of_motion(scene)
+        self.friction = one_friction(scene, "drake") if scene.contacts else 0.0
         self.joints: dict[str, Any] = {}  # body -> the joint it hangs by
         self.geometries: dict[str, Any] = {}
         builder = DiagramBuilder()
@@ -192,8 +193,7 @@ class _Run:
 
     def _surface(self, body: RigidBody, shape: Shape, made: Any) -> None:
         properties = ProximityProperties()
-        mu = one_friction(self.scene, "drake")
-        AddContactMaterial(None, None, CoulombFriction(mu, mu), properties)
+        AddContactMaterial(None, None, CoulombFriction(self.friction, self.friction), properties)
         if isinstance(shape, Plane):
             AddRigidHydroelasticProperties(properties)
         elif isinstance(shape, Box):

@@ -107,6 +107,7 @@ class _Run:
         self.restitution = one_restitution(scene, "pybullet")
         self.ids: dict[str, tuple[int, int]] = {}  # body -> tree and link
         self.held: dict[str, tuple[int, ...]] = {}  # constraint -> Bullet's constraints
+        self.children = {node.tie.name: name for name, node in self.nodes.items() if node.tie is not None}
         self.pushes = Pushes(scene)
         bullet.setGravity(*scene.gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(
@@ -371,7 +372,7 @@ class _Run:
 
     def _force(self, constraint: Any, keep: Kept, row: int) -> Any:
         """Tension of a rod, force and torque of a joint on its second end, about its point."""
-        child = next((n for n, node in self.nodes.items() if node.tie is constraint), None)
+        child = self.children.get(constraint.name)
         body = self.scene.body(child or self._ends(constraint)[0])
         k = self.nodes[body.name].index
         where, moved = keep.positions[row, k], product(keep.orientations[row, k], conjugate(turn_of(body)))
