@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site docs serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -24,6 +24,7 @@ help:
 	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
 	@echo "make site      publish the website again from what is recorded"
+	@echo "make docs      the documentation as a site in build/docs, and the man pages in build/man"
 	@echo "make serve     look at the website on this machine"
 	@echo "make clean     remove what was built (the database stays)"
 
@@ -53,6 +54,10 @@ tidy tidy-deep: develop
 # The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
 package: develop
 	SPOOK_TEST_REAL_WHEEL=1 $(BIN)/pytest -q -p no:cacheprovider --timeout 1800 tests/test_packaging.py
+
+docs: develop
+	$(BIN)/mkdocs build --quiet
+	$(BIN)/click-man --target build/man tracker
 
 release:
 	@sh .ci/release --check "$(VERSION)"
