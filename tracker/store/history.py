@@ -89,6 +89,27 @@ class History:
                 found[key] = definition, sample
         return found
 
+    def samples_of(
+        self, run_ids: Sequence[str], tests: set[str] | None = None
+    ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
+        """The samples of several runs, of these tests (all if None): `samples` of each, read at once."""
+        if tests is None:
+            return {run_id: self.samples(run_id) for run_id in run_ids}
+        of_tests = [i for i, key in self._canonical.items() if key.partition("/")[0] in tests]
+        found: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {run_id: {} for run_id in run_ids}
+        for start in range(0, len(run_ids), CHUNK):
+            runs = [self.run(run_id) for run_id in run_ids[start : start + CHUNK]]
+            conditions = [
+                models.Sample.series_id.in_(of_tests),
+                models.Sample.run_key.in_([run.key for run in runs]),
+                models.Sample.started_at.in_([run.started_at for run in runs]),
+            ]
+            for run, series_id, definition, sample in self._read_samples(conditions):
+                key = self._canonical.get(series_id, definition.key)
+                if key not in found[run.id] or definition.key == key:
+                    found[run.id][key] = definition, sample
+        return found
+
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> dict[str, SeriesHistory]:
         """Histories of all series or those named (by today's or an earlier name), by today's key.
 
