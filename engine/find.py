@@ -38,6 +38,7 @@ NODE: Mapping[str, str] = {
     "cannon": "cannon-es",
     "rapier": "@dimforge/rapier3d-compat",
     "jolt": "jolt-physics",
+    "p2": "p2-es",
 }  # engine: its package, from npm
 
 

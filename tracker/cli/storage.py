@@ -60,7 +60,11 @@ def export(versions: tuple[str, ...], out: Path | None, form: str, database: str
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @database_option
 def import_files(files: tuple[Path, ...], database: str) -> None:
-    """Record runs from JSON documents, whole or in short form; what is there already is left as it is."""
+    """Record runs from JSON documents, whole or in short form; what is there already is left as it is.
+
+    Files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark are taken as run times. So are the
+    compressed files of `tracker export --format months`.
+    """
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.months import import_months, is_month
     from spook_tracker.tracker.store.record import record
@@ -70,21 +74,28 @@ def import_files(files: tuple[Path, ...], database: str) -> None:
     months = [file for file in files if is_month(file)]
     with session_on(database) as session:
         done = read_in(session, [file for file in files if file not in short and file not in months])
-        new = sum(record(session, document) for document in short.values())
+        documents = [document for runs in short.values() for document in runs]
+        new = sum(record(session, document) for document in documents)
         fresh, known = import_months(session, months)
-    stored, present = len(done.stored) + new + fresh, len(done.present) + len(short) - new + known
+    stored, present = len(done.stored) + new + fresh, len(done.present) + len(documents) - new + known
     click.echo(f"{stored} runs recorded, {present} were there already")
 
 
-def _short(files: tuple[Path, ...]) -> dict[Path, Any]:
-    """The files that are runs in short form, as whole documents."""
+def _short(files: tuple[Path, ...]) -> dict[Path, tuple[Any, ...]]:
+    """The files that are runs in short form or another tool's, as whole documents."""
+    from spook_tracker.tracker.measure.other_tools import of_other_tools
     from spook_tracker.tracker.measure.short_form import is_short, whole
     from spook_tracker.tracker.store.border import MAX_BYTES
 
-    found = {}
+    found: dict[Path, tuple[Any, ...]] = {}
     for file in files:
-        if file.is_file() and file.stat().st_size <= MAX_BYTES and is_short(content := file.read_bytes()):
-            found[file] = whole(content, str(file))
+        if not file.is_file() or file.stat().st_size > MAX_BYTES:
+            continue
+        content = file.read_bytes()
+        if is_short(content):
+            found[file] = (whole(content, str(file)),)
+        elif (runs := of_other_tools(content, str(file))) is not None:
+            found[file] = runs
     return found
 
 
@@ -147,6 +158,15 @@ def copy(source: str, target: str) -> None:
     click.echo(
         f"copied {sum(digest.rows for digest in digests.values())} rows in {len(digests)} tables, all equal"
     )
+
+
+@db.command(epilog=example("tracker db partition timescaledb | psql postgresql://host/tracker"))
+@click.argument("extension", type=click.Choice(["timescaledb", "citus"]))
+def partition(extension: Any) -> None:
+    """Print the SQL that splits the large tables of a PostgreSQL database by time, or over several servers."""
+    from spook_tracker.tracker.store.partition import statements
+
+    click.echo("\n".join(statements(extension)))
 
 
 @db.command(epilog=example("tracker db stats"))
