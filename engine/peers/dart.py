@@ -30,6 +30,7 @@ from spook_tracker.engine.peers.joint_tree import (
     hung_at,
     plane_of_motion,
     rod_axes,
+    sliding,
     spins,
     turn_of,
 )
@@ -222,11 +223,8 @@ class _Run:
                 continue
             relative = turning[name] - turning[str(node.parent)]
             if isinstance(node.tie, Prismatic):
-                parent = self.nodes.get(str(node.parent))
-                place = np.array(parent.body.position) if parent else np.zeros(3)
-                carried = np.cross(turning[str(node.parent)], np.array(node.body.position) - place)
-                carried = carried + (parent.body.velocity if parent else 0.0)
-                joint.setVelocity(0, float((node.body.velocity - carried) @ np.array(node.tie.axis)))
+                axis, above = np.array(node.tie.axis), turning[str(node.parent)]
+                joint.setVelocity(0, sliding(self.nodes, node, axis, above))
             elif isinstance(node.tie, Ball):
                 joint.setVelocities(relative)
             elif joint.getNumDofs() == 2:
