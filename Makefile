@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site docs serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -20,6 +20,8 @@ help:
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
+	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
+	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
 	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
@@ -58,6 +60,12 @@ package: develop
 docs: develop
 	$(BIN)/mkdocs build --quiet
 	$(BIN)/click-man --target build/man tracker
+
+crashes: develop
+	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_crashes.py
+
+hostile: develop
+	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py
 
 release:
 	@sh .ci/release --check "$(VERSION)"

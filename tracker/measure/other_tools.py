@@ -60,7 +60,7 @@ def _reader(said: Mapping[str, Any]) -> Any:
     if isinstance(said.get("benchmarks"), list):
         if "machine_info" in said and "commit_info" in said:
             return _pytest
-        if "host_name" in said.get("context", {}):
+        if isinstance(context := said.get("context"), dict) and "host_name" in context:
             return _google
     return None
 

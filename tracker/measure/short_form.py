@@ -85,8 +85,8 @@ def whole(content: bytes, origin: str) -> RunDocument:
     """The run document it stands for. DocumentError names the file and the place in it."""
     try:
         short = decode(content, ShortRun)
-    except msgspec.DecodeError as error:
-        raise DocumentError(f"{origin} is not a valid run in short form: {error}") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise DocumentError(f"{origin} is not a valid run in short form: {error!s:.300}") from None
     return document_of(short, hashlib.sha256(content).hexdigest()[:32], origin)
 
 
