@@ -31,6 +31,11 @@ def cross(a: Vector, b: Vector) -> Vector:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
+def drawn(faces: Sequence[Sequence[Vector]]) -> tuple[float, ...]:
+    """Faces as one row of numbers: of each how many corners, then their places."""
+    return tuple(number for face in faces for number in (float(len(face)), *(x for p in face for x in p)))
+
+
 def hull(points: Sequence[Vector]) -> tuple[tuple[Vector, ...], tuple[Face, ...]]:
     """Corners and faces of the convex hull, each face anticlockwise seen from outside.
 

@@ -1,4 +1,4 @@
-"""Surfaces: sphere, box, capsule, convex hull, plane, and compounds of these. Each knows its inertia per mass.
+"""Surfaces: sphere, box, capsule, cylinder, convex hull, plane, and compounds of these. Each knows its inertia per mass.
 
 A new shape says here what it is called, which columns the native side gets and how it is drawn.
 """
@@ -110,6 +110,39 @@ class Capsule(Shape):
         return (across, across, along)
 
 
+@dataclass(frozen=True, slots=True)
+class Cylinder(Shape):
+    """A cylinder along the body's z axis; a coin is a short one. It meets planes and spheres, and floats.
+
+    Other shapes it may touch are refused when the scene is compiled: its round edge against theirs is not there yet.
+    """
+
+    kind: ClassVar[str] = "cylinder"
+    drawn_as: ClassVar[str] = "facets"
+    radius: float  # m
+    length: float  # m
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check.positive("cylinder", "radius", self.radius))
+        object.__setattr__(self, "length", check.positive("cylinder", "length", self.length))
+
+    def columns(self) -> dict[str, Any]:
+        return {"radius": self.radius, "length": self.length}
+
+    def inertia(self, mass: float) -> Vector:
+        across = mass * (self.radius**2 / 4.0 + self.length**2 / 12.0)
+        return (across, across, mass * self.radius**2 / 2.0)
+
+    def measures(self) -> tuple[float, ...]:
+        sides, half = 24, 0.5 * self.length
+        turns = [2.0 * math.pi * k / sides for k in range(sides)]
+        rim = [(self.radius * math.cos(turn), self.radius * math.sin(turn)) for turn in turns]
+        faces = [[(x, y, half) for x, y in rim], [(x, y, -half) for x, y in reversed(rim)]]
+        for (x, y), (u, v) in zip(rim, [*rim[1:], rim[0]], strict=True):
+            faces.append([(x, y, -half), (u, v, -half), (u, v, half), (x, y, half)])
+        return polytope.drawn(faces)
+
+
 class PlacedHull(NamedTuple):
     """A hull in its principal axes, and where its body has to stand so that its corners are where they were given."""
 
@@ -173,11 +206,7 @@ class ConvexHull(Shape):
         return tuple(mass / volume * tensor[i][i] for i in range(3))  # type: ignore[return-value]
 
     def measures(self) -> tuple[float, ...]:
-        return tuple(
-            number
-            for face in self.faces
-            for number in (float(len(face)), *(x for corner in face for x in self.corners[corner]))
-        )
+        return polytope.drawn([[self.corners[corner] for corner in face] for face in self.faces])
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,8 +239,10 @@ class Part:
     orientation: Rotation = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Sphere | Box | Capsule | ConvexHull):
-            raise SceneError(f"compound: a part must be a sphere, box, capsule or hull, not {self.shape!r}")
+        if not isinstance(self.shape, Sphere | Box | Capsule | Cylinder | ConvexHull):
+            raise SceneError(
+                f"compound: a part must be a sphere, box, capsule, cylinder or hull, not {self.shape!r}"
+            )
         object.__setattr__(self, "position", check.vector("compound part", "position", self.position))
         object.__setattr__(
             self, "orientation", check.rotation("compound part", "orientation", self.orientation)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from spook_tracker.engine import theory
+from spook_tracker.engine import RigidBody, theory
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import (
     double_pendulum,
@@ -21,8 +21,10 @@ from spook_tracker.scalar_tests import (
     masonry_arch,
     motor,
     robot_arm,
+    rolling_coin,
     sinking_sphere,
     turntable,
+    vehicle,
     wires,
 )
 from spook_tracker.scalar_tests.beam import scene as beam
@@ -368,6 +370,49 @@ def test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn() -> None:
     assert found == pytest.approx(math.atan(turn) / turn - 1.0, rel=1e-9)
     assert found == pytest.approx(-(turn**2) / 3.0, rel=1e-4)
     assert measurement("turntable", "plain").metrics[0].passes(found)
+
+
+@pytest.mark.parametrize("motion", [rolling_coin.COIN, rolling_coin.DISK])
+def test_the_coin_rolls_steadily_by_the_equations_of_motion(motion: rolling_coin.Steady) -> None:
+    """Newton's and Euler's equations with a contact that does not slip, solved for the accelerations at the start."""
+    (body,) = [b for b in rolling_coin.scene(motion).bodies if b.name == "coin"]
+    assert isinstance(body, RigidBody) and body.inertia is not None and body.mass is not None
+    c, s = math.cos(motion.lean), math.sin(motion.lean)
+    turn = np.array([(c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)])
+    inertia = turn @ np.diag(body.inertia) @ turn.T
+    v, w, up = np.array(body.velocity), np.array(body.angular_velocity), np.array((0.0, 0.0, motion.rate))
+    arm = np.array((motion.reach, 0.0, -motion.height))
+    cross = np.array([(0, -arm[2], arm[1]), (arm[2], 0, -arm[0]), (-arm[1], arm[0], 0)])
+    one, none = np.eye(3), np.zeros((3, 3))
+    matrix = np.block([[body.mass * one, none, -one], [none, inertia, -cross], [one, -cross, none]])
+    right = np.concatenate(
+        (
+            (0.0, 0.0, -body.mass * rolling_coin.GRAVITY),
+            -np.cross(w, inertia @ w),
+            -np.cross(w, np.cross(up, arm)),
+        )
+    )
+    found = np.linalg.solve(matrix, right)
+    friction = math.hypot(found[6], found[7]) / found[8]
+
+    np.testing.assert_allclose(v + np.cross(w, arm), 0.0, atol=1e-12)
+    np.testing.assert_allclose(found[:3], np.cross(up, v), atol=1e-9)
+    np.testing.assert_allclose(found[3:6], np.cross(up, w), atol=1e-9)
+    assert friction < rolling_coin.FRICTION
+
+
+def test_the_loads_of_a_braking_vehicle_balance_its_moments() -> None:
+    v = vehicle
+    parts = [(v.CHASSIS, 0.0, v.RADIUS + v.RISE)] + [(v.WHEEL, x, v.RADIUS) for x, _ in v.WHEELS.values()]
+    # Two loads: forces upwards, and moments about the road under the chassis' centre, of weights and of m a.
+    matrix = np.array([(1.0, 1.0), (v.FRONT, -v.REAR)])
+    weights = v.GRAVITY * sum(m for m, _, _ in parts)
+    moment = sum(m * (v.GRAVITY * x + v.BRAKING * z) for m, x, z in parts)
+    front, rear = np.linalg.solve(matrix, (weights, moment))
+
+    assert v.front_load(-v.BRAKING) == pytest.approx(front, rel=1e-12)
+    assert v.front_load(-v.BRAKING, rise=v.TIPPING) == pytest.approx(weights, rel=1e-12)
+    assert rear > 0.0 and pytest.approx(0.19e-6, rel=0.02) == v.SINK
 
 
 def arch_statics(count: int, thickness: float, *, round_stones: bool = False) -> tuple[float, float] | None:

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "collision/cylinder.hpp"
+
 namespace spook {
 
 Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
@@ -27,6 +29,12 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
                           shape.half.z * std::abs(at.rotation(i, 2));
                 break;
             case ShapeKind::hull: break;
+            case ShapeKind::cylinder: {
+                Vec3 axis;
+                axis[i] = 1.0;
+                half[i] = cylinder_reach(shape, column(at.rotation, 2), axis);
+                break;
+            }
             case ShapeKind::plane: half[i] = std::numeric_limits<double>::infinity(); break;
         }
     half += grown;
@@ -39,6 +47,8 @@ double reach(const Primitive& shape) noexcept {
         case ShapeKind::capsule: return shape.half_length + shape.radius;
         case ShapeKind::box: return norm(shape.half);
         case ShapeKind::hull: return shape.hull->reach;
+        case ShapeKind::cylinder:
+            return std::sqrt(shape.radius * shape.radius + shape.half_length * shape.half_length);
         case ShapeKind::plane: break;
     }
     return std::numeric_limits<double>::infinity();

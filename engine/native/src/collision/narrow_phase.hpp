@@ -27,6 +27,10 @@ Manifold box_box(const Primitive&, const Pose&, const Primitive&, const Pose&, d
 Manifold solid_solid(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold sphere_hull(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold capsule_hull(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+/// Cylinders meet planes and balls only; other pairs give no point, and are refused before anything runs.
+Manifold sphere_cylinder(const Primitive&, const Pose&, const Primitive&, const Pose&,
+                         double margin) noexcept;
+Manifold cylinder_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold hull_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold box_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 

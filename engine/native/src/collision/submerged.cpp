@@ -99,12 +99,12 @@ constexpr double WEIGHT[] = {0.18945061045506864,  0.18260341504492364, 0.169156
                              0.1495959888165767,   0.12462897125553407, 0.0951585116824926,
                              0.062253523938647456, 0.027152459411754176};
 
-/// A capsule along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
+/// A capsule, or without caps a cylinder, along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
 /// height + slope s above the slice's centre and rises across it with `tilt`.
 struct Capsule {
     double radius, half_length, height, slope, tilt;
 
-    double rho2(double s) const noexcept {
+    double rho2(double s) const noexcept {  // of a cylinder no slice is beyond
         const double beyond = std::max(0.0, std::abs(s) - half_length);
         return std::max(0.0, radius * radius - beyond * beyond);
     }
@@ -121,21 +121,24 @@ struct Capsule {
 Submerged capsule_below(const Primitive& shape, const Pose& at, Vec3 up, double height) noexcept {
     const Vec3 axis = column(at.rotation, 2);
     const double slope = dot(axis, up), r = shape.radius, half = shape.half_length;
-    const double reach = r + half * std::abs(slope);
-    if (height >= reach) return {0.0, at.position};
-    if (height <= -reach) return {volume(shape), at.position};
+    const bool caps = shape.kind == ShapeKind::capsule;
     const Vec3 across = up - slope * axis;
     const double tilt = norm(across);
+    const double reach = (caps ? r : r * tilt) + half * std::abs(slope), end = caps ? half + r : half;
+    if (height >= reach) return {0.0, at.position};
+    if (height <= -reach) return {volume(shape), at.position};
     const Capsule capsule{r, half, height, slope, tilt};
     // Where pieces end: the caps, and where the surface meets the side |over| = tilt ρ of cylinder and caps.
-    double ends[20] = {-half - r, -half, half, half + r};
-    int count = 4;
+    double ends[20] = {-end, end};
+    int count = 2;
+    if (caps) ends[count++] = -half, ends[count++] = half;
     const auto add = [&](double s) {
-        if (s > -half - r && s < half + r) ends[count++] = s;
+        if (s > -end && s < end) ends[count++] = s;
     };
     if (slope != 0.0)
         for (const double side : {-1.0, 1.0}) add((side * tilt * r - height) / slope);
-    for (const double middle : {-half, half}) {  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
+    for (const double middle : {-half, half}) {
+        if (!caps) break;  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
         const double over = height + slope * middle, root = r * r - over * over;
         if (root < 0.0) continue;
         for (const double side : {-1.0, 1.0}) add(middle - slope * over + side * tilt * std::sqrt(root));
@@ -172,6 +175,7 @@ double volume(const Primitive& shape) noexcept {
         case ShapeKind::capsule: return kPi * r * r * (2.0 * shape.half_length + 4.0 / 3.0 * r);
         case ShapeKind::box: return 8.0 * shape.half.x * shape.half.y * shape.half.z;
         case ShapeKind::hull: return shape.hull->volume;
+        case ShapeKind::cylinder: return 2.0 * kPi * r * r * shape.half_length;
         case ShapeKind::plane: return 0.0;
     }
     return 0.0;
@@ -187,6 +191,11 @@ double shadow(const Primitive& shape, const Pose& at, Vec3 direction) noexcept {
             const Vec3 d = local(at.rotation, direction), half = shape.half;
             return 4.0 * (std::abs(d.x) * half.y * half.z + std::abs(d.y) * half.x * half.z +
                           std::abs(d.z) * half.x * half.y);
+        }
+        case ShapeKind::cylinder: {
+            const Vec3 axis = column(at.rotation, 2);
+            return kPi * r * r * std::abs(dot(axis, direction)) +
+                   4.0 * r * shape.half_length * norm(cross(axis, direction));
         }
         case ShapeKind::hull: {
             const Vec3 d = local(at.rotation, direction);
@@ -204,6 +213,7 @@ Submerged submerged(const Primitive& shape, const Pose& at, Vec3 up, double leve
     const double height = dot(up, at.position) - level;  // of the centre above the surface
     switch (shape.kind) {
         case ShapeKind::sphere: return sphere_below(shape.radius, at.position, up, height);
+        case ShapeKind::cylinder:
         case ShapeKind::capsule: return capsule_below(shape, at, up, height);
         case ShapeKind::box: return box_below(shape.half, at, up, height);
         case ShapeKind::hull: return hull_below(*shape.hull, at, up, height);
