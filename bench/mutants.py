@@ -47,8 +47,13 @@ class Mutant:
     sweep: bool = False  # told by error against run time
 
     @property
-    def of_the_tracker(self) -> bool:
+    def of_the_suite(self) -> bool:
+        """Whether a test of the suite catches it, and not a scalar test."""
         return "::" in self.caught_by
+
+    @property
+    def native(self) -> bool:
+        return any(file.startswith(SRC) for file, _, _ in self.changes)
 
 
 def wrong(room: str, name: str, story: str, caught_by: str, file: str, old: str, new: str) -> Mutant:
@@ -119,14 +124,23 @@ MUTANTS = (
             ),
         ),
     ),
-    wrong(
+    Mutant(
         "particles",
         "fast-clock",
         "places move on by 1.0001 steps",
         "falling_object",
-        "particles/particle_system.cpp",
-        "nodes_.x[node] += parts_.h * nodes_.v[node];",
-        "nodes_.x[node] += 1.0001 * parts_.h * nodes_.v[node];",
+        (
+            (
+                f"{SRC}/particles/particle_system.cpp",
+                "nodes_.x[node] += parts_.h * nodes_.v[node];",
+                "nodes_.x[node] += 1.0001 * parts_.h * nodes_.v[node];",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "x[node] += h * v[node];",
+                "x[node] += 1.0001 * h * v[node];",
+            ),
+        ),
     ),
     wrong(
         "particles",
@@ -146,23 +160,32 @@ MUTANTS = (
         "time_step * field.strength / (r2 * r)",
         "0.9999 * time_step * field.strength / (r2 * r)",
     ),
-    wrong(
+    Mutant(
         "particles",
         "flat-curvature",
         "curved constraints see a fifth where a quarter belongs",
         "pendulum",
-        "particles/particle_curvature.cpp",
-        "(0.25 + row.relaxation) * ahead",
-        "(0.2 + row.relaxation) * ahead",
+        (
+            (
+                f"{SRC}/particles/particle_curvature.cpp",
+                "(0.25 + row.relaxation) * ahead",
+                "(0.2 + row.relaxation) * ahead",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "(0.25 + r.relaxation) * ahead",
+                "(0.2 + r.relaxation) * ahead",
+            ),
+        ),
     ),
     wrong(
         "particles",
         "late-half-step",
         "velocities begin .4 of a step early, not half of one",
-        "pendulum",
+        "planetarium",
         "particles/particle_curvature.cpp",
-        "start[node] - 0.5 * (nodes_.v[node] - start[node])",
-        "start[node] - 0.4 * (nodes_.v[node] - start[node])",
+        "nodes_.v[node] -= 0.5 * nodes_.kick[node];",
+        "nodes_.v[node] -= 0.4 * nodes_.kick[node];",
     ),
     wrong(
         "strings",
@@ -177,7 +200,7 @@ MUTANTS = (
         "composition",
         "short-last-stage",
         "the middle stage of order 4 is a little short",
-        "n_pendulum",
+        "tests/test_engine_composition.py::test_the_order_holds_on_the_pendulum",
         "run/composition.hpp",
         "-0.65796308717750294857",
         "-0.65795",
@@ -186,7 +209,7 @@ MUTANTS = (
         "composition",
         "drift-too-far",
         "the drift before a kick is 1 % too long",
-        "planetarium",
+        "tests/test_engine_composition.py::test_the_order_holds_on_an_orbit",
         "particles/particle_composition.cpp",
         "state_.pending + 0.5 * tau, part = tau / h_",
         "state_.pending + 0.505 * tau, part = tau / h_",
@@ -204,7 +227,7 @@ MUTANTS = (
         "recorder",
         "forgets-the-start",
         "what is measured from the start is measured from zero",
-        "falling_object",
+        "rotating_box",
         "run/recorder.cpp",
         "now[i] - (what.from_start ? channel.start[i] : 0.0)",
         "now[i]",
@@ -213,7 +236,7 @@ MUTANTS = (
         "recorder",
         "mean-of-one-more",
         "a mean divides by one sample too many",
-        "door",
+        "tests/test_engine_recording.py::test_of_particles_with_every_force",
         "run/recorder.cpp",
         "value /= static_cast<double>(channel.count);",
         "value /= static_cast<double>(channel.count + 1);",
@@ -428,6 +451,8 @@ def caught_by_scalar_test(place: Path, mutant: Mutant, sound: RunDocument) -> tu
 
 def caught_by_test(place: Path, mutant: Mutant) -> tuple[bool, str]:
     """Whether the named test of the suite fails."""
+    if mutant.native:
+        commits.build_in_place(place)
     search = os.pathsep.join([str(place), sysconfig.get_path("purelib")])
     command = [sys.executable, "-S", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", mutant.caught_by]
     done = subprocess.run(
@@ -470,17 +495,17 @@ def main() -> int:
     chosen = tuple(m for m in chosen if not given.names or m.name in given.names)
     rows: list[tuple[Mutant, bool, str]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        head = commits.full_hash(ROOT, "HEAD")
+        head = commits.full_hash(ROOT, given.commit)
         place = commits.built(ROOT, head, (given.keep or Path(folder)).resolve())
         sound = {
             sweep: measure(place, sorted(tests), sweep)
             for sweep in (False, True)
-            if (tests := {m.caught_by for m in chosen if m.sweep == sweep and not m.of_the_tracker})
+            if (tests := {m.caught_by for m in chosen if m.sweep == sweep and not m.of_the_suite})
         }
         for mutant in chosen:
             started = time.monotonic()
             changed(place, mutant.changes)
-            if mutant.of_the_tracker:
+            if mutant.of_the_suite:
                 found, said = caught_by_test(place, mutant)
             else:
                 found, said = caught_by_scalar_test(

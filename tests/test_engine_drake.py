@@ -144,6 +144,12 @@ def test_speeds_at_the_start_are_those_of_the_scene() -> None:
     assert found[0] == pytest.approx(np.array([body.velocity for body in bodies]), abs=1e-12)
 
 
+@pytest.mark.parametrize("configuration", ["sap", "rk3", "constraints"])
+def test_spins_at_the_start_are_those_of_the_scene(configuration: str) -> None:
+    """Two bodies turned against the world on ball joints; each engine wants the spin of a joint in axes of its own."""
+    assert peer_scenes.started(run(configuration)) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
 @pytest.mark.parametrize("kind", [Ball, Hinge, Lock, Prismatic])
 def test_a_joint_holds_its_body(kind: Any) -> None:
     assert peer_scenes.left_its_place(run("sap"), kind) < 1e-12

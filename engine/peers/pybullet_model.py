@@ -177,6 +177,7 @@ class Model:
             kind, axis = self._joint(node)
             relative = turning[name] - turning[str(node.parent)]
             if kind == bullet.JOINT_SPHERICAL:
+                relative = turned_back(turn_of(node.body), relative)  # it wants it in the child's own axes
                 bullet.resetJointStateMultiDof(
                     made, link, [0, 0, 0, 1], relative.tolist(), physicsClientId=self.client
                 )

@@ -50,6 +50,7 @@ from spook_tracker.tracker.measure.question import (
 from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME_LIMIT
 from spook_tracker.tracker.measure.questions import Questions as Questions
 from spook_tracker.tracker.measure.questions import RunError as RunError
+from spook_tracker.tracker.measure.renames import with_aliases
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
@@ -195,7 +196,7 @@ def _document(
         engine=version,
         machine=machine(),
         tests=tuple(test_card(name, test, engine, timed[1].get(name, {})) for name, test in tests.items()),
-        series=tuple(series for series, _ in measured),
+        series=with_aliases((series for series, _ in measured), tests),
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
         maps=tuple(maps),
