@@ -239,10 +239,8 @@ class Part:
     orientation: Rotation = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Sphere | Box | Capsule | Cylinder | ConvexHull):
-            raise SceneError(
-                f"compound: a part must be a sphere, box, capsule, cylinder or hull, not {self.shape!r}"
-            )
+        if not isinstance(self.shape, Shape) or isinstance(self.shape, Plane | Compound):
+            raise SceneError(f"compound: a part must be a bounded shape and no compound, not {self.shape!r}")
         object.__setattr__(self, "position", check.vector("compound part", "position", self.position))
         object.__setattr__(
             self, "orientation", check.rotation("compound part", "orientation", self.orientation)

@@ -27,7 +27,7 @@ from spook_tracker.tracker.store.transfer import export_runs
 from tests.run_documents import definition, run, sample
 
 HERE = Path(__file__).parent
-ROUNDS = int(os.environ.get("SPOOK_CRASH_ROUNDS", "5"))
+ROUNDS = int(os.environ.get("SPOOK_CRASH_ROUNDS", "3"))
 LONGEST = 4.0  # s after which a command is killed, unless it has ended
 COMMANDS = ("run", "nightly", "import", "upgrade", "publish", "months", "copy")
 
