@@ -20,7 +20,6 @@ constexpr int pivot_rounds = 60;        // a round of the cone need not be exact
 constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
 constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr int quick_rounds = 4;         // what rests or moves on as it did is found within these, exactly
-constexpr int patient_rounds = 12;      // before Newton's method is asked where blocks are few
 constexpr int longest_wait = 16;        // solves
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 
@@ -118,6 +117,7 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
 /// Whether the system is one for Newton's method on the cone.
 bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
     if (model != FrictionModel::cone && !points.empty()) return false;
+    if (system.rows.size() <= few_blocks) return false;
     if (std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.row != 1; }))
         return false;  // it knows no friction of turning
     // Rigid joints need the factor of the whole, not a relief.
@@ -296,30 +296,19 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
                                      FrictionModel model, DirectSolver& direct, int max_rounds) {
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
-    const bool newton = is_for_newton(system, points, model), few = system.rows.size() <= few_blocks;
-    if (newton && !few) {
+    MixedSystem start;
+    if (is_for_newton(system, points, model)) {
         if (settle_quickly(system, points, model, direct, report)) return report;
         if (solve_by_newton(system, points, direct, report)) return report;
-    }
-    MixedSystem start;
-    std::vector<FrictionPoint> start_points;
-    if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
-                                       [](const RowBlock& block) { return block.lower[0] == 0.0; }))
-        start = system, start_points = points;
-    const int rounds = newton ? std::min(max_rounds, patient_rounds) : max_rounds;
-    report.residual = unbounded;
-    report.converged = false;
-    if (!newton || few) {
-        if (settle_by_rounds(system, points, model, direct.pivot, rounds, false, report) || !report.finite)
+        start = system;
+        report.residual = unbounded;
+    } else {
+        if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
+                                           [](const RowBlock& block) { return block.lower[0] == 0.0; }))
+            start = system;
+        if (settle_by_rounds(system, points, model, direct.pivot, max_rounds, false, report) ||
+            !report.finite)
             return report;
-    }
-    if (newton && few) {
-        MixedSystem other = start;
-        if (solve_by_newton(other, start_points, direct, report)) {
-            system = std::move(other);
-            points = std::move(start_points);
-            return report;
-        }
     }
     finish_by_sweeps(system, start, points, model, report);
     return report;

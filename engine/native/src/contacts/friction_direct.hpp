@@ -30,10 +30,10 @@ struct DirectSolver {
 /// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
 /// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
 /// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
-/// Systems of contacts alone, under the cone or without friction, are Newton's method's, too
-/// (`contacts/cone_newton.hpp`): up to 24 blocks after 12 of these rounds; with more after a few, which settle what
-/// rests exactly and, where they failed, wait up to 16 solves. What it leaves within 1e-4 of the speeds is the answer,
-/// and converged within 1e-9; else sweeps finish.
+/// Systems of contacts alone with more than 24 blocks, under the cone or without friction, get a few of these rounds,
+/// which settle what rests exactly, and go to Newton's method then (`contacts/cone_newton.hpp`): what it leaves within
+/// 1e-4 of the speeds is the answer, and converged within 1e-9; else sweeps finish. Where the few rounds failed they
+/// wait, up to 16 solves.
 /// On return FrictionPoint::normal is the normal impulse.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);
