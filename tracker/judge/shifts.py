@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histori
 SPANS = (4, 6)  # last nights looked at together
 BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
-RARE = 1e-4  # by permutation, of a shift in one series on one night
+RARE = 5e-5  # by permutation, of a shift in one series on one night
 RARER = 4.013  # standard deviations, by the t test: one in 33 000
 REMEMBERED = (
     4.265  # the same of nights that remember each other, by a model of how: one in a hundred thousand
