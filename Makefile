@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -20,10 +20,13 @@ help:
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
+	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
+	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
 	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
 	@echo "make site      publish the website again from what is recorded"
+	@echo "make docs      the documentation as a site in build/docs, and the man pages in build/man"
 	@echo "make serve     look at the website on this machine"
 	@echo "make clean     remove what was built (the database stays)"
 
@@ -53,6 +56,16 @@ tidy tidy-deep: develop
 # The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
 package: develop
 	SPOOK_TEST_REAL_WHEEL=1 $(BIN)/pytest -q -p no:cacheprovider --timeout 1800 tests/test_packaging.py
+
+docs: develop
+	$(BIN)/mkdocs build --quiet
+	$(BIN)/click-man --target build/man tracker
+
+crashes: develop
+	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_crashes.py
+
+hostile: develop
+	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py
 
 release:
 	@sh .ci/release --check "$(VERSION)"
@@ -98,6 +111,14 @@ three-scene:
 	    --format=iife --global-name=THREE --legal-comments=none \
 	    --banner:js="/* three.js 0.187.0, MIT licence: three-LICENSE.txt */" --outfile=$(CURDIR)/site/static/three-scene.min.js
 
+# The vendored part of the font of formulas again: STIX Two Math, the signs that formulas have.
+formulas-font: develop
+	mkdir -p build/font && cd build/font && npm install --no-save @fontsource/stix-two-math@5.3.0
+	$(BIN)/pip install -q fonttools brotli
+	$(BIN)/pyftsubset build/font/node_modules/@fontsource/stix-two-math/files/stix-two-math-latin-400-normal.woff2 \
+	    --unicodes="U+20-7E,U+B1,U+B7,U+D7,U+BC-BE,U+393-3C9,U+2032-2033,U+207A-208E,U+210E,U+2153-215A,U+2192,U+2202,U+2211,U+2212,U+221A,U+221E,U+222B,U+2248,U+2264,U+2265,U+22C5,U+1D434-1D467,U+1D6E2-1D71B,U+302,U+307,U+308" \
+	    --flavor=woff2 --layout-features=ssty --no-hinting --output-file=site/static/formulas.woff2
+
 site: install
 	$(BIN)/tracker publish --db $(DB) --out $(OUT)
 
@@ -136,7 +157,7 @@ $(BIN)/pip: | require
 
 $(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
 	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
-	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e .
+	    echo "installing into $(VENV)" && $(BIN)/pip install -q -e ".[standard]"
 	@touch $@
 
 # The same with the tools of development; one installation does for both.

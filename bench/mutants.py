@@ -1,44 +1,78 @@
-"""`make mutants`: build engines that are wrong on purpose, and see that `tracker compare` names each of them.
+"""`make mutants`: build engines that are wrong on purpose, and see that each is caught by the test that is named for it.
 
-Each mutant is a clone of this repository with one change to the native source, committed and built, so that it
-has a version and a hash of its own; all record into one scratch database. Rebuilds without a change must be
-reported identical in every value. `python bench/mutants.py NAME …` runs only those named; `--rebuilds N` sets how
-many unchanged rebuilds are tried.
+A clone of this repository is built once and asked the named tests. Then it is changed in one place at a time,
+committed, built again (one file, mostly) and asked again: the comparison of the two runs must say *regressed* of a
+series of the named test. At the end the change is taken back, and every answer must be there again, to the bit.
+Mutants of the tracker itself are put to the named test of the test suite instead.
+
+`python bench/mutants.py NAME …` runs only those named, `--tonight 4` four of them, others every night, `--page FILE`
+writes the table as Markdown.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import datetime
 import os
 import subprocess
 import sys
 import sysconfig
 import tempfile
+import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+import msgspec
+
+import spook_tracker.tracker.measure.commits as commits
+from spook_tracker.tracker.document.json_form import decode
+from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.judge.choice import worst_change
+from spook_tracker.tracker.past import compare_documents
+
+ROOT = Path(__file__).resolve().parent.parent
+SRC = "engine/native/src"
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change to the source and what the comparison must say about it."""
+    """One change to the source, and the test that catches it."""
 
+    room: str
     name: str
     story: str
+    caught_by: str  # a scalar test, or a test of the suite: tests/test_….py::test_…
     changes: tuple[tuple[str, str, str], ...]  # file, text as it is, text put in its place
-    tests: tuple[str, ...]
-    sweep: bool
-    expected: tuple[str, ...]  # words that must appear among the verdicts or reasons of what is red
+    sweep: bool = False  # told by error against run time
+
+    @property
+    def of_the_suite(self) -> bool:
+        """Whether a test of the suite catches it, and not a scalar test."""
+        return "::" in self.caught_by
+
+    @property
+    def native(self) -> bool:
+        return any(file.startswith(SRC) for file, _, _ in self.changes)
 
 
-SRC = "engine/native/src"
+def wrong(room: str, name: str, story: str, caught_by: str, file: str, old: str, new: str) -> Mutant:
+    """A mutant of one place in the native engine."""
+    return Mutant(room, name, story, caught_by, ((f"{SRC}/{file}", old, new),))
+
+
+def judged(name: str, story: str, test: str, file: str, old: str, new: str) -> Mutant:
+    """A mutant of the tracker's own arithmetic."""
+    return Mutant("tracker", name, story, f"tests/{test}", ((f"tracker/{file}", old, new),))
+
+
 MUTANTS = (
     Mutant(
-        name="costly-solver",
-        story="the elimination of a path wastes time and changes no bit",
-        changes=(
+        "particles",
+        "costly-solver",
+        "the elimination of a path wastes time and changes no bit",
+        "n_pendulum",
+        (
             (
                 f"{SRC}/particles/particle_kernels.cpp",
                 "                link[k].u = u;\n",
@@ -46,14 +80,14 @@ MUTANTS = (
                 "                link[k].u = u;\n",
             ),
         ),
-        tests=("pendulum", "n_pendulum"),
         sweep=True,
-        expected=("slower",),
     ),
     Mutant(
-        name="coarse-update",
-        story="only half of each violation is put right per step",
-        changes=(
+        "particles",
+        "coarse-update",
+        "only half of each violation is put right per step",
+        "pendulum",
+        (
             (f"{SRC}/particles/particle_kernels.cpp", "-r.violation_gain * g", "-0.5 * r.violation_gain * g"),
             (
                 f"{SRC}/particles/distance_rows.cpp",
@@ -61,14 +95,13 @@ MUTANTS = (
                 "-0.5 * r.violation_gain * l.g",
             ),
         ),
-        tests=("pendulum", "n_pendulum"),
-        sweep=True,
-        expected=("regressed",),
     ),
     Mutant(
-        name="no-refinement",
-        story="solutions are not refined against the true equations",
-        changes=(
+        "linear",
+        "no-refinement",
+        "solutions are not refined against the true equations",
+        "lock_ring",
+        (
             (f"{SRC}/linear/block_ldlt.cpp", "round < refinements", "round < 0 * refinements"),
             (
                 f"{SRC}/contacts/pivot_solver.cpp",
@@ -76,14 +109,13 @@ MUTANTS = (
                 "    if (false && refined) {\n        refine(",
             ),
         ),
-        tests=("beam", "door", "lock_ring", "cantilever"),
-        sweep=False,
-        expected=("regressed",),
     ),
     Mutant(
-        name="damping-sign",
-        story="the damping term has the sign printed in equation 2.11 of the thesis",
-        changes=(
+        "linear",
+        "damping-sign",
+        "the damping term has the sign printed in equation 2.11 of the thesis",
+        "oscillator_damped",
+        (
             (f"{SRC}/linear/regularisation.hpp", "spread = 1.0 + 4.0 * theta", "spread = 1.0 - 4.0 * theta"),
             (
                 f"{SRC}/linear/regularisation.hpp",
@@ -91,94 +123,423 @@ MUTANTS = (
                 "",
             ),
         ),
-        tests=("pendulum", "oscillator_damped", "door"),
-        sweep=False,
-        expected=("regressed",),
+    ),
+    Mutant(
+        "particles",
+        "fast-clock",
+        "places move on by 1.0001 steps",
+        "falling_object",
+        (
+            (
+                f"{SRC}/particles/particle_system.cpp",
+                "nodes_.x[node] += parts_.h * nodes_.v[node];",
+                "nodes_.x[node] += 1.0001 * parts_.h * nodes_.v[node];",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "x[node] += h * v[node];",
+                "x[node] += 1.0001 * h * v[node];",
+            ),
+        ),
+    ),
+    wrong(
+        "particles",
+        "one-sided-spring",
+        "a spring pulls its second end 1 % less",
+        "oscillator_spring",
+        "particles/particle_forces.cpp",
+        "nodes.kick[s.b] -= (time_step * nodes.w[s.b]) * pull",
+        "nodes.kick[s.b] -= (0.99 * time_step * nodes.w[s.b]) * pull",
+    ),
+    wrong(
+        "particles",
+        "weak-attraction",
+        "planets are drawn one part in 10 000 less",
+        "planetarium",
+        "particles/particle_forces.cpp",
+        "time_step * field.strength / (r2 * r)",
+        "0.9999 * time_step * field.strength / (r2 * r)",
+    ),
+    Mutant(
+        "particles",
+        "flat-curvature",
+        "curved constraints see a fifth where a quarter belongs",
+        "pendulum",
+        (
+            (
+                f"{SRC}/particles/particle_curvature.cpp",
+                "(0.25 + row.relaxation) * ahead",
+                "(0.2 + row.relaxation) * ahead",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "(0.25 + r.relaxation) * ahead",
+                "(0.2 + r.relaxation) * ahead",
+            ),
+        ),
+    ),
+    wrong(
+        "particles",
+        "late-half-step",
+        "velocities begin .4 of a step early, not half of one",
+        "planetarium",
+        "particles/particle_curvature.cpp",
+        "nodes_.v[node] -= 0.5 * nodes_.kick[node];",
+        "nodes_.v[node] -= 0.4 * nodes_.kick[node];",
+    ),
+    wrong(
+        "strings",
+        "slack-strings",
+        "strings have a fifth of the stiffness of their tension, not a quarter",
+        "hanging_chain",
+        "particles/saddle_blocks.cpp",
+        "held = 0.25 * stiffness",
+        "held = 0.05 * stiffness",
+    ),
+    wrong(
+        "composition",
+        "short-last-stage",
+        "the middle stage of order 4 is a little short",
+        "tests/test_engine_composition.py::test_the_order_holds_on_the_pendulum",
+        "run/composition.hpp",
+        "-0.65796308717750294857",
+        "-0.65795",
+    ),
+    wrong(
+        "composition",
+        "drift-too-far",
+        "the drift before a kick is 1 % too long",
+        "tests/test_engine_composition.py::test_the_order_holds_on_an_orbit",
+        "particles/particle_composition.cpp",
+        "state_.pending + 0.5 * tau, part = tau / h_",
+        "state_.pending + 0.505 * tau, part = tau / h_",
+    ),
+    wrong(
+        "recorder",
+        "last-for-largest",
+        "the largest size is the last one",
+        "pendulum",
+        "run/recorder.cpp",
+        "if (first || size > out[i] || size != size) out[i] = size;",
+        "out[i] = size;",
+    ),
+    wrong(
+        "recorder",
+        "forgets-the-start",
+        "what is measured from the start is measured from zero",
+        "rotating_box",
+        "run/recorder.cpp",
+        "now[i] - (what.from_start ? channel.start[i] : 0.0)",
+        "now[i]",
+    ),
+    wrong(
+        "recorder",
+        "mean-of-one-more",
+        "a mean divides by one sample too many",
+        "tests/test_engine_recording.py::test_of_particles_with_every_force",
+        "run/recorder.cpp",
+        "value /= static_cast<double>(channel.count);",
+        "value /= static_cast<double>(channel.count + 1);",
+    ),
+    wrong(
+        "rotation",
+        "weak-gyroscope",
+        "a tenth of the gyroscopic term is lost",
+        "spinning_top",
+        "rigid/rotation.cpp",
+        "c * momentum + half * cross(w, momentum) - p",
+        "c * momentum + 0.9 * half * cross(w, momentum) - p",
+    ),
+    wrong(
+        "rotation",
+        "quick-spheres",
+        "spheres turn a little too fast",
+        "tests/test_engine_free_rotation.py::test_a_sphere_turns_by_the_arc_sine_of_its_step",
+        "rigid/rotation.cpp",
+        "w = (1.0 / std::sqrt(1.0 - y)) * s;",
+        "w = (1.0001 / std::sqrt(1.0 - y)) * s;",
+    ),
+    wrong(
+        "joints",
+        "soft-locks",
+        "held turns are seen 5 % too small",
+        "cantilever",
+        "rigid/joint_rows.cpp",
+        "write.angular(q.w * axes[k] + cross(world, axes[k]), 2.0 * dot(joint.axes[k], e));",
+        "write.angular(q.w * axes[k] + cross(world, axes[k]), 1.9 * dot(joint.axes[k], e));",
+    ),
+    wrong(
+        "joints",
+        "hinge-backwards",
+        "one row of a hinge pushes the wrong way",
+        "door",
+        "rigid/joint_rows.cpp",
+        "write.angular(cross(axis, axes[1]), dot(joint.axes[1], moved));",
+        "write.angular(cross(axis, axes[1]), -dot(joint.axes[1], moved));",
+    ),
+    wrong(
+        "joints",
+        "short-arm",
+        "a rod pulls at 99 % of its arm",
+        "tests/test_engine_rigid_oracle.py::test_each_joint_alone",
+        "rigid/joint_rows.cpp",
+        "put(rows.second + 3, cross(ends.second_arm, direction));",
+        "put(rows.second + 3, 0.99 * cross(ends.second_arm, direction));",
+    ),
+    wrong(
+        "joints",
+        "free-gears",
+        "relations do not see how fast their joints turn",
+        "gears",
+        "rigid/general_rows.cpp",
+        "sum.rate += c * row.rate;",
+        "sum.rate += 0.0 * c * row.rate;",
+    ),
+    wrong(
+        "joints",
+        "long-wire",
+        "wires are one part in a thousand longer than they are told",
+        "wires",
+        "rigid/general_rows.cpp",
+        "sum.violation -= general.length;",
+        "sum.violation -= 1.001 * general.length;",
+    ),
+    wrong(
+        "loads",
+        "light-fluid",
+        "fluids carry 1 % less",
+        "floating_box",
+        "rigid/rigid_loads.cpp",
+        "-(fluid.density * below.volume) * gravity_",
+        "-(0.99 * fluid.density * below.volume) * gravity_",
+    ),
+    wrong(
+        "loads",
+        "thin-drag",
+        "drag is 2 % too small",
+        "sinking_sphere",
+        "rigid/rigid_loads.cpp",
+        "(0.5 * fluid.density * fluid.drag",
+        "(0.49 * fluid.density * fluid.drag",
+    ),
+    wrong(
+        "collision",
+        "large-spheres",
+        "the second of two spheres is 1 % too large",
+        "cradle",
+        "collision/round_pairs.cpp",
+        "distance - first.radius - second.radius;",
+        "distance - first.radius - 1.01 * second.radius;",
+    ),
+    wrong(
+        "collision",
+        "sunk-boxes",
+        "boxes lie a millimetre deeper in a plane than they do",
+        "resting_stack",
+        "collision/plane_pairs.cpp",
+        "const double gap = ground.height(point);",
+        "const double gap = ground.height(point) - 1e-3;",
+    ),
+    wrong(
+        "collision",
+        "high-spheres",
+        "spheres touch a plane 1 % of their radius too early",
+        "bouncing_ball",
+        "collision/plane_pairs.cpp",
+        "plane.height(centre) - radius;",
+        "plane.height(centre) - 1.01 * radius;",
+    ),
+    wrong(
+        "contacts",
+        "dull-impacts",
+        "3 % of every restitution is lost",
+        "bouncing_ball",
+        "contacts/contact_detect.cpp",
+        "const double psi = point.material.restitution, speed",
+        "const double psi = 0.97 * point.material.restitution, speed",
+    ),
+    wrong(
+        "friction",
+        "sticky",
+        "friction holds one part in a thousand more",
+        "friction",
+        "contacts/contact_stage.cpp",
+        "friction.push_back({block, material.friction, soft, point.before});",
+        "friction.push_back({block, 1.001 * material.friction, soft, point.before});",
+    ),
+    wrong(
+        "friction",
+        "smooth-rolling",
+        "rolling friction is 3 % too small",
+        "rolling_friction",
+        "contacts/contact_stage.cpp",
+        "material.rolling / scale",
+        "0.97 * material.rolling / scale",
+    ),
+    judged(
+        "signed-errors",
+        "an error is judged with its sign",
+        "test_tracker_verdict.py::test_a_doubled_negative_error_and_a_lost_exact_zero_are_regressed",
+        "judge/verdict.py",
+        "        return abs(value)\n",
+        "        return value\n",
+    ),
+    judged(
+        "ulps-by-value",
+        "doubles between two values are counted by their difference",
+        "test_tracker_verdict.py::test_ulps_count_the_doubles_between",
+        "judge/verdict.py",
+        "return abs(_place(a) - _place(b))",
+        "return int(abs(a - b))",
+    ),
+    judged(
+        "lost-sign",
+        "the sign of zero is not stored",
+        "test_tracker_record.py::test_every_float_comes_back_with_the_same_bits",
+        "store/rows.py",
+        'return 0.0, "-0.0"',
+        "return 0.0, None",
+    ),
+    judged(
+        "sum-of-ratios",
+        "the slow-down of a ladder is the sum over its rungs, not their mean",
+        "test_tracker_noise.py::test_one_slow_rung_is_not_a_slower_engine",
+        "judge/timing_statistics.py",
+        "for a, b in rungs) / len(rungs))",
+        "for a, b in rungs))",
     ),
 )
 
 
-def call(*command: str, cwd: Path, check: bool = True, **env: str) -> subprocess.CompletedProcess[str]:
-    """Run a command quietly; its output is shown only if it fails."""
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | env)
-    if check and done.returncode != 0:
-        sys.exit(f"{' '.join(command[:6])} … failed in {cwd}:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
-    return done
-
-
-def build(clone: Path, changes: tuple[tuple[str, str, str], ...], message: str) -> None:
-    """A clone of HEAD with the changes committed and the engine built in place."""
-    call("git", "clone", "-q", str(ROOT), str(clone), cwd=ROOT)
+def changed(place: Path, changes: Iterable[tuple[str, str, str]]) -> None:
+    """The sources with the changes made; ends the program where a text is not there any more."""
     for file, old, new in changes:
-        text = (clone / file).read_text()
+        text = (place / file).read_text(encoding="utf-8")
         if old not in text:
             sys.exit(f"{file} no longer holds {old!r}; bring this mutant up to date")
-        (clone / file).write_text(text.replace(old, new))
-    author = ("-c", "user.name=mutant", "-c", "user.email=mutant@example.org")
-    call("git", *author, "commit", "-q", "--allow-empty", "-am", message, cwd=clone)
-    cmake = str(Path(sys.executable).with_name("cmake"))
-    call(cmake, "-S", "engine/native", "-B", "build", f"-DPython_EXECUTABLE={sys.executable}", cwd=clone)
-    call(cmake, "--build", "build", "-j2", cwd=clone)
-    for module in (clone / "build").glob("_core*.so"):
-        module.rename(clone / "engine" / module.name)
+        (place / file).write_text(text.replace(old, new), encoding="utf-8")
 
 
-def tracker(clone: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """The tracker of a clone, with that clone's engine."""
-    # -S leaves out the finder of an editable install, here and in the worker processes it starts.
-    packages = sysconfig.get_path("purelib")
-    search = os.pathsep.join([str(clone), packages])
-    return call(
-        sys.executable, "-S", "-m", "spook_tracker", *arguments, cwd=clone, check=False, PYTHONPATH=search
+def git(place: Path, *arguments: str) -> None:
+    who = ("-c", "user.name=mutant", "-c", "user.email=mutant@example.org")
+    subprocess.run(["git", "-C", str(place), *who, *arguments], check=True, capture_output=True)
+
+
+def measure(place: Path, tests: Sequence[str], sweep: bool) -> RunDocument:
+    """What the clone answers, to its own questions."""
+    file = place / "run.json"
+    file.unlink(missing_ok=True)
+    done = commits.call(place, "run", *tests, "--no-record", "--json", str(file), *["--sweep"] * sweep)
+    if not file.exists():
+        sys.exit(f"{place} gives no answers: {done.stderr[-500:]}")
+    return decode(file.read_bytes(), RunDocument)
+
+
+def caught_by_scalar_test(place: Path, mutant: Mutant, sound: RunDocument) -> tuple[bool, str]:
+    """Whether a series of the named test regressed, and which did most."""
+    git(place, "commit", "-qam", mutant.story)
+    try:
+        commits.build_in_place(place)
+        document = compare_documents(sound, measure(place, (mutant.caught_by,), mutant.sweep))
+    finally:
+        git(place, "reset", "-q", "--hard", "HEAD~1")
+    worst = worst_change(document)
+    if worst is None or worst.word != "regressed" or worst.test != mutant.caught_by:
+        return False, "nothing is worse"
+    return True, f"{worst.series}: {worst.name or worst.word}, {worst.sentence}"
+
+
+def caught_by_test(place: Path, mutant: Mutant) -> tuple[bool, str]:
+    """Whether the named test of the suite fails."""
+    if mutant.native:
+        commits.build_in_place(place)
+    search = os.pathsep.join([str(place), sysconfig.get_path("purelib")])
+    command = [sys.executable, "-S", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", mutant.caught_by]
+    done = subprocess.run(
+        command, cwd=place, env={**os.environ, "PYTHONPATH": search}, capture_output=True, text=True
     )
+    git(place, "reset", "-q", "--hard")
+    last = [line for line in done.stdout.splitlines() if line.strip()]
+    return done.returncode == 1, last[-1] if last else done.stderr[-200:]
 
 
-def measure(clone: Path, database: str, tests: tuple[str, ...], sweep: bool) -> str:
-    """Record one run of the clone; returns its commit."""
-    done = tracker(clone, "run", *tests, *(["--sweep"] if sweep else []), "--db", database)
-    if done.returncode > 1:
-        sys.exit(done.stderr)
-    return call("git", "rev-parse", "HEAD", cwd=clone).stdout.strip()
+def tonights(count: int, day: datetime.date) -> tuple[Mutant, ...]:
+    """So many of them, others every night, until all had their turn."""
+    start = day.toordinal() * count % len(MUTANTS)
+    return tuple((MUTANTS * 2)[start : start + min(count, len(MUTANTS))])
+
+
+def page(rows: Sequence[tuple[Mutant, bool, str]]) -> str:
+    caught = sum(found for _, found, _ in rows)
+    lines = [
+        "# Engines that are wrong on purpose", "",
+        f"Made by `make mutants`, not by hand: {caught} of {len(rows)} are caught by the test that is named for them.", "",
+        "| room | what is wrong | caught by | what it says |", "|---|---|---|---|",
+    ]  # fmt: skip
+    for mutant, found, said in rows:
+        by = mutant.caught_by if found else f"NOT by {mutant.caught_by}"
+        lines.append(f"| {mutant.room} | {mutant.story} | `{by}` | {said.replace('|', '/')} |")
+    return "\n".join(lines) + "\n"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="mutants to try; all if none is named")
-    parser.add_argument("--rebuilds", type=int, default=2, help="unchanged rebuilds to try")
+    parser.add_argument("--tonight", type=int, metavar="N", help="N of them, others every night")
+    parser.add_argument(
+        "--keep", type=Path, metavar="DIR", help="build there, and leave it for the next time"
+    )
+    parser.add_argument("--page", type=Path, help="write the table here")
     given = parser.parse_args()
-    chosen = [m for m in MUTANTS if not given.names or m.name in given.names]
-    failed = 0
+    chosen = tonights(given.tonight, datetime.datetime.now(datetime.UTC).date()) if given.tonight else MUTANTS
+    chosen = tuple(m for m in chosen if not given.names or m.name in given.names)
+    rows: list[tuple[Mutant, bool, str]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        place = Path(folder)
-        original = place / "original"
-        build(original, (), "the engine as it is")
+        head = commits.full_hash(ROOT, given.commit)
+        place = commits.built(ROOT, head, (given.keep or Path(folder)).resolve())
+        sound = {
+            sweep: measure(place, sorted(tests), sweep)
+            for sweep in (False, True)
+            if (tests := {m.caught_by for m in chosen if m.sweep == sweep and not m.of_the_suite})
+        }
         for mutant in chosen:
-            database = f"sqlite:///{place}/{mutant.name}.db"
-            clone = place / mutant.name
-            build(clone, mutant.changes, mutant.story)
-            before = measure(original, database, mutant.tests, mutant.sweep)
-            after = measure(clone, database, mutant.tests, mutant.sweep)
-            table = tracker(original, "compare", before, after, "--db", database)
-            caught = table.returncode == 1 and all(word in table.stdout for word in mutant.expected)
-            failed += not caught
-            print(f"{'caught' if caught else 'MISSED'}  {mutant.name}: {mutant.story}")
-            print("\n".join(f"        {line}" for line in table.stdout.strip().splitlines()[:12]), flush=True)
-        for number in range(given.rebuilds):
-            database = f"sqlite:///{place}/rebuild-{number}.db"
-            clone = place / f"rebuild-{number}"
-            build(clone, (), f"rebuild {number}")
-            tests, sweep = ("pendulum", "n_pendulum"), True
-            before = measure(original, database, tests, sweep)
-            after = measure(clone, database, tests, sweep)
-            report = tracker(original, "compare", before, after, "--db", database, "--format", "json")
-            same = report.returncode == 0
-            failed += not same
-            summary = json.loads(report.stdout)["counts"] if same else report.stdout[-1500:]
+            started = time.monotonic()
+            changed(place, mutant.changes)
+            if mutant.of_the_suite:
+                found, said = caught_by_test(place, mutant)
+            else:
+                found, said = caught_by_scalar_test(
+                    place, mutant, only(sound[mutant.sweep], mutant.caught_by)
+                )
+            rows.append((mutant, found, said))
+            took = f"{time.monotonic() - started:.0f} s"
             print(
-                f"{'identical' if same else 'DIFFERENT'}  rebuild {number + 1} of {given.rebuilds}: {summary}",
+                f"{'caught' if found else 'MISSED'}  {mutant.room}/{mutant.name} ({took}): {mutant.story}; {said}",
                 flush=True,
             )
-    return 1 if failed else 0
+        same = True
+        if False in sound:
+            commits.build_in_place(place)
+            again = compare_documents(
+                sound[False], measure(place, sorted({d.test for d in sound[False].series}), False)
+            )
+            same = again.verdict == "identical"
+            print(
+                f"{'identical' if same else 'DIFFERENT'}  the engine as it was, built again: {again.counts}",
+                flush=True,
+            )
+    if given.page:
+        given.page.write_text(page(rows), encoding="utf-8")
+    return 0 if same and all(found for _, found, _ in rows) else 1
+
+
+def only(run: RunDocument, test: str) -> RunDocument:
+    """The run without its other tests."""
+    series = tuple(d for d in run.series if d.test == test)
+    keys = {d.key for d in series}
+    return msgspec.structs.replace(
+        run, series=series, samples=tuple(s for s in run.samples if s.series in keys), maps=()
+    )
 
 
 if __name__ == "__main__":

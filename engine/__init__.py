@@ -98,7 +98,18 @@ from spook_tracker.engine.program import Program, StageChoice
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.engine.run import Run, Snapshot, start
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import (
+    Box,
+    Capsule,
+    Compound,
+    ConvexHull,
+    Cylinder,
+    Part,
+    PlacedHull,
+    Plane,
+    Shape,
+    Sphere,
+)
 from spook_tracker.engine.simulation import simulate
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
 
@@ -117,6 +128,8 @@ __all__ = [
     "ConstraintForce",
     "ContactCount",
     "ContactForce",
+    "ConvexHull",
+    "Cylinder",
     "Cylindrical",
     "Distance",
     "Energy",
@@ -143,6 +156,7 @@ __all__ = [
     "Part",
     "Particle",
     "Penetration",
+    "PlacedHull",
     "Planar",
     "Plane",
     "PointOnLine",

@@ -31,11 +31,14 @@ EXTRAS: Mapping[str, str] = {
     "mujoco": "mujoco",
     "exudyn": "exudyn",
     "pybullet": "pybullet",
+    "drake": "drake",
+    "dart": "dartpy",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",
     "rapier": "@dimforge/rapier3d-compat",
     "jolt": "jolt-physics",
+    "p2": "p2-es",
 }  # engine: its package, from npm
 
 

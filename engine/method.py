@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,7 +24,8 @@ class Method:
     substeps           steps of h/substeps per reported step
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
-                       compliance, damping and corrections play no part; forces are those at the sample's time
+                       compliance, damping and corrections play no part; forces are those at the sample's time.
+                       Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
     iterations, residual_tolerance   when an iterative solve stops; sweeps over contacts go on, up to four times as
                        many, where rows are still off by more than unsettled_residual
@@ -64,6 +66,12 @@ class Method:
                 refuse(field, "a number")
             if isinstance(value, int) and abs(value) > sys.float_info.max:
                 raise MethodError(f"method: {field} is a number too large for arithmetic")
+        for field in ("half_step_velocities", "string_stiffness"):
+            if not isinstance(getattr(self, field), bool):
+                refuse(field, "True or False")
+        for field in ("corrections", "substeps", "iterations", "refinements"):
+            if isinstance(getattr(self, field), bool):
+                refuse(field, "a whole number")
         if self.corrections not in (0, 1, 2):
             refuse("corrections", "0, 1 or 2")
         if not 0.0 < self.correction_cap <= 1.0:
@@ -88,6 +96,8 @@ class Method:
             refuse("refinements", "a whole number from 0 to 10")
         if not 0.0 <= self.floor < 1.0:
             refuse("floor", "from 0 to below 1")
+        if isinstance(self.force_stages, str) or not isinstance(self.force_stages, Iterable):
+            refuse("force_stages", "names of stages, such as ('rotation',)")
         object.__setattr__(self, "force_stages", tuple(self.force_stages))
         for stage in self.force_stages:
             if stage not in STAGES_THAT_CAN_BE_FORCED:

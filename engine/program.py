@@ -83,6 +83,10 @@ def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
         raise MethodError(f"observe must map names to a Trace, Final, Maximum, ..., not {observe!r}")
     quantities: list[Any] = []
     for name, what in observe.items():
+        if not isinstance(name, str):
+            raise MethodError(
+                f"observe must map names to a Trace, Final, Maximum, ..., and {name!r} is not a name"
+            )
         if not isinstance(what, Observable):
             raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
         if what.quantity not in quantities:

@@ -43,8 +43,9 @@ from spook_tracker.engine.particle_program import ends
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
-from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import ConvexHull
 from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
+from spook_tracker.engine.surface_tables import check_cylinders, hull_tables, surfaces
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, at_start
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
@@ -71,6 +72,7 @@ def compile_rigid(
 ) -> Program:
     """The Program of a scene with at least one rigid body; `held`: its loads may be set."""
     check_wide_rows(scene, method)
+    check_cylinders(scene)
     quantities, shapes = requests(scene, observe)
     native = _core.RigidProgram(
         **pack(scene, time_step, method, held),
@@ -117,6 +119,7 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
                     "viscosity": force.viscosity,
                 }
             )
+    hulls: dict[ConvexHull, int] = {}
     joints = [_joint(scene, constraint, bodies, step) for constraint in scene.constraints]
     apart = [{"first": bodies[first], "second": bodies[second]} for first, second in scene.no_contact]
     apart += [
@@ -129,11 +132,12 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
         "joints": table(joints),
         **_drives(scene, step),
         **_couplings(scene, bodies),
-        **_fluids(scene),
+        **_fluids(scene, hulls),
         **_in_time(scene, bodies),
         "springs": table(springs),
         "fields": table(fields),
-        "colliders": table(_surfaces(scene) if scene.contacts else []),
+        "colliders": table(surfaces(scene, hulls) if scene.contacts else []),
+        **hull_tables(hulls),
         "no_contact": table(apart),
         "contacts": scene.contacts,
         "gravity": scene.gravity,
@@ -288,7 +292,7 @@ def _couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
     return {"terms": table(terms), "wire_points": table(points)}
 
 
-def _fluids(scene: Scene) -> dict[str, Any]:
+def _fluids(scene: Scene, hulls: dict[ConvexHull, int]) -> dict[str, Any]:
     """Fluids, and the surfaces of dynamic bodies that displace them."""
     down = math.hypot(*scene.gravity)
     fluids = [
@@ -302,7 +306,9 @@ def _fluids(scene: Scene) -> dict[str, Any]:
         for fluid in scene.forces
         if isinstance(fluid, Fluid)
     ]
-    floaters = [part for part in _surfaces(scene) if _moves(scene.bodies[part["body"]])] if fluids else []
+    floaters = (
+        [part for part in surfaces(scene, hulls) if _moves(scene.bodies[part["body"]])] if fluids else []
+    )
     return {"fluids": table(fluids), "floaters": table(floaters)}
 
 
@@ -370,32 +376,3 @@ def _axes(joint: Joint) -> tuple[float, ...]:
         (a, b, c), (x, y, z) = joint.axis, joint.cross_axis
         return (a, b, c, x, y, z, b * z - c * y, c * x - a * z, a * y - b * x)
     return _WORLD_AXES
-
-
-def _surfaces(scene: Scene) -> list[dict[str, Any]]:
-    colliders: list[dict[str, Any]] = []
-    for index, body in enumerate(scene.bodies):
-        if not isinstance(body, RigidBody) or body.shape is None:
-            continue
-        placed = (
-            [(part.position, part.orientation, part.shape) for part in body.shape.parts]
-            if isinstance(body.shape, Compound)
-            else [(_ORIGIN, _UPRIGHT, body.shape)]
-        )
-        for position, orientation, shape in placed:
-            colliders.append(
-                {"body": index, "position": position, "orientation": orientation} | _primitive(shape)
-            )
-    return colliders
-
-
-def _primitive(shape: Shape) -> dict[str, Any]:
-    columns: dict[str, Any] = {"radius": 0.0, "length": 0.0, "size": _ORIGIN, "normal": _ORIGIN}
-    if isinstance(shape, Sphere):
-        return columns | {"kind": "sphere", "radius": shape.radius}
-    if isinstance(shape, Capsule):
-        return columns | {"kind": "capsule", "radius": shape.radius, "length": shape.length}
-    if isinstance(shape, Box):
-        return columns | {"kind": "box", "size": shape.size}
-    assert isinstance(shape, Plane)
-    return columns | {"kind": "plane", "normal": shape.normal}

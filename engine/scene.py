@@ -45,6 +45,8 @@ class Scene:
             if not isinstance(given, Iterable) or isinstance(given, str):
                 raise SceneError(f"scene: {field} must be a sequence, not {given!r}")
             object.__setattr__(self, field, tuple(given))
+        if not isinstance(self.contacts, bool):
+            raise SceneError(f"scene: contacts must be True or False, not {self.contacts!r}")
         if not self.bodies:
             raise SceneError("a scene needs at least one body")
         for body in self.bodies:
@@ -152,6 +154,8 @@ class Scene:
         for name in pair:
             if name not in known:
                 raise SceneError(f"no_contact: there is no body named {name!r}")
+        if pair[0] == pair[1]:
+            raise SceneError(f"no_contact: {pair[0]!r} cannot touch itself; name two bodies")
         return (pair[0], pair[1])
 
     def follows_time(self) -> bool:

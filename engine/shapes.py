@@ -1,11 +1,16 @@
-"""Surfaces: sphere, box, capsule, plane, and compounds of these. Each knows its inertia per mass."""
+"""Surfaces: sphere, box, capsule, cylinder, convex hull, plane, and compounds of these. Each knows its inertia per mass.
+
+A new shape says here what it is called, which columns the native side gets and how it is drawn.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
 
-from spook_tracker.engine import check
+from spook_tracker.engine import check, polytope
 from spook_tracker.engine.check import Rotation, Vector
 from spook_tracker.engine.errors import SceneError
 
@@ -14,6 +19,16 @@ class Shape:
     """Base of every shape; `inertia(mass)` gives the principal moments [kg m²] at uniform density."""
 
     __slots__ = ()
+    kind: ClassVar[str] = ""  # the native side's name
+    drawn_as: ClassVar[str] = ""  # a kind of DrawnSolid; none: not drawn
+
+    def columns(self) -> dict[str, Any]:
+        """What the native side is told of it."""
+        return {}
+
+    def measures(self) -> tuple[float, ...]:
+        """What it is drawn with: see DrawnSolid."""
+        return ()
 
     def inertia(self, mass: float) -> Vector:
         raise NotImplementedError
@@ -23,10 +38,18 @@ class Shape:
 class Sphere(Shape):
     """A ball about the body's origin."""
 
+    kind: ClassVar[str] = "sphere"
+    drawn_as: ClassVar[str] = "sphere"
     radius: float  # m
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", check.positive("sphere", "radius", self.radius))
+
+    def columns(self) -> dict[str, Any]:
+        return {"radius": self.radius}
+
+    def measures(self) -> tuple[float, ...]:
+        return (self.radius,)
 
     def inertia(self, mass: float) -> Vector:
         moment = 0.4 * mass * self.radius**2
@@ -37,11 +60,19 @@ class Sphere(Shape):
 class Box(Shape):
     """A cuboid about the body's origin, edges along the body axes."""
 
+    kind: ClassVar[str] = "box"
+    drawn_as: ClassVar[str] = "box"
     size: Vector  # full edge lengths, m
 
     def __post_init__(self) -> None:
         x, y, z = (check.positive("box", "size", edge) for edge in check.vector("box", "size", self.size))
         object.__setattr__(self, "size", (x, y, z))
+
+    def columns(self) -> dict[str, Any]:
+        return {"size": self.size}
+
+    def measures(self) -> tuple[float, ...]:
+        return self.size
 
     def inertia(self, mass: float) -> Vector:
         x, y, z = self.size
@@ -52,12 +83,20 @@ class Box(Shape):
 class Capsule(Shape):
     """A cylinder along the body's z axis with half-spheres at both ends."""
 
+    kind: ClassVar[str] = "capsule"
+    drawn_as: ClassVar[str] = "capsule"
     radius: float  # m
     length: float  # of the cylinder, without the caps, m
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", check.positive("capsule", "radius", self.radius))
         object.__setattr__(self, "length", check.positive("capsule", "length", self.length))
+
+    def columns(self) -> dict[str, Any]:
+        return {"radius": self.radius, "length": self.length}
+
+    def measures(self) -> tuple[float, ...]:
+        return (self.radius, self.length)
 
     def inertia(self, mass: float) -> Vector:
         radius, length = self.radius, self.length
@@ -72,13 +111,120 @@ class Capsule(Shape):
 
 
 @dataclass(frozen=True, slots=True)
+class Cylinder(Shape):
+    """A cylinder along the body's z axis; a coin is a short one. It meets planes and spheres, and floats.
+
+    Other shapes it may touch are refused when the scene is compiled: its round edge against theirs is not there yet.
+    """
+
+    kind: ClassVar[str] = "cylinder"
+    drawn_as: ClassVar[str] = "facets"
+    radius: float  # m
+    length: float  # m
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check.positive("cylinder", "radius", self.radius))
+        object.__setattr__(self, "length", check.positive("cylinder", "length", self.length))
+
+    def columns(self) -> dict[str, Any]:
+        return {"radius": self.radius, "length": self.length}
+
+    def inertia(self, mass: float) -> Vector:
+        across = mass * (self.radius**2 / 4.0 + self.length**2 / 12.0)
+        return (across, across, mass * self.radius**2 / 2.0)
+
+    def measures(self) -> tuple[float, ...]:
+        sides, half = 24, 0.5 * self.length
+        turns = [2.0 * math.pi * k / sides for k in range(sides)]
+        rim = [(self.radius * math.cos(turn), self.radius * math.sin(turn)) for turn in turns]
+        faces = [[(x, y, half) for x, y in rim], [(x, y, -half) for x, y in reversed(rim)]]
+        for (x, y), (u, v) in zip(rim, [*rim[1:], rim[0]], strict=True):
+            faces.append([(x, y, -half), (u, v, -half), (u, v, half), (x, y, half)])
+        return polytope.drawn(faces)
+
+
+class PlacedHull(NamedTuple):
+    """A hull in its principal axes, and where its body has to stand so that its corners are where they were given."""
+
+    shape: ConvexHull
+    position: Vector  # m
+    orientation: Rotation
+
+
+@dataclass(frozen=True, slots=True)
+class ConvexHull(Shape):
+    """The smallest convex solid round some points, in body axes: at most 64 corners, at most 8 round a face.
+
+    The body's origin is its centre of mass and its axes are principal, so the points must be given there, unless the
+    body gets its inertia. `ConvexHull.placed(points)` finds them for points anywhere.
+    """
+
+    kind: ClassVar[str] = "hull"
+    drawn_as: ClassVar[str] = "facets"
+    corners: tuple[Vector, ...]  # m; of the points given only the corners are kept
+    faces: tuple[polytope.Face, ...] = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given: Any = self.corners
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise SceneError(f"convex hull: corners must be points, not {given!r}")
+        points = [check.vector("convex hull", "corners", point) for point in given]
+        try:
+            corners, faces = polytope.hull(points)
+        except ValueError as refused:
+            raise SceneError(f"convex hull: {refused}") from None
+        object.__setattr__(self, "corners", corners)
+        object.__setattr__(self, "faces", faces)
+
+    @classmethod
+    def placed(cls, points: Iterable[Vector]) -> PlacedHull:
+        """The hull of points anywhere: its shape in principal axes, and the pose of its body."""
+        rough = cls(tuple(points))
+        _, (x, y, z), second = polytope.moments(rough.corners, rough.faces)
+        axes = polytope.principal_axes(polytope.inertia_of(second))
+        columns = tuple(zip(*axes, strict=True))
+        moved = [polytope.minus(corner, (x, y, z)) for corner in rough.corners]
+        turned = tuple(tuple(polytope.dot(column, p) for column in columns) for p in moved)
+        return PlacedHull(cls(turned), (x, y, z), polytope.quaternion(axes))  # type: ignore[arg-type]
+
+    @property
+    def volume(self) -> float:
+        """m³."""
+        return polytope.moments(self.corners, self.faces)[0]
+
+    def inertia(self, mass: float) -> Vector:
+        volume, centre, second = polytope.moments(self.corners, self.faces)
+        tensor = polytope.inertia_of(second)
+        size = max(math.hypot(*corner) for corner in self.corners)
+        least = min(tensor[i][i] for i in range(3))
+        off = max(abs(tensor[0][1]), abs(tensor[0][2]), abs(tensor[1][2]))
+        if math.hypot(*centre) > 1e-9 * size or off > 1e-9 * least:
+            raise SceneError(
+                "convex hull: its centre of mass is not the origin, or its axes are not principal; "
+                "ConvexHull.placed(points) finds both, or give the body its inertia"
+            )
+        return tuple(mass / volume * tensor[i][i] for i in range(3))  # type: ignore[return-value]
+
+    def measures(self) -> tuple[float, ...]:
+        return polytope.drawn([[self.corners[corner] for corner in face] for face in self.faces])
+
+
+@dataclass(frozen=True, slots=True)
 class Plane(Shape):
     """The half-space below the plane through the body's origin; `normal` points out, in body axes."""
 
+    kind: ClassVar[str] = "plane"
+    drawn_as: ClassVar[str] = "plane"
     normal: Vector = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", check.direction("plane", "normal", self.normal))
+
+    def columns(self) -> dict[str, Any]:
+        return {"normal": self.normal}
+
+    def measures(self) -> tuple[float, ...]:
+        return self.normal
 
     def inertia(self, mass: float) -> Vector:
         return (math.inf, math.inf, math.inf)
@@ -93,8 +239,8 @@ class Part:
     orientation: Rotation = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Sphere | Box | Capsule):
-            raise SceneError(f"compound: a part must be a sphere, box or capsule, not {self.shape!r}")
+        if not isinstance(self.shape, Shape) or isinstance(self.shape, Plane | Compound):
+            raise SceneError(f"compound: a part must be a bounded shape and no compound, not {self.shape!r}")
         object.__setattr__(self, "position", check.vector("compound part", "position", self.position))
         object.__setattr__(
             self, "orientation", check.rotation("compound part", "orientation", self.orientation)

@@ -82,6 +82,7 @@ class Metric:
     reference: float | None = None  # the right value, where one exists
     tolerance: float = 0.0
     relative_tolerance: float = 1e-9
+    formerly: tuple[str, ...] = ()  # its earlier names, the first one first: its history goes on
 
     @property
     def quantity(self) -> Quantity:
@@ -281,6 +282,7 @@ class ScalarTest:
     stability: tuple[StabilityStudy, ...] = ()
     misprints: tuple[str, ...] = ()  # where a reader comparing with the thesis would stumble
     seven: bool = False  # one of the thesis' seven continuous tests
+    formerly: tuple[str, ...] = ()  # its earlier names: its history goes on
 
     def questions(self) -> tuple[Asked, ...]:
         """What is asked apart from how: each quantity once for every time step and parameters.

@@ -52,6 +52,9 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "conveyor": "conveyor",
     "turntable": "turntable",
     "rolling_friction": "rolling_friction",
+    "masonry_arch": "masonry_arch",
+    "vehicle": "vehicle",
+    "rolling_coin": "rolling_coin",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +23,9 @@ from spook_tracker.engine import (
     Violation,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -32,6 +35,8 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityMap,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import line
 
@@ -47,6 +52,11 @@ PRECESSION = 1.0  # rad/s
 SPIN = (MASS * GRAVITY * ARM / PRECESSION + (ACROSS + MASS * ARM**2) * PRECESSION * math.cos(LEAN)) / ALONG
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 20.0  # s
+NUDGE = 1e-7  # rad/s
+SLEEP = 20.0  # s
+SLOWEST = 2.0 * math.sqrt(MASS * GRAVITY * ARM * (ACROSS + MASS * ARM**2)) / ALONG  # rad/s, asleep
+MAP_SPINS = tuple(float(s) for s in np.geomspace(2.0, 400.0, 9))  # rad/s
+MAP_STEPS = tuple(float(h) for h in np.geomspace(1.0 / 480.0, 1.0 / 15.0, 6))  # s
 ORDERS: tuple[Literal["order4", "order6", "order8"], ...] = ("order4", "order6", "order8")
 OBSERVE: dict[str, Observable] = {
     "place": Trace(quantity=Position("top")),
@@ -123,6 +133,64 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(built, time_step=time_step, duration=DURATION, method=method)
 
 
+def sleeping_scene(spin: float) -> Scene:
+    """The same top upright, spinning at `spin` [rad/s] and nudged by NUDGE [rad/s] across."""
+    top = RigidBody(
+        name="top",
+        mass=MASS,
+        inertia=(ACROSS, ACROSS, ALONG),
+        position=(0.0, 0.0, ARM),
+        velocity=(NUDGE * ARM, 0.0, 0.0),
+        angular_velocity=(0.0, NUDGE, spin),
+    )
+    tip = Ball(name="tip", between=(WORLD, "top"), at=(0.0, 0.0, 0.0), compliance=0.0)
+    return Scene(bodies=(top,), constraints=(tip,), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def falling_rate(spin: float) -> float:
+    """Of the growth of a small lean [1/s]: A' z'' − i C s z' − m g l z = 0 has z = e^(i C s t/2A') e^(± rate t)."""
+    upright = ACROSS + MASS * ARM**2
+    return math.sqrt(max(0.0, MASS * GRAVITY * ARM / upright - (0.5 * ALONG * spin / upright) ** 2))
+
+
+def _sleeps(simulate: Simulate, spin: float, time_step: float, method: Method) -> str:
+    """Asleep while the lean stays within a thousand nudges; their own nutation has one over its rate."""
+    place = {"place": Trace(quantity=Position("top"))}
+    built, steps = sleeping_scene(spin), round(SLEEP / time_step)
+    result = simulate(built, time_step=time_step, steps=steps, method=method, observe=place)
+    lean = np.hypot(result.partial["place"][:, 0], result.partial["place"][:, 1]) / ARM
+    return cell(result, lean / (1e3 * NUDGE), bound=1.0)
+
+
+def slowest(simulate: Simulate) -> BreakPoint:
+    """Slowest spin [rad/s] at which the upright top sleeps, order 4."""
+    return break_point(
+        lambda spin: is_stable(_sleeps(simulate, spin, TIME_STEP, ORDER_4)), 20.0, 2.0, resolution=1e-3
+    )
+
+
+def _growth(spin: float, time_step: float, method: Method) -> float:
+    if method is PLAIN and time_step * spin > 1.0:
+        return math.inf
+    return math.exp(time_step * falling_rate(spin))
+
+
+def _sleeping_map(method: Method) -> Callable[[Simulate], StabilityMap]:
+    def study(simulate: Simulate) -> StabilityMap:
+        return StabilityMap(
+            x=MAP_SPINS,
+            y=MAP_STEPS,
+            cells=table(MAP_STEPS, MAP_SPINS, lambda s, h: _sleeps(simulate, s, h, method)),
+            x_label="spin [rad/s]",
+            y_label="time step [s]",
+            prediction=table(MAP_STEPS, MAP_SPINS, lambda s, h: _growth(s, h, method)),
+            note="The prediction is the growth per step of the slow top's fall; infinite where one plain step cannot "
+            "turn by h s > 1, which compositions do in parts of a step.",
+        )
+
+    return study
+
+
 def draw(simulate: Simulate) -> Drawing:
     """Path of the centre of mass from above."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
@@ -140,6 +208,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
+ASLEEP = "20 s upright, nudged by 1e-7 rad/s, without a lean above 1e-4 rad, or doubling in the last third"
 TEST = ScalarTest(
     title="Spinning top",
     question="Does a leaning top precess steadily, at the rate that gravity and spin give it?",
@@ -283,6 +352,34 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-5,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="slowest-spin",
+            title="Slowest spin of the upright top, order 4",
+            configuration="order 4",
+            definition=ASLEEP,
+            study=slowest,
+            unit="rad/s",
+            better="smaller",
+            expected=(0.9985 * SLOWEST, 1.001 * SLOWEST),
+            expected_source="C s = 2 √(m g l (A + m l²)), less the 0.05 % below it at which sinh doubles from 13 s to 20 s, and the "
+            "resolution of 0.1 %",
+        ),
+        StabilityStudy(
+            name="map-spin-plain",
+            title="Spin and time step of the upright top, plain SPOOK",
+            configuration="plain",
+            definition=ASLEEP,
+            study=_sleeping_map(PLAIN),
+        ),
+        StabilityStudy(
+            name="map-spin-order-4",
+            title="Spin and time step of the upright top, order 4",
+            configuration="order 4",
+            definition=ASLEEP,
+            study=_sleeping_map(ORDER_4),
         ),
     ),
 )

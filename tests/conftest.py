@@ -16,7 +16,8 @@ from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  #
 
 # Minutes of work in few tests: they start first, so that all workers end at about the same time.
 LONG = ("tracker_publish", "scalar_tests_limits", "scalar_tests_answers", "tracker_durability", "tracker_history_machine",
-        "site_browser", "site_access", "release", "packaging", "tracker_publish_history", "judge_detection")  # fmt: skip
+        "site_browser", "site_access", "release", "packaging", "tracker_publish_history", "judge_detection",
+        "team_workflow", "tracker_executors")  # fmt: skip
 FIRST = [Path(__file__).with_name(f"test_{name}.py") for name in LONG]
 
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from spook_tracker.engine import (
     AngularMomentum,
+    AngularVelocity,
+    Ball,
     Box,
     Distance,
     Energy,
@@ -25,6 +27,7 @@ from spook_tracker.engine import (
     Scene,
     Sphere,
     Trace,
+    Velocity,
     Violation,
 )
 
@@ -222,3 +225,48 @@ def door(hinges: int) -> Scene:
         for k, z in enumerate(heights)
     ]
     return Scene(bodies=(body,), constraints=tuple(made), gravity=GRAVITY)
+
+
+def nodding() -> Scene:
+    """A body turned against the world that spins about a ball joint, on which hangs another that spins as well."""
+    spins = (np.array([1.0, 2.0, 3.0]), np.array([-2.0, 0.5, 1.0]))
+    turns = (
+        (math.cos(0.4), math.sin(0.4), 0.0, 0.0),
+        (math.cos(0.3), 0.0, 0.6 * math.sin(0.3), 0.8 * math.sin(0.3)),
+    )
+    points = (np.zeros(3), np.array([1.0, 0.2, -0.3]), np.array([1.7, 0.1, 0.4]))
+    speed, bodies = np.zeros(3), []
+    for k, (spin, turn) in enumerate(zip(spins, turns, strict=True)):
+        place = 0.5 * (points[k] + points[k + 1])
+        bodies.append(
+            RigidBody(
+                name=f"{k}",
+                mass=1.0,
+                inertia=(0.3, 0.2, 0.25),
+                position=tuple(float(x) for x in place),
+                orientation=turn,
+                velocity=tuple(float(x) for x in speed + np.cross(spin, place - points[k])),
+                angular_velocity=tuple(float(x) for x in spin),
+            )
+        )
+        speed = speed + np.cross(spin, points[k + 1] - points[k])
+    joints = [
+        Ball(
+            name=f"ball {k}",
+            between=("world" if k == 0 else f"{k - 1}", f"{k}"),
+            at=tuple(float(x) for x in points[k]),
+            compliance=0.0,
+        )
+        for k in range(2)
+    ]
+    return Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=GRAVITY)
+
+
+def started(simulate: Any) -> tuple[float, float]:
+    """How far the speeds [m/s] and spins [rad/s] of those two bodies are from the scene's before any step."""
+    scene = nodding()
+    observe = {"speeds": Trace(quantity=Velocity()), "spins": Trace(quantity=AngularVelocity())}
+    run = simulate(scene, time_step=1e-3, steps=1, observe=observe)
+    speeds = np.array([body.velocity for body in scene.bodies])
+    spins = np.array([body.angular_velocity for body in scene.bodies if isinstance(body, RigidBody)])
+    return float(np.abs(run["speeds"][0] - speeds).max()), float(np.abs(run["spins"][0] - spins).max())

@@ -313,6 +313,18 @@ class DocumentHistory:
         definitions = {d.key: d for d in run.series}
         return {s.series: (definitions[s.series], s) for s in run.samples}
 
+    def samples_of(
+        self, run_ids: Sequence[str], tests: set[str] | None = None
+    ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
+        return {
+            run_id: {
+                key: pair
+                for key, pair in self.samples(run_id).items()
+                if tests is None or pair[0].test in tests
+            }
+            for run_id in run_ids
+        }
+
     def cards(self, run_id: str) -> tuple[TestCard, ...]:
         return self.documents[run_id].tests
 

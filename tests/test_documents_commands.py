@@ -16,7 +16,7 @@ DOCUMENTS = (
     "README.md",
     "CONTRIBUTING.md",
     "ARCHITECTURE.md",
-    *sorted(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md")),
+    *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")),
     "examples/pebble/README.md",
 )
 TYPED = re.compile(r"^(?: {4}|.*?`)(?:\S*/)?(?P<line>(?:tracker|make) [a-z][^`#\n]*)", re.MULTILINE)

@@ -141,6 +141,12 @@ def test_speeds_at_the_start_are_those_of_the_scene(configuration: str) -> None:
     assert found[1] == pytest.approx(found[0], abs=5e-3)
 
 
+@pytest.mark.parametrize("configuration", ["joints", "constraints"])
+def test_spins_at_the_start_are_those_of_the_scene(configuration: str) -> None:
+    """Two bodies turned against the world on ball joints; each engine wants the spin of a joint in axes of its own."""
+    assert peer_scenes.started(run(configuration)) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
 @pytest.mark.parametrize("configuration", BOTH)
 @pytest.mark.parametrize("kind", [Ball, Hinge, Lock, Prismatic])
 def test_a_joint_holds_its_body(kind: Any, configuration: str) -> None:

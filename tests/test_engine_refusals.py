@@ -157,6 +157,8 @@ SCENES: list[tuple[Callable[[], object], tuple[str, ...]]] = [
     (lambda: stones(no_contact=(("stone", "ghost"),)), ("no_contact", "'ghost'")),
     (lambda: stones(no_contact=("stone",)), ("no_contact", "pair")),
     (lambda: stones(no_contact=(5,)), ("no_contact", "pair", "5")),
+    (lambda: stones(no_contact=(("stone", "stone"),)), ("no_contact", "'stone'", "itself")),
+    (lambda: stones(contacts="no"), ("contacts", "'no'")),
     (lambda: stones(no_contact=5), ("no_contact", "sequence", "5")),
     (lambda: Scene(bodies=None), ("bodies", "sequence", "None")),
     (lambda: Scene(bodies=(A,), constraints=A), ("constraints", "sequence")),
@@ -198,6 +200,15 @@ METHODS: list[dict[str, Any]] = [
     {"floor": 1.0},
     {"floor": math.nan},
     {"force_stages": ("observe",)},
+    {"force_stages": "rotation"},
+    {"force_stages": 5},
+    {"half_step_velocities": "no"},  # true, as Python reads it
+    {"half_step_velocities": 1},
+    {"string_stiffness": None},
+    {"corrections": True},
+    {"substeps": True},
+    {"iterations": True},
+    {"refinements": False},
 ]
 
 
@@ -220,6 +231,8 @@ def test_observe_must_be_a_mapping_and_quantities_numbers() -> None:
     for scene in (particles(), stones()):
         with pytest.raises(MethodError, match=r"observe must map names.*not 5"):
             compile(scene, time_step=0.01, observe=5)  # type: ignore[arg-type]
+        with pytest.raises(MethodError, match=r"observe must map names.*5 is not a name"):
+            compile(scene, time_step=0.01, observe={5: Final(quantity=Position())})  # type: ignore[dict-item]
     for point in (math.nan, (0.0, math.nan, 0.0), ("x", 0.0, 0.0)):
         with pytest.raises(MethodError, match="observe: about"):
             AngularMomentum(about=point)  # type: ignore[arg-type]

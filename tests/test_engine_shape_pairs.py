@@ -10,6 +10,7 @@ from spook_tracker.engine import (
     Capsule,
     Compound,
     ContactForce,
+    ConvexHull,
     Energy,
     Material,
     Maximum,
@@ -33,6 +34,9 @@ SHAPES: dict[str, Shape] = {
     "sphere": Sphere(0.3),
     "box": Box((0.6, 0.4, 0.5)),
     "capsule": Capsule(0.15, 0.5),
+    "hull": ConvexHull(
+        ((0.35, 0, 0), (-0.3, 0.05, 0), (0, 0.35, 0), (0.02, -0.3, 0), (0, 0, 0.3), (0, 0.03, -0.28))
+    ),
     "compound": Compound(
         (
             Part(shape=Box((1.0, 0.2, 0.1))),

@@ -6,6 +6,7 @@ seconds. `make package` builds the real one from the archive of the sources and 
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 import shutil
 import subprocess
@@ -142,3 +143,69 @@ def test_it_works_beside_a_teams_own_engine_tracker_and_scalar_tests(installed: 
     said("tracker", "publish", "--out", "public")
     assert (tmp_path / "public" / "index.html").is_file()
     said("tracker", "db", "check")
+
+
+HIDDEN = """
+import sys
+
+class Hidden:
+    \"\"\"What an installation without extras has not.\"\"\"
+
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("scipy", "pandas", "plotly", "distributed", "fastparquet"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Hidden())
+"""
+QUESTIONS = """
+import numpy as np
+from spook_tracker.engine import Final, Particle, Position, Scene
+from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest
+
+SCENE = Scene(bodies=(Particle(name="stone", position=(0, 0, 0), mass=1.0),), gravity=(0, 0, -10.0))
+
+def measure(simulate):
+    end = simulate(SCENE, time_step=0.1, duration=1.0, observe={"end": Final(quantity=Position("stone"))})["end"]
+    return {"error": float(end[2]) + 5.0}
+
+ERROR = Metric(name="error", description="depth minus ½ g t²", unit="m", role="gate", limit=0.6)
+FALL = ScalarTest(
+    title="Fall", question="How far does it fall?", why="", model="", parameters=(), theory=(), reference="",
+    conclusion="", source="", example=lambda: Example(scene=SCENE, time_step=0.1),
+    measurements=(Measurement(configuration="plain", time_step=0.1, metrics=(ERROR,), measure=measure),),
+)
+CATALOGUE = {"fall": FALL}
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="environments look different there")
+def test_a_night_of_a_teams_own_questions_needs_no_extra_and_no_compiler(
+    installed: Path, tmp_path: Path
+) -> None:
+    """Without SciPy, pandas and Plotly, and with nothing in PATH but the environment itself."""
+    shutil.copytree(next(installed.glob("lib/*/site-packages/engine")), tmp_path / "engine")
+    (tmp_path / "sitecustomize.py").write_text(HIDDEN)
+    (tmp_path / "questions.py").write_text(QUESTIONS)
+    (tmp_path / "tracker.toml").write_text('catalogue = "questions"\ntitle = "Ours"\n')
+    environment = {"PATH": str(installed / "bin"), "PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)}
+
+    def tracker(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(installed / "bin" / "tracker"), *words],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    night = tracker("nightly", "--out", "public")
+    standard = tracker("list", "--catalogue", "standard")
+    table = tracker("export", "--format", "csv", "--out", "x.csv")
+
+    assert night.returncode == 0, night.stderr
+    assert "Ours" in (tmp_path / "public" / "index.html").read_text(encoding="utf-8")
+    assert standard.returncode == table.returncode == 2
+    assert "pip install 'spook-tracker[standard]'" in standard.stderr
+    assert "spook-tracker[data]" in table.stderr
+    assert not {"scipy", "pandas", "plotly"} & {
+        name.partition(">")[0]
+        for name in importlib.metadata.requires("spook-tracker") or ()
+        if "extra" not in name
+    }

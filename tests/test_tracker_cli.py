@@ -136,6 +136,15 @@ def test_the_table_fits_its_terminal(monkeypatch, columns):
     assert not Path("tracker.db").exists()
 
 
+def test_at_80_columns_limits_keep_their_unit_and_values_their_time_step(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+
+    shown = measure(monkeypatch, "--no-record").stdout
+
+    assert re.search(r"^fall +h = 0\.01 s *$", shown, re.MULTILINE)
+    assert "≤ 0.1 m" in shown
+
+
 def test_a_broken_limit_ends_with_1_and_says_which(monkeypatch):
     shown = measure(monkeypatch, ERROR="-0.2")
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import signal
+import subprocess
+import sys
 from shutil import copytree
 from typing import get_args
 
@@ -247,3 +251,75 @@ def test_urls_are_understood(monkeypatch):
     for wrong in ("mysql://host/db", "://", "sqlite://host:port/x"):
         with pytest.raises(DatabaseError):
             database_url(wrong)
+
+
+KILLED = """
+import os, signal, sys
+from sqlalchemy import event
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store import connection
+
+left, real = [int(sys.argv[2])], connection.connected
+
+def counting(*given):
+    engine = real(*given)
+    @event.listens_for(engine, "before_cursor_execute")
+    def count(_connection, _cursor, statement, *_rest):
+        if statement.startswith(("UPDATE", "CREATE", "INSERT", "DROP", "ALTER")):
+            left[0] -= 1
+            if left[0] == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+    return engine
+
+import spook_tracker.tracker.store.database as database
+database.connected = counting
+open_database(sys.argv[1]).dispose()
+"""
+
+
+def contents(url):
+    """Every row of every table."""
+    engine = create_engine(url)
+    with engine.connect() as connection:
+        found = {
+            name: sorted(map(repr, connection.execute(text(f'SELECT * FROM "{name}"'))))
+            for name in inspect(connection).get_table_names()
+        }
+    engine.dispose()
+    return found
+
+
+def test_a_migration_that_moves_every_row_is_whole_or_absent_wherever_it_is_killed(url):
+    """Revision 0008 gives every id a new number: up, down, and killed after each of several statements."""
+    engine = at_head_with_rows(url)
+    above = contents(url)
+    with engine.begin() as connection:
+        revert(connection, "0007")
+    below = contents(url)
+    engine.dispose()
+    assert below != above
+    assert {name: len(rows) for name, rows in below.items()} == {
+        name: len(rows) for name, rows in above.items()
+    }
+
+    for statement in (1, 4, 9, 17):
+        done = subprocess.run([sys.executable, "-c", KILLED, url, str(statement)], check=False, timeout=300)
+        assert done.returncode == -signal.SIGKILL
+        assert contents(url) == below
+
+    open_database(url).dispose()
+    assert contents(url) == above
+
+
+def test_going_down_gives_the_ids_that_older_trackers_compute(session):
+    """63 bits of the same hash: such a tracker finds its own runs again and stores nothing twice."""
+    filled(session)
+    keys = list(session.scalars(select(models.Series.key)))
+    session.close()
+    with session.get_bind().engine.begin() as connection:
+        revert(connection, "0007")
+        found = dict(connection.execute(text("SELECT key, id FROM series")).all())
+
+    for key in keys:
+        digest_of = hashlib.sha256(f"series\0{key}".encode()).digest()
+        assert found[key] == int.from_bytes(digest_of[:8], "big") >> 1

@@ -161,6 +161,17 @@ def test_progress_names_every_test_once_it_is_finished():
     assert [p.test for p in seen if p.finished] == ["fall", "stand"]
 
 
+@pytest.mark.parametrize("workers", [0, 1])
+def test_progress_of_a_sweep_goes_to_its_end(workers):
+    """Run times are work, too: it used to stop when only they were left."""
+    seen = []
+    run(SOURCE, Request(workers=workers, sweep=True, repeats=1), watch=seen.append)
+
+    assert [p.done for p in seen] == list(range(1, seen[0].total + 1))
+    assert {p.total for p in seen} == {seen[-1].done}
+    assert [p.test for p in seen][-2:] == ["fall, run times", "stand, run times"]
+
+
 def test_the_address_of_the_ci_log_is_kept():
     github = {"GITHUB_RUN_ID": "7", "GITHUB_SERVER_URL": "https://x", "GITHUB_REPOSITORY": "a/b"}
 

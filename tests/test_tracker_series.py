@@ -182,3 +182,17 @@ def test_history_without_evidence_has_the_same_values(session, nowhere):
     ]
     assert full[KEY].points[0].sample.counters
     assert not bare[KEY].points[0].sample.counters
+
+
+def test_samples_of_some_tests_over_some_runs_are_those_of_each_run(session, nowhere):
+    record(session, run_of({"t/a": 1.0, "u/a": 2.0}, engine=commit(A)))
+    record(session, run_of({"t/a": 3.0, "t/b": 4.0, "u/a": "nan"}, engine=commit(B, A)))
+    history = History(session, nowhere)
+    ids = [found.id for found in history.runs()]
+
+    some = history.samples_of(ids, {"t"})
+
+    for run_id in ids:
+        whole = history.samples(run_id)
+        assert some[run_id] == {key: pair for key, pair in whole.items() if key.startswith("t/")}
+        assert history.samples_of([run_id])[run_id] == whole

@@ -130,3 +130,18 @@ def test_nobody_outlives_a_supervisor_that_is_killed(how: signal.Signals, tmp_pa
         process.wait(timeout=SOON)
 
     assert until(lambda: not alive(family)), "workers are left behind"
+
+
+def where(seconds: float) -> int:
+    """Who does it, after a while."""
+    time.sleep(seconds)
+    return os.getpid()
+
+
+def test_a_question_of_milliseconds_starts_one_process():
+    """Two would import everything twice; work that lasts is shared as soon as it has lasted a second."""
+    short = {answer for _, answer in crew.answers(where, [0.001] * 6, 4, crew.Limits())}
+    long = {answer for _, answer in crew.answers(where, [crew.WORTH] * 12, 2, crew.Limits())}
+
+    assert len(short) == 1
+    assert len(long) == 2

@@ -125,6 +125,9 @@ def trend(
         near = difflib.get_close_matches(test, {key.partition("/")[0] for key in history.series_keys()}, n=3)
         hint = f"did you mean {' or '.join(near)}?" if near else "`tracker db stats` shows what is recorded"
         raise UnknownName(f"nothing is recorded of a test {test!r}; {hint}")
+    if metric is not None and not metric.startswith("work:"):
+        stems = (metric, metric.removesuffix(":run-time"))
+        keys = [key for key in keys if key.split("/")[2:3] and key.split("/")[2] in stems] or keys
     found: dict[str, SeriesHistory] = {}
     runs = history.runs(engine)
     if not runs and engine is not None:

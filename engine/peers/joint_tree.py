@@ -149,3 +149,12 @@ def spins(scene: Scene, nodes: dict[str, Node]) -> dict[str, Array]:
             above = nodes[node.parent].body.velocity if node.parent in nodes else (0.0, 0.0, 0.0)
             found[name] = np.cross(arm, np.subtract(node.body.velocity, above)) / (arm @ arm)
     return found
+
+
+def sliding(nodes: dict[str, Node], node: Node, axis: Array, above: Array) -> float:
+    """Speed [m/s] along a slide at the start; `above` is the parent's angular velocity."""
+    parent = nodes.get(str(node.parent))
+    place = np.array(parent.body.position) if parent else np.zeros(3)
+    carried = np.cross(above, np.array(node.body.position) - place)
+    carried = carried + (parent.body.velocity if parent else 0.0)
+    return float((np.array(node.body.velocity) - carried) @ axis)

@@ -8,6 +8,7 @@ const vec = (v) => new J.Vec3(...v);
 const place = (v) => new J.RVec3(...v);
 const quat = ([w, x, y, z]) => new J.Quat(x, y, z, w);
 const WITHOUT_BOUND = 1e9; // m/s, rad/s: Jolt bounds all speeds
+const CONTACTS = 10240; // pairs that touch, at most: more do not fit into the memory Jolt keeps for a step
 const PLANE = 1e5; // m, half the edge of what stands for a plane without end
 
 const given = new J.JoltSettings();
@@ -19,7 +20,8 @@ given.mObjectLayerPairFilter = layers;
 given.mBroadPhaseLayerInterface = broad;
 given.mObjectVsBroadPhaseLayerFilter = new J.ObjectVsBroadPhaseLayerFilterTable(broad, 1, layers, 1);
 given.mMaxBodies = task.bodies.length + 1;
-given.mMaxBodyPairs = given.mMaxContactConstraints = 1024 + 16 * task.bodies.length;
+given.mMaxBodyPairs = 1024 + 16 * task.bodies.length;
+given.mMaxContactConstraints = Math.min(1024 + 8 * task.bodies.length, CONTACTS);
 const jolt = new J.JoltInterface(given);
 const system = jolt.GetPhysicsSystem();
 const rules = system.GetPhysicsSettings();

@@ -80,12 +80,13 @@ def described(task: Task) -> dict[str, Any]:
         for constraint in task.scene.constraints:
             if type(constraint) in (Jolt.capabilities.shows_force_of or ()):
                 shown[constraint.name] = 1 if isinstance(constraint, Distance) else 6
-    constraints = [_constraint(task, constraint) for constraint in task.scene.constraints]
+    places = numbered(task)
+    constraints = [_constraint(task, constraint, places) for constraint in task.scene.constraints]
     return {**common(task, FOUND, constraints), "forces_of": shown, "depth": task.contacts}
 
 
-def _constraint(task: Task, constraint: Any) -> dict[str, Any]:
-    scene, places = task.scene, numbered(task)
+def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str, Any]:
+    scene = task.scene
     ends = [places[end] if isinstance(end, str) and end != WORLD else None for end in constraint.between]
     if isinstance(constraint, Distance):
         length = scene.length(constraint) if constraint.rest_length is None else constraint.rest_length

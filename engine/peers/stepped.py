@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,23 @@ from spook_tracker.engine.result import Array
 
 BLOCK = 1000  # steps between two looks at the clock where nothing is recorded between, at most
 LOOK = 0.05  # s after which it is looked at again, or sooner
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """What an engine writes past Python, to standard output or error, goes nowhere; its outcome says it."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        for number, whole in enumerate(kept, start=1):
+            os.dup2(whole, number)
+            os.close(whole)
+        os.close(nowhere)
 
 
 class Kept:
@@ -74,7 +94,7 @@ def stepped(
             break
         read(kept, row, sample)
         kept.count = row + 1
-        if not np.isfinite(kept.positions[row]).all():
+        if not (np.isfinite(kept.positions[row]).all() and np.isfinite(kept.velocities[row]).all()):
             status, failure = "not_finite", f"a value is not finite by step {done}"
             break
     count = kept.count

@@ -40,3 +40,14 @@ def one_restitution(scene: Scene, engine: str) -> float:
     if len(found) > 1:
         raise NotSupported(f"{engine} does not support surfaces of different restitution in one scene")
     return max(found, default=0.0)
+
+
+def one_friction(scene: Scene, engine: str) -> float:
+    """The friction of all surfaces, for engines that do not take the geometric mean of two.
+
+    Raises NotSupported where two differ.
+    """
+    found = {body.material.friction for body in solid(scene)}
+    if len(found) > 1:
+        raise NotSupported(f"{engine} does not support surfaces of different friction in one scene")
+    return found.pop() if found else 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from spook_tracker.engine import (
@@ -17,7 +19,7 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, table
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -26,6 +28,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityMap,
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.multibody.library import (
@@ -52,6 +55,11 @@ EXACT = {  # s: P3 in m
     10.0: (0.999999964, -1.000269013, 0.999730951),
 }
 AFTER_ONE_SECOND = 0.02  # m
+MAP_COMPLIANCES = tuple(float(c) for c in np.geomspace(1e-14, 1e-2, 7))  # m/N and rad/(N m)
+MAP_STEPS = (1 / 960, 1 / 480, 1 / 240, 1 / 120, 1 / 60)  # s
+MAP_DEFINITION = (
+    "settled: P3 within 0.02 m of its place after 1 s; bounded: elsewhere; diverged: refused or lost"
+)
 
 
 def scene(time_step: float, compliance: float = COMPLIANCE) -> Scene:
@@ -134,6 +142,32 @@ def stiffest(simulate: Simulate) -> BreakPoint:
     return break_point(holds, 1e-7, 1e-14, resolution=0.05, walk=8)
 
 
+def _cell(simulate: Simulate, compliance: float, time_step: float, method: Method) -> str:
+    """settled: right after 1 s; bounded: it holds together and is somewhere else; diverged: refused or lost."""
+    observe = {"centre": Trace(quantity=Position("rod 3")), "turn": Trace(quantity=Orientation("rod 3"))}
+    built = scene(time_step, compliance)
+    result = simulate(built, time_step=time_step, duration=1.0, method=method, observe=observe)
+    if not result.completed:
+        return "not_finite" if result.status == "not_finite" else "diverged"
+    place = result["centre"][-1:] + turned(result["turn"][-1:], (0.0, 0.0, 0.5))
+    return "settled" if float(np.linalg.norm(place[0] - EXACT[1.0])) <= AFTER_ONE_SECOND else "bounded"
+
+
+def _map(method: Method) -> Callable[[Simulate], StabilityMap]:
+    def study(simulate: Simulate) -> StabilityMap:
+        return StabilityMap(
+            x=MAP_COMPLIANCES,
+            y=MAP_STEPS,
+            cells=table(MAP_STEPS, MAP_COMPLIANCES, lambda c, h: _cell(simulate, c, h, method)),
+            x_label="compliance [m/N, rad/(N m)]",
+            y_label="time step [s]",
+            note="At the right end the hinges themselves give way. On the left linearised rows contradict each other by "
+            "violations of order h²; the energy these hold, of order h⁴ over the compliance, stops the mechanism.",
+        )
+
+    return study
+
+
 ENERGY = Metric(
     name="energy_deviation",
     description="largest |E − E₀| over the weight of all rods times 1 m",
@@ -206,6 +240,19 @@ TEST = ScalarTest(
             better="smaller",
             expected_source="none: the rows contradict each other by the curvature that linearised rows leave out, and "
             "no closed form says what compliance forgives it in a loop of six hinges",
+        ),
+        *(
+            StabilityStudy(
+                name=f"map-{name}",
+                title=f"Compliance of redundant hinges and time step, {told}",
+                configuration=told,
+                definition=MAP_DEFINITION,
+                study=_map(method),
+            )
+            for name, told, method in (
+                ("plain", "plain", PLAIN),
+                ("curved", "curved", Method(corrections=1)),
+            )
         ),
     ),
 )

@@ -61,6 +61,18 @@ class Poses {
   }
 }
 
+// Of facets: the corners of each face, three numbers each.
+function facesOf(size) {
+  const faces = [];
+  for (let start = 0; start < size.length;) {
+    const end = start + 1 + 3 * size[start], face = [];
+    for (let i = start + 1; i < end; i += 3) { face.push(size.slice(i, i + 3)); }
+    faces.push(face);
+    start = end;
+  }
+  return faces;
+}
+
 function extentOf(movie) {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const see = (x, y, z, r) => [x, y, z].forEach((v, k) => {
@@ -69,7 +81,8 @@ function extentOf(movie) {
   const reach = new Float64Array(movie.bodies), drawn = new Uint8Array(movie.bodies);
   for (const solid of movie.solids) {
     if (solid.kind === "plane") { continue; }
-    const r = solid.kind === "box" ? Math.hypot(...solid.size) / 2 : solid.kind === "capsule" ? solid.size[0] + solid.size[1] / 2 : solid.size[0] || 0;
+    const r = solid.kind === "box" ? Math.hypot(...solid.size) / 2 : solid.kind === "capsule" ? solid.size[0] + solid.size[1] / 2 :
+      solid.kind === "facets" ? Math.max(...facesOf(solid.size).flat().map((p) => Math.hypot(...p))) : solid.size[0] || 0;
     if (solid.body === WORLD_BODY) { see(...solid.position, r); } else { reach[solid.body] = Math.max(reach[solid.body], r); drawn[solid.body] = 1; }
   }
   const stride = Math.max(1, Math.floor(movie.count * movie.bodies / 60000));
@@ -172,7 +185,7 @@ class SceneView {
     const start = new Poses(this.movie, this.movie.position, this.movie.orientation);
     for (const solid of this.movie.solids) {
       if (solid.kind === "plane") { this.floor(solid); continue; }
-      const key = (solid.kind === "particle" ? "sphere" : solid.kind === "capsule" ? `capsule ${solid.size}` : solid.kind) + (solid.fixed ? " fixed" : "");
+      const key = (solid.kind === "particle" ? "sphere" : ["capsule", "facets"].includes(solid.kind) ? `${solid.kind} ${solid.size}` : solid.kind) + (solid.fixed ? " fixed" : "");
       if (!kinds.has(key)) { kinds.set(key, []); }
       // The solid in the axes of its body: a compound has several that move as one.
       start.at(solid.body, 0);
@@ -186,7 +199,7 @@ class SceneView {
     for (const [key, items] of kinds) {
       const detail = items.length > 800 ? [10, 6] : [28, 18];
       const shape = key.split(" ")[0], fixed = key.endsWith("fixed");
-      const geometry = () => shape === "sphere" ? new THREE.SphereGeometry(1, ...detail) : shape === "box" ? new THREE.BoxGeometry(1, 1, 1) :
+      const geometry = () => shape === "facets" ? this.facets(key.split(" ")[1].split(",").map(Number)) : shape === "sphere" ? new THREE.SphereGeometry(1, ...detail) : shape === "box" ? new THREE.BoxGeometry(1, 1, 1) :
         new THREE.CapsuleGeometry(...key.split(" ")[1].split(",").map(Number), 6, 16).rotateX(Math.PI / 2);
       this.solids.push({ mesh: this.mesh(geometry(), items.length), items, poses: this.poses, colour: fixed ? "--ink-3" : "--c0" });
       if (this.ghost && !fixed) {
@@ -223,6 +236,14 @@ class SceneView {
       if (largest > 0) { most.push(largest); }
     }
     return most.sort((a, b) => a - b)[Math.floor(most.length / 2)] || 0;
+  }
+
+  facets(size) {
+    const places = facesOf(size).flatMap((face) => face.slice(2).flatMap((corner, k) => [...face[0], ...face[k + 1], ...corner]));
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(places), 3));
+    geometry.computeVertexNormals();
+    return geometry;
   }
 
   floor(solid) {

@@ -165,7 +165,11 @@ function filter() {
   const search = document.getElementById("search"), show = document.getElementById("show"), none = document.getElementById("none-found");
   const groups = [...document.querySelectorAll("details.cause")];
   const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll("tbody tr")];
-  const textOf = (element) => element.dataset.search ?? (element.dataset.search = element.textContent.toLowerCase());
+  const known = new Map();
+  const textOf = (element) => {
+    if (!known.has(element)) { known.set(element, `${element.dataset.search || ""} ${element.textContent}`.toLowerCase()); }
+    return known.get(element);
+  };
   const apply = () => {
     const words = search.value.toLowerCase().trim();
     lines.forEach((line) => {

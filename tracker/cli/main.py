@@ -10,6 +10,7 @@ import click
 import spook_tracker.tracker.cli.past as past
 import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
+from spook_tracker.tracker.cli.ci import ci
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -17,6 +18,7 @@ from spook_tracker.tracker.cli.options import (
     accepted_option,
     database_option,
     example,
+    executor_option,
     limit_option,
     recorded,
     refuse_unwritable,
@@ -77,6 +79,7 @@ def _print_versions() -> None:
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@executor_option
 @workers_option
 @limit_option
 @source_options
@@ -90,6 +93,7 @@ def run_command(
     everything: bool,
     json_file: Path | None,
     junit_file: Path | None,
+    executor: str,
     workers: int,
     time_limit: float,
     engine: str,
@@ -102,7 +106,13 @@ def run_command(
 
     refuse_unwritable(json_file, junit_file)
     request = Request(
-        tests=tests, figures=figures, sweep=sweep, stability=stability, workers=workers, time_limit=time_limit
+        tests=tests,
+        figures=figures,
+        sweep=sweep,
+        stability=stability,
+        workers=workers,
+        time_limit=time_limit,
+        executor=executor,
     )
     names = engine.split(",")
     red = False
@@ -128,6 +138,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
+@executor_option
 @workers_option
 @limit_option
 @click.option(
@@ -147,6 +158,7 @@ def nightly(
     with_database: bool,
     title: str,
     home_page: str,
+    executor: str,
     workers: int,
     time_limit: float,
     accepted: Path | None,
@@ -168,7 +180,9 @@ def nightly(
     refuse_unusable(out)
     first, *others = engine.split(",")
     for other in others:
-        asked = Request(sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly")
+        asked = Request(
+            sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly", executor=executor
+        )
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     def tell(news: Any) -> None:
@@ -201,6 +215,7 @@ def nightly(
             stability=not quick,
             workers=workers,
             time_limit=time_limit,
+            executor=executor,
         )
     for sentence in report.notes:
         say(f"note: {sentence}")
@@ -308,6 +323,7 @@ def serve(folder: Path, port: int) -> None:
 
 for command in (
     past.bisect,
+    ci,
     releases.backfill,
     releases.releases_command,
     ranking.rank,

@@ -115,6 +115,17 @@ def workers_option(command: Command) -> Command:
     return command
 
 
+def executor_option(command: Command) -> Command:
+    """--executor NAME: who measures values."""
+    return click.option(
+        "--executor",
+        metavar="NAME",
+        default="process",
+        show_default=True,
+        help="Who measures values: process, dask://HOST:PORT, or module:factory of any executor.",
+    )(command)
+
+
 ACCEPTED = "accepted.toml"
 
 

@@ -36,10 +36,13 @@ def comment(document: CompareDocument) -> str:
 
 def workflow_commands(document: CompareDocument) -> str:
     """A workflow command of GitHub Actions for each red line; empty when nothing is red."""
-    return "\n".join(
-        f"::error title={_value(document.after.engine + ' became worse')}::{_data(clean(line))}"
-        for line in red_lines(document.changes)
-    )
+    title = f"{document.after.engine} became worse"
+    return "\n".join(command_of(title, line) for line in red_lines(document.changes))
+
+
+def command_of(title: str, words: str) -> str:
+    """The workflow command for an annotation; nothing in it can end it or begin another."""
+    return f"::error title={_value(title)}::{_data(clean(words))}"
 
 
 def _data(text: str) -> str:

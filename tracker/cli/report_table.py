@@ -20,7 +20,7 @@ from spook_tracker.tracker.judge.standing import HAVE_VALUES, against_limit, cou
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
-NARROW = 100  # columns; below, time step and set point have no column of their own
+NARROW = 100  # columns; below, the set point has no column, and the time step stands above its values
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
 Pair = tuple[SeriesDefinition, Sample]
 
@@ -39,15 +39,15 @@ def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> s
     return f"{number(value, digits)} {_unit(definition)}".rstrip() + said
 
 
-def limit(definition: SeriesDefinition) -> str:
+def limit(definition: SeriesDefinition, digits: int = 6) -> str:
     """The limit in signs: "≤ 0.004 %", "≥ 100", "0.4999 … 0.5001"."""
     if definition.limit is None:
         return "-"
     if isinstance(definition.limit, tuple):
         low, high = definition.limit
-        return f"{number(low)} … {number(high)}"
+        return f"{number(low, digits)} … {number(high, digits)}"
     sign = "≥" if definition.better == "larger" else "≤"
-    return f"{sign} {number(definition.limit)} {_unit(definition)}".rstrip()
+    return f"{sign} {number(definition.limit, digits)} {_unit(definition)}".rstrip()
 
 
 def _unit(definition: SeriesDefinition) -> str:
@@ -148,15 +148,18 @@ def title(run: RunDocument) -> str:
 
 
 def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
-    """A heading row for each test, its values beneath; set point and time step where there is room."""
+    """A heading row for each test, its values beneath; the set point where there is room, else the time step above."""
     narrow = room < NARROW
     rows: list[tuple[str, ...]] = []
-    previous = ""
+    previous = step_above = ""
     for definition, sample in shown:
         columns = NARROW_COLUMNS if narrow else WIDE_COLUMNS
+        step = "" if definition.time_step is None else f"h = {number(definition.time_step, 4)} s"
         if definition.test != previous:
-            rows.append((definition.test, *[""] * (len(columns) - 1)))
-        previous = definition.test
+            rows.append((definition.test, step * narrow, *[""] * (len(columns) - 2)))
+        elif narrow and step != step_above:
+            rows.append(("", step, *[""] * (len(columns) - 2)))
+        previous, step_above = definition.test, step
         rows.append(_row(definition, sample, narrow))
     return table(NARROW_COLUMNS if narrow else WIDE_COLUMNS, rows, room, _styles(narrow))
 
@@ -168,8 +171,8 @@ def _row(definition: SeriesDefinition, sample: Sample, narrow: bool) -> tuple[st
     mark = "●" if definition.role == "gate" else " "
     name, room_left = f"{mark} {definition.metric} [{', '.join(facts)}]", margin(definition, sample)
     if narrow:
-        bound = limit(definition).removesuffix(f" {_unit(definition)}")
-        return name, measured(definition, sample, 4), bound, room_left.replace("decades", "dec"), judged
+        left = room_left.replace("decades", "dec")
+        return name, measured(definition, sample, 4), limit(definition, 4), left, judged
     step = "" if definition.time_step is None else number(definition.time_step, 4)
     return name, step, measured(definition, sample), limit(definition), room_left, held, judged
 

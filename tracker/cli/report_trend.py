@@ -9,7 +9,6 @@ import click
 from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.judge.change_points import change_points
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of, is_noisy
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, STATES, spaced
@@ -66,6 +65,10 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
             f"{j.verdict.sentence}"
             for j in told
         ]
+    from spook_tracker.tracker.judge.change_points import (
+        change_points,
+    )  # NumPy, which most series do not need
+
     values = [j.night.value for j in judged]
     return [
         f"{judged[point.place].night.run.started[:10]} {commit_of(judged[point.place].night.run)}: "

@@ -14,15 +14,41 @@ from spook_tracker.tracker.cli.options import database_option, example
 @click.command(epilog=example("tracker export latest --out runs/"))
 @click.argument("versions", nargs=-1, metavar="[V]...")
 @click.option(
-    "--out", metavar="DIR", type=click.Path(path_type=Path), help="One file per run; default: print."
+    "--out",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="A folder, for one file per run or month; default: print. The file of a table.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["json", "months", "csv", "parquet"]),
+    default="json",
+    show_default=True,
+    help="months: a compressed file a month; csv, parquet: one table of all values.",
 )
 @database_option
-def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
-    """Write runs (all, or those named) as JSON documents."""
+def export(versions: tuple[str, ...], out: Path | None, form: str, database: str) -> None:
+    """Write runs (all, or those named) as JSON documents, or all values as one table."""
     from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.store.transfer import encoded, export_runs
 
+    if form != "json" and (out is None or (versions and form == "months")):
+        raise click.UsageError(
+            f"--format {form} writes " + ("all runs; name none" if out else "files: say --out")
+        )
     with history_of(database) as history:
+        if form == "months":
+            from spook_tracker.tracker.store.months import export_months
+
+            click.echo(f"{len(export_months(history, Path(str(out))))} files written in {out}")
+            return
+        if form in ("csv", "parquet"):
+            from spook_tracker.tracker.store.table import write_table
+
+            count = write_table(history.to_dataframe(versions), Path(str(out)), form)
+            click.echo(f"{count} values in {out}")
+            return
         if out is not None:
             click.echo(f"{len(export_runs(history, out, versions))} runs in {out}")
             return
@@ -34,28 +60,42 @@ def export(versions: tuple[str, ...], out: Path | None, database: str) -> None:
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @database_option
 def import_files(files: tuple[Path, ...], database: str) -> None:
-    """Record runs from JSON documents, whole or in short form; what is there already is left as it is."""
+    """Record runs from JSON documents, whole or in short form; what is there already is left as it is.
+
+    Files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark are taken as run times. So are the
+    compressed files of `tracker export --format months`.
+    """
     from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.months import import_months, is_month
     from spook_tracker.tracker.store.record import record
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
     short = _short(files)
+    months = [file for file in files if is_month(file)]
     with session_on(database) as session:
-        done = read_in(session, [file for file in files if file not in short])
-        new = sum(record(session, document) for document in short.values())
-    stored, present = len(done.stored) + new, len(done.present) + len(short) - new
+        done = read_in(session, [file for file in files if file not in short and file not in months])
+        documents = [document for runs in short.values() for document in runs]
+        new = sum(record(session, document) for document in documents)
+        fresh, known = import_months(session, months)
+    stored, present = len(done.stored) + new + fresh, len(done.present) + len(documents) - new + known
     click.echo(f"{stored} runs recorded, {present} were there already")
 
 
-def _short(files: tuple[Path, ...]) -> dict[Path, Any]:
-    """The files that are runs in short form, as whole documents."""
+def _short(files: tuple[Path, ...]) -> dict[Path, tuple[Any, ...]]:
+    """The files that are runs in short form or another tool's, as whole documents."""
+    from spook_tracker.tracker.measure.other_tools import of_other_tools
     from spook_tracker.tracker.measure.short_form import is_short, whole
     from spook_tracker.tracker.store.border import MAX_BYTES
 
-    found = {}
+    found: dict[Path, tuple[Any, ...]] = {}
     for file in files:
-        if file.is_file() and file.stat().st_size <= MAX_BYTES and is_short(content := file.read_bytes()):
-            found[file] = whole(content, str(file))
+        if not file.is_file() or file.stat().st_size > MAX_BYTES:
+            continue
+        content = file.read_bytes()
+        if is_short(content):
+            found[file] = (whole(content, str(file)),)
+        elif (runs := of_other_tools(content, str(file))) is not None:
+            found[file] = runs
     return found
 
 
@@ -118,6 +158,15 @@ def copy(source: str, target: str) -> None:
     click.echo(
         f"copied {sum(digest.rows for digest in digests.values())} rows in {len(digests)} tables, all equal"
     )
+
+
+@db.command(epilog=example("tracker db partition timescaledb | psql postgresql://host/tracker"))
+@click.argument("extension", type=click.Choice(["timescaledb", "citus"]))
+def partition(extension: Any) -> None:
+    """Print the SQL that splits the large tables of a PostgreSQL database by time, or over several servers."""
+    from spook_tracker.tracker.store.partition import statements
+
+    click.echo("\n".join(statements(extension)))
 
 
 @db.command(epilog=example("tracker db stats"))

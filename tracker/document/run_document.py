@@ -162,9 +162,10 @@ class StageChoice(Struct, frozen=True, kw_only=True):
 
 
 class DrawnSolid(Struct, frozen=True, kw_only=True):
-    """One body of a drawing. Size: sphere radius; box edges; capsule radius, length; plane normal; m."""
+    """One body of a drawing. Size: sphere radius; box edges; capsule radius, length; plane normal; of facets the number
+    of corners of each, followed by their places; m."""
 
-    kind: Literal["particle", "sphere", "box", "capsule", "plane"]
+    kind: Literal["particle", "sphere", "box", "capsule", "facets", "plane"]
     position: tuple[float, float, float]  # m
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     size: tuple[float, ...] = ()

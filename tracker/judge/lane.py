@@ -35,6 +35,7 @@ class Records(Protocol):
     def runs(self, engine: str | None = None) -> Sequence[Any]: ...
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
     def samples(self, run_id: str) -> Samples: ...
+    def samples_of(self, run_ids: Sequence[str], tests: set[str] | None) -> Mapping[str, Samples]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
 
 
@@ -114,7 +115,8 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     if not placed:
         return list(runs)
     line = line_of(placed, placed[-1])
-    aside = [run for run in placed if run not in line]
+    here = {run.id for run in line}
+    aside = [run for run in placed if run.id not in here]
     if aside and len(other := line_of(placed, aside[-1])) > len(line):
         line = other  # a branch that was measured once is not what the history is about
     return line if _placed(newest) else [*line, newest]
@@ -133,8 +135,9 @@ def histories(
 ) -> dict[str, SeriesHistory]:
     """The histories of all series (or those named) over these runs, the made ones among them."""
     place = {run.id: run for run in runs}
+    tests = None if keys is None else {key.partition("/")[0] for key in keys}
     looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
-    recent = {run.id: records.samples(run.id) for run in looked_at}
+    recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
     for key, stored in records.series(keys, evidence=False).items():
         points = []
@@ -145,7 +148,6 @@ def histories(
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
     found = with_missing(found, [run for run in runs if run.id in recent or _says(run)], recent)
-    tests = None if keys is None else {key.partition("/")[0] for key in keys}
     return found | run_times(found) | work(looked_at, recent, tests)
 
 

@@ -26,6 +26,7 @@ INSTALLED = "spook_tracker."
 WORDING = {
     "conclusion",
     "definition",
+    "formerly",
     "description",
     "limit_source",
     "misprints",

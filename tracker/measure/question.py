@@ -142,7 +142,7 @@ def series_key(test: str, configuration: str, name: str, time_step: float | None
 def metric_series(name: str, test: ScalarTest, measurement: Measurement, metric: Metric) -> SeriesDefinition:
     """The series a metric of a measurement belongs to."""
     facts = (
-        metric.name,
+        metric.formerly[0] if metric.formerly else metric.name,
         metric.unit,
         metric.better,
         metric.limit,

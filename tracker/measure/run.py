@@ -18,14 +18,10 @@ from typing import Any, Literal
 
 import msgspec
 
-import spook_tracker.tracker.measure.catalogues as catalogues
-import spook_tracker.tracker.measure.limits as limits
-import spook_tracker.tracker.measure.others as others
+import spook_tracker.tracker.measure.executors as executors
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
-from spook_tracker.engine.find import EngineMissing, find
-from spook_tracker.scalar_tests.case import ScalarTest, Simulate
-from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.run_document import (
     Asked,
     EngineVersion,
@@ -51,56 +47,13 @@ from spook_tracker.tracker.measure.question import (
     metric_series,
     study,
 )
+from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME_LIMIT
+from spook_tracker.tracker.measure.questions import Questions as Questions
+from spook_tracker.tracker.measure.questions import RunError as RunError
+from spook_tracker.tracker.measure.renames import with_aliases
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
-PEER_TIME_LIMIT = 10.0  # s of wall time per simulation of an engine that is only shown
-
-
-class RunError(TrackerError):
-    """The run cannot be started as asked; one sentence that names what to do."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Questions:
-    """Where the questions and the engine are found, by name."""
-
-    catalogue: str = catalogues.STANDARD  # as `catalogues.find` knows it
-    engine: str = "spook"  # as `engine.find` knows it
-    limit: float | None = None  # s of wall time for one simulation; None leaves it to the test
-    limits: limits.Limits = ()  # a team's own, by series
-
-    def tests(self) -> Mapping[str, ScalarTest]:
-        found = catalogues.find(self.catalogue)
-        engine = self.module()
-        configurations = getattr(engine, "configurations", ())
-        if configurations:
-            found = others.asked_of(found, configurations, engine.gating)
-        return limits.held_to(found, self.limits) if self.limits else found
-
-    def module(self) -> Any:
-        """The engine: simulate, build_info, and its configurations if it is not ours."""
-        try:
-            return find(self.engine)
-        except EngineMissing as error:
-            raise RunError(str(error)) from None
-
-    def simulate(self) -> Simulate:
-        module = self.module()
-        try:
-            simulate: Simulate = module.simulate
-        except AttributeError:
-            raise RunError(f"engine {self.engine!r} has no function simulate; it is not an engine") from None
-        limit = self.limit
-        if limit is None and hasattr(module, "configurations"):
-            limit = PEER_TIME_LIMIT
-        return simulate if limit is None else partial(_limited, simulate, limit)
-
-
-def _limited(simulate: Simulate, limit: float, scene: Any, **options: Any) -> Any:
-    """Simulate for at most `limit` seconds of wall time."""
-    options["time_limit"] = min(limit, options.get("time_limit") or limit)
-    return simulate(scene, **options)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +69,7 @@ class Request:
     time_limit: float = crew.Limits.seconds  # s for one piece of work
     memory_limit: int = crew.Limits.memory  # bytes for one piece of work
     repeats: int = 5  # of each timing
+    executor: str = executors.PROCESS  # where values are measured, as `executors.answers` knows it
 
 
 Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
@@ -183,7 +137,7 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
         for task, part in _perform_all(source, tasks, tests, request, watch):
             parts[task.position] = part
         if request.sweep:
-            timed = _timed(source, request, tests, _errors(tasks, parts))
+            timed = _timed(source, request, tests, _errors(tasks, parts), watch)
     except KeyboardInterrupt:
         unfinished = {task.test for task in tasks if task.position not in parts}
         finished = {name: test for name, test in tests.items() if name not in unfinished}
@@ -242,7 +196,7 @@ def _document(
         engine=version,
         machine=machine(),
         tests=tuple(test_card(name, test, engine, timed[1].get(name, {})) for name, test in tests.items()),
-        series=tuple(series for series, _ in measured),
+        series=with_aliases((series for series, _ in measured), tests),
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
         maps=tuple(maps),
@@ -305,7 +259,9 @@ def _perform_all(
     """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer."""
     left = {name: sum(task.test == name for task in tasks) for name in tests}
     found: Iterator[tuple[Task, Any]] = ((task, perform(source, task)) for task in tasks)
-    if request.workers:
+    if request.executor != executors.PROCESS:
+        found = executors.answers(request.executor, partial(perform, source), tasks, partial(_place, source))
+    elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
         found = crew.answers(partial(perform, source), tasks, request.workers, limits)
     for done, (task, parts) in enumerate(found, start=1):
@@ -315,8 +271,12 @@ def _perform_all(
         bad = tuple(
             s.key for p in parts if isinstance(p, tuple) for s, m in p if not m.passed and s.role == "gate"
         )
-        watch(Progress(done, len(tasks), task.test, left[task.test] == 0, bad))
+        watch(Progress(done, _total(tasks, tests, request), task.test, left[task.test] == 0, bad))
         yield task, parts
+
+
+def _place(source: Questions) -> executors.Place:
+    return executors.place_of(source.module())
 
 
 Errors = Mapping[tuple[str, int, int], ladders.ErrorPoints]
@@ -332,31 +292,48 @@ def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int]
     return timed, ladders.saved_by_leaving_out(tests, simulate) if stages_can_be_forced else {}
 
 
-def _timed(source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors) -> Timed:
-    """Run times, taken by one process while no other works; without them if that one is lost."""
-    piece = (tuple(tests), errors, request.repeats)
-    if not request.workers:
-        return perform_timing(source, piece)
-    seconds = request.time_limit * max(1, sum(len(test.ladders) for test in tests.values()))
-    limits = crew.Limits(seconds=seconds, memory=request.memory_limit)
-    ((_, timed),) = crew.answers(partial(perform_timing, source), [piece], 1, limits)
-    if isinstance(timed, crew.Lost):
-        lost = timed
-
-        def gone(*arguments: Any, **options: Any) -> Any:
-            raise NoAnswer(lost.outcome, lost.failure)
-
-        return ladders.timed_series(tests, errors, gone, request.repeats), {}
-    found: Timed = timed
-    return found
+def _total(tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Request) -> int:
+    """Pieces of work of a run: those that measure, and one for the run times of each test."""
+    return len(tasks) + (len(tests) if request.sweep else 0)
 
 
-def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> tuple[Any, ...]:
-    """What is recorded for a piece of work without an answer."""
+def _timed(
+    source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors, watch: Watch
+) -> Timed:
+    """Run times, taken by one process while no other works, test by test; without them where that one is lost."""
+    pieces = [
+        ((name,), {place: found for place, found in errors.items() if place[0] == name}, request.repeats)
+        for name in tests
+    ]
+    answers: Iterator[tuple[Any, Any]] = ((piece, perform_timing(source, piece)) for piece in pieces)
+    if request.workers:
+        ladders_each = max([1, *(len(test.ladders) for test in tests.values())])
+        limits = crew.Limits(seconds=request.time_limit * ladders_each, memory=request.memory_limit)
+        answers = crew.answers(partial(perform_timing, source), pieces, 1, limits)
+    series: list[tuple[SeriesDefinition, Sample]] = []
+    saved: dict[str, Mapping[str, float]] = {}
+    total = _total(list(_tasks(tests, request)), tests, request)
+    for done, (((name,), known, repeats), answer) in enumerate(answers, start=total - len(pieces) + 1):
+        if isinstance(answer, crew.Lost):
+            answer = ladders.timed_series({name: tests[name]}, known, _gone(answer), repeats), {}
+        series += answer[0]
+        saved |= answer[1]
+        watch(Progress(done, total, f"{name}, run times", True))
+    return series, saved
+
+
+def _gone(lost: crew.Lost) -> Any:
+    """What simulating comes to where the process is lost."""
 
     def gone(*arguments: Any, **options: Any) -> Any:
         raise NoAnswer(lost.outcome, lost.failure)
 
+    return gone
+
+
+def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> tuple[Any, ...]:
+    """What is recorded for a piece of work without an answer."""
+    gone = _gone(lost)
     first = task.index[0]
     outcome = Outcome(None, lost.outcome, lost.failure)
     if task.kind == "measure":

@@ -15,7 +15,7 @@ from spook_tracker.engine.couplings import Wire
 from spook_tracker.engine.forces import CentralGravity, Spring
 from spook_tracker.engine.joints import Distance, Joint
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Compound, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Compound, Shape
 from spook_tracker.tracker.document.quaternions import UPRIGHT, Quaternion, Vector, multiplied, turned
 from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
 
@@ -72,15 +72,14 @@ def _solids(shape: Shape, position: Vector, orientation: Quaternion, body: Rigid
                 body,
             )
         ]
-    kind, size = _kind(shape)
-    if kind is None:
+    if not shape.drawn_as:
         return []
     return [
         DrawnSolid(
-            kind=kind,  # type: ignore[arg-type]
+            kind=shape.drawn_as,  # type: ignore[arg-type]
             position=position,
             orientation=orientation,
-            size=size,
+            size=shape.measures(),
             fixed=body.motion != "dynamic",
             velocity=body.velocity,
         )
@@ -100,18 +99,6 @@ def _of_inertia(body: RigidBody) -> DrawnSolid:
         size=tuple(math.sqrt(max(0.0, 6.0 * edge / body.mass)) for edge in edges),
         velocity=body.velocity,
     )
-
-
-def _kind(shape: Shape) -> tuple[str | None, tuple[float, ...]]:
-    if isinstance(shape, Sphere):
-        return "sphere", (shape.radius,)
-    if isinstance(shape, Box):
-        return "box", tuple(shape.size)
-    if isinstance(shape, Capsule):
-        return "capsule", (shape.radius, shape.length)
-    if isinstance(shape, Plane):
-        return "plane", tuple(shape.normal)
-    return None, ()
 
 
 def _end(end: object, anchor: Vector, places: dict[str, Vector], turns: dict[str, Quaternion]) -> Vector:

@@ -9,6 +9,7 @@ It becomes a whole run document. Its content is its identity: the same file twic
 from __future__ import annotations
 
 import hashlib
+import math
 from datetime import UTC, datetime
 from typing import Any, Literal
 
@@ -27,6 +28,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     Struct,
     Text,
+    Timing,
 )
 from spook_tracker.tracker.measure.question import Outcome, Witness, judged_sample, series_key
 
@@ -46,6 +48,8 @@ class ShortResult(Struct, frozen=True, kw_only=True):
     better: Better = "smaller_magnitude"
     limit: float | tuple[float, float] | None = None
     outcome: OutcomeClass = "value"
+    noisy: bool = False  # judged by statistics, as run times are, and not exactly
+    seconds: tuple[float, ...] = ()  # run time of each repeat; the value is the shortest, and noisy
     failure: Text = ""
     description: Text = ""
 
@@ -81,9 +85,13 @@ def whole(content: bytes, origin: str) -> RunDocument:
     """The run document it stands for. DocumentError names the file and the place in it."""
     try:
         short = decode(content, ShortRun)
-    except msgspec.DecodeError as error:
-        raise DocumentError(f"{origin} is not a valid run in short form: {error}") from None
-    identity = hashlib.sha256(content).hexdigest()[:32]
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise DocumentError(f"{origin} is not a valid run in short form: {error!s:.300}") from None
+    return document_of(short, hashlib.sha256(content).hexdigest()[:32], origin)
+
+
+def document_of(short: ShortRun, identity: str, origin: str) -> RunDocument:
+    """The same from what was read. DocumentError names the place that makes no sense."""
     started = short.started or short.commit_time or datetime.now(UTC).isoformat(timespec="microseconds")
     pairs = [_pair(result, origin) for result in short.results]
     return RunDocument(
@@ -118,6 +126,11 @@ def whole(content: bytes, origin: str) -> RunDocument:
 
 def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
     key = series_key(result.test, result.configuration, result.metric, result.time_step, result.parameters)
+    if any(not (math.isfinite(s) and s >= 0.0) for s in result.seconds):
+        raise DocumentError(f"{origin}: {key}: seconds must be numbers that are not negative")
+    if result.seconds:
+        smallest = Number(min(result.seconds))
+        result = msgspec.structs.replace(result, value=smallest, unit="s", better="smaller", noisy=True)
     if result.value is None and result.outcome in ("value", "unsettled", "out_of_limit"):
         raise DocumentError(f"{origin}: {key} has no value; say in its outcome what became of it")
     if isinstance(result.limit, tuple) != (result.better == "inside") and result.limit is not None:
@@ -141,7 +154,7 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
         unit=result.unit,
         role=metric.role,
         better=result.better,
-        kind="scalar",
+        kind="time" if result.noisy else "scalar",
         time_step=result.time_step,
         parameters=result.parameters,
         limit=result.limit,
@@ -155,7 +168,10 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
     )
     value = None if result.value is None else float(result.value)
     outcome = "value" if result.outcome == "out_of_limit" else result.outcome
-    return series, judged_sample(key, metric, Outcome(value, outcome, result.failure), Witness(_nothing))
+    sample = judged_sample(key, metric, Outcome(value, outcome, result.failure), Witness(_nothing))
+    if result.seconds:
+        sample = msgspec.structs.replace(sample, timing=Timing(seconds=result.seconds, runs_per_repeat=1))
+    return series, sample
 
 
 def _nothing(*arguments: Any, **options: Any) -> Any:

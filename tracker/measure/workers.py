@@ -7,6 +7,7 @@ supervisor is gone (killed, even) ends itself.
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -24,6 +25,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 START_LIMIT = 120.0  # s in which a new process has read its program, on a machine however busy
+WORTH = 1.0  # s of work after which further processes are worth what they take to start
 DIED = "the engine's process died while answering"
 
 Piece = TypeVar("Piece")
@@ -50,16 +52,23 @@ def answers(
 ) -> Iterator[tuple[Piece, Any]]:
     """Every piece with what `perform` made of it, or Lost, as they come. What `perform` raises is raised.
 
-    `perform` and the pieces are sent to processes, so both must be picklable; `workers` is at least 1.
+    `perform` and the pieces are sent to processes, so both must be picklable; `workers` is at least 1. One begins,
+    the others join when the work has lasted a while: a question of milliseconds does not pay for two imports.
     """
     left = deque(pieces)
     crew: list[_Worker[Piece]] = []
+    since = math.inf  # when the first of them had read its program and began
     try:
         while left or crew:
-            while left and len(crew) < workers:
+            since = min([since, *(worker.begun for worker in crew)])
+            wanted = workers if time.monotonic() >= since + WORTH else 1
+            while left and len(crew) < wanted:
                 crew.append(_Worker(perform, limits))
                 crew[-1].give(left.popleft())
-            soonest = min(worker.deadline for worker in crew) - time.monotonic()
+            moments = [worker.deadline for worker in crew]
+            soonest = (
+                min([*moments, since + WORTH] if left and wanted < workers else moments) - time.monotonic()
+            )
             waiting.wait([worker.pipe for worker in crew], timeout=max(0.0, soonest))
             for worker in list(crew):
                 answer = worker.look()
@@ -95,6 +104,7 @@ class _Worker(Generic[Piece]):
         theirs.close()
         end.close()
         self.deadline = time.monotonic() + START_LIMIT
+        self.begun = math.inf  # when it began its first piece
 
     def give(self, piece: Piece) -> None:
         self.piece = piece
@@ -107,6 +117,7 @@ class _Worker(Generic[Piece]):
             while self.pipe.poll():
                 kind, content = self.pipe.recv()
                 if kind == "begun":
+                    self.begun = min(self.begun, time.monotonic())
                     self.deadline = time.monotonic() + self.limits.seconds
                 elif kind == "raised":
                     raise content

@@ -73,7 +73,7 @@ def decoded(data: bytes, origin: str = "the document") -> RunDocument:
     try:
         return checked(decode(_without_surrogates(data), RunDocument))
     except (msgspec.ValidationError, DocumentError) as error:
-        raise DocumentError(f"{origin} is not a valid run document: {error}") from None
+        raise DocumentError(f"{origin} is not a valid run document: {error!s:.300}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DocumentError(f"{origin} is not JSON: {error}") from None
 

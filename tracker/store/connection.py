@@ -172,6 +172,7 @@ def _sentence(name: str, error: Exception) -> str:
         ("is full", "cannot be written: no space left; nothing of this run was stored"),
         ("no space left", "cannot be written: no space left; nothing of this run was stored"),
         ("disk i/o", "cannot be written or read: the disk reports an error, or is full"),
+        ("can't decode byte", "is damaged: it holds text that is none; restore it from a copy"),
         ("malformed", "is damaged; restore it from a copy (tracker db check says more)"),
         ("not a database", "is damaged or not a SQLite database; restore it from a copy"),
         ("unable to open", "cannot be opened; check the path and its permissions"),

@@ -11,7 +11,7 @@ import gc
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sqlalchemy import ColumnElement, and_, select
 from sqlalchemy.orm import Session
@@ -29,6 +29,9 @@ from spook_tracker.tracker.store import git, models, rows
 from spook_tracker.tracker.store.ancestry import commit_order
 from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
+
+if TYPE_CHECKING:
+    import pandas
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
 
@@ -84,6 +87,27 @@ class History:
             key = self._canonical.get(series_id, definition.key)
             if key not in found or definition.key == key:  # today's name wins over an earlier one
                 found[key] = definition, sample
+        return found
+
+    def samples_of(
+        self, run_ids: Sequence[str], tests: set[str] | None = None
+    ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
+        """The samples of several runs, of these tests (all if None): `samples` of each, read at once."""
+        if tests is None:
+            return {run_id: self.samples(run_id) for run_id in run_ids}
+        of_tests = [i for i, key in self._canonical.items() if key.partition("/")[0] in tests]
+        found: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {run_id: {} for run_id in run_ids}
+        for start in range(0, len(run_ids), CHUNK):
+            runs = [self.run(run_id) for run_id in run_ids[start : start + CHUNK]]
+            conditions = [
+                models.Sample.series_id.in_(of_tests),
+                models.Sample.run_key.in_([run.key for run in runs]),
+                models.Sample.started_at.in_([run.started_at for run in runs]),
+            ]
+            for run, series_id, definition, sample in self._read_samples(conditions):
+                key = self._canonical.get(series_id, definition.key)
+                if key not in found[run.id] or definition.key == key:
+                    found[run.id][key] = definition, sample
         return found
 
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> dict[str, SeriesHistory]:
@@ -172,6 +196,17 @@ class History:
             partial=stored.partial,
             asked=run.asked,
         )
+
+    def to_dataframe(self, names: Iterable[str] = ()) -> pandas.DataFrame:
+        """Every value of the runs that `names` stand for (none: all) as a pandas DataFrame, a row each.
+
+        Columns: night, run, engine, version, git_hash, machine, test, configuration, metric, role, kind, time_step [s],
+        unit, series, value, outcome, passed, set_point_held, limit_low, limit_high. TableError without pandas.
+        """
+        from spook_tracker.tracker.store.table import values_table
+
+        runs = [self.resolve(name) for name in names] or self._runs
+        return values_table(self._session, [run.key for run in runs])
 
     def _read_runs(self) -> tuple[RunInfo, ...]:
         connection = self._session.connection()

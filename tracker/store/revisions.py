@@ -8,10 +8,12 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
 
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.store.models import Base
+from spook_tracker.tracker.store.views import create_views, drop_views
 
 
 def configuration(connection: Connection | None = None) -> Config:
@@ -25,12 +27,17 @@ def configuration(connection: Connection | None = None) -> Config:
 
 
 def migrate(connection: Connection, target: str) -> None:
-    """Upgrade to `target` inside the transaction of `connection`."""
+    """Upgrade to `target` inside the transaction of `connection`; at the newest revision the views are made."""
+    drop_views(connection)
     command.upgrade(configuration(connection), target)
+    reached = MigrationContext.configure(connection).get_current_revision()
+    if reached == ScriptDirectory.from_config(configuration()).get_current_head():
+        create_views(connection)
 
 
 def revert(connection: Connection, target: str) -> None:
     """Downgrade to `target` ("base" or a revision) inside the transaction of `connection`."""
+    drop_views(connection)
     command.downgrade(configuration(connection), target)
 
 

@@ -11,10 +11,10 @@ from typing import Any
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.standing import Count, count, expected, worst
-from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
 from spook_tracker.tracker.website.causes import Told, lasting, told
 from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
-from spook_tracker.tracker.website.page_rows import Page, address, row
+from spook_tracker.tracker.website.page_rows import Page, Row, address, row
 
 HEAT_NIGHTS = 60
 MOST_OLD = 6  # causes of earlier nights on the first page; the page of regressions has all
@@ -47,12 +47,10 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     new, old = [c for c in red if c.new], [c for c in red if not c.new]
     state, found = health(book)
     seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
-    others = [row(t, test.card.title, address(test), book.nights) for test, t in gates if not test.card.seven]
-    others += [
-        row(trend, test.card.title, address(test), book.nights)
+    others = [
+        _nearest(test, book)
         for test in book.tests
-        if not test.gates()
-        for trend in test.companions()[:1]
+        if not (test.card.seven and test.gates()) and _judged(test)
     ]
     steps = {t.definition.time_step for test, t in gates if test.card.seven}
     step = steps.pop() if len(steps) == 1 else None
@@ -77,6 +75,19 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         "signs": [(name, said, meaning) for name, (_, said, meaning) in CLASSES.items()],
     }
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
+
+
+def _judged(test: TestHistory) -> list[Trend]:
+    """What stands for a test in the table: its gates, or its first companion."""
+    return test.gates() or test.companions()[:1]
+
+
+def _nearest(test: TestHistory, book: Book) -> Row:
+    """One line for a test: the worst of its gates, or the one that is nearest to its limit."""
+    rows = [row(trend, test.card.title, address(test), book.nights) for trend in _judged(test)]
+    shown = min(rows, key=lambda one: (CLASS_RANK[one.state], -float(one.share or 0.0)))
+    shown.more = len(rows) - 1
+    return shown
 
 
 def counts_by_night(book: Book) -> list[Count]:

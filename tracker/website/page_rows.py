@@ -68,7 +68,8 @@ class Row:
     failure: str
     spark: dict[str, object]
     stale: str  # the night the value is of, if it is not tonight
-    search: str
+    search: str  # what the words of the line do not say
+    more: int = 0  # gates of the same test that are not shown
 
 
 def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) -> Row:
@@ -105,7 +106,7 @@ def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) ->
         failure=failed,
         spark=sparkline(trend.values[ends], states),
         stale=day(nights[last].started) if nights and (last := trend.nights[-1]) != nights[-1].index else "",
-        search=clean(f"{d.test} {title} {d.description} {d.configuration}").lower(),
+        search=clean(d.test).lower(),
     )
 
 

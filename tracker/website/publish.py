@@ -60,7 +60,13 @@ ASSETS = {  # name in templates: file under site/static
     "live": "live.js",
 }
 TITLE = "SPOOK tracker"  # of the website, unless a team says otherwise
-PLAIN_ASSETS = ("icon.svg", "plotly-LICENSE.txt", "three-LICENSE.txt")
+PLAIN_ASSETS = (
+    "icon.svg",
+    "formulas.woff2",
+    "formulas-LICENSE.txt",
+    "plotly-LICENSE.txt",
+    "three-LICENSE.txt",
+)
 
 
 @dataclass(frozen=True)

@@ -149,20 +149,43 @@ def _pieces(solid: DrawnSolid, camera: Camera, place: Place, scale: float, dot: 
                 path=f"M{_n(x1)} {_n(y1)}L{_n(x2)} {_n(y2)}",
             )
         ]
-    corners = _corners(solid)
     found = []
-    for places, axis, sign in FACES:
-        normal = turned(solid.orientation, tuple(float(sign) if i == axis else 0.0 for i in range(3)))  # type: ignore[arg-type]
+    for corners, normal in _faces(solid):
         if _dot(normal, camera.away) >= -1e-9:
             continue  # turned away
         bright = round(2.0 + 2.0 * _dot(normal, LIGHT))
-        face = "L".join(f"{_n(x)} {_n(y)}" for x, y in (place(corners[i]) for i in places))
+        face = "L".join(f"{_n(x)} {_n(y)}" for x, y in (place(p) for p in corners))
         found.append(Shape(depth, f"{kind} f{max(0, min(4, bright))}", path=f"M{face}Z"))
+    return found
+
+
+def _faces(solid: DrawnSolid) -> list[tuple[list[Vector], Vector]]:
+    """Corners and outward normal of every face of a box or of facets."""
+    if solid.kind == "box":
+        corners = _corners(solid)
+        return [
+            (
+                [corners[i] for i in places],
+                turned(solid.orientation, tuple(float(sign) if i == axis else 0.0 for i in range(3))),  # type: ignore[arg-type]
+            )
+            for places, axis, sign in FACES
+        ]
+    found, start = [], 0
+    while start < len(solid.size):
+        end = start + 1 + 3 * int(solid.size[start])
+        flat = [
+            _plus(solid.position, turned(solid.orientation, (x, y, z)))
+            for x, y, z in zip(*[iter(solid.size[start + 1 : end])] * 3, strict=True)
+        ]
+        found.append((flat, _unit(_cross(_minus(flat[1], flat[0]), _minus(flat[2], flat[0])))))
+        start = end
     return found
 
 
 def _corners(solid: DrawnSolid) -> list[Vector]:
     """Places that show how far a solid reaches."""
+    if solid.kind == "facets":
+        return [corner for corners, _ in _faces(solid) for corner in corners]
     if solid.kind == "box":
         return [
             _plus(

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from spook_tracker.tracker.document import wording
 from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
 from spook_tracker.tracker.resources import resource
+from spook_tracker.tracker.website.formulas import formula
 
 ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 
@@ -54,5 +55,6 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
         "web_address": wording.web_address,
         "seconds": wording.seconds,
         "number": wording.number,
+        "formula": formula,
     }
     return made

@@ -110,14 +110,43 @@ void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
     table.expect_all_read();
 }
 
-std::vector<Collider> read_colliders(const nb::dict& colliders, const char* name) {
+using Hulls = std::vector<std::shared_ptr<const Polytope>>;
+
+/// Corners of hulls, and the loops round their faces; both in ascending order of hull and face.
+Hulls read_hulls(const nb::dict& corners, const nb::dict& loops) {
+    Columns points(corners, "hull_corners"), rounds(loops, "hull_faces");
+    const Numbers hull_of = points.numbers("hull"), place = points.numbers("position", 3),
+                  loop_of = rounds.numbers("hull"), face = rounds.numbers("face"),
+                  corner = rounds.numbers("corner");
+    Hulls hulls;
+    std::size_t point = 0, row = 0;
+    while (point < points.rows()) {
+        const int hull = hull_of.index(point);
+        std::vector<Vec3> places;
+        std::vector<int> indices, counts;
+        for (; point < points.rows() && hull_of.index(point) == hull; ++point)
+            places.push_back(place.vec(point));
+        for (int last = -1; row < rounds.rows() && loop_of.index(row) == hull; ++row) {
+            if (face.index(row) != last) counts.push_back(0);
+            last = face.index(row);
+            ++counts.back();
+            indices.push_back(corner.index(row));
+        }
+        hulls.push_back(std::make_shared<const Polytope>(std::move(places), std::move(indices), counts));
+    }
+    points.expect_all_read();
+    rounds.expect_all_read();
+    return hulls;
+}
+
+std::vector<Collider> read_colliders(const nb::dict& colliders, const Hulls& hulls, const char* name) {
     std::vector<Collider> read;
     Columns table(colliders, name);
     const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
     const Numbers body = table.numbers("body"), position = table.numbers("position", 3),
                   orientation = table.numbers("orientation", 4), radius = table.numbers("radius"),
                   length = table.numbers("length"), size = table.numbers("size", 3),
-                  normal = table.numbers("normal", 3);
+                  normal = table.numbers("normal", 3), hull = table.numbers("hull");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         Collider& collider = read.emplace_back();
         collider.body = body.index(i);
@@ -126,6 +155,10 @@ std::vector<Collider> read_colliders(const nb::dict& colliders, const char* name
             case ShapeKind::sphere: collider.shape = Primitive::sphere(radius[i]); break;
             case ShapeKind::capsule: collider.shape = Primitive::capsule(radius[i], length[i]); break;
             case ShapeKind::box: collider.shape = Primitive::box(size.vec(i)); break;
+            case ShapeKind::cylinder: collider.shape = Primitive::cylinder(radius[i], length[i]); break;
+            case ShapeKind::hull:
+                collider.shape = Primitive::convex(hulls.at(static_cast<std::size_t>(hull.index(i))));
+                break;
             case ShapeKind::plane: collider.shape = Primitive::plane(normal.vec(i)); break;
         }
     }
@@ -223,9 +256,9 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
           const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& springs,
           const nb::dict& terms, const nb::dict& wire_points, const nb::dict& fields, const nb::dict& fluids,
           const nb::dict& floaters, const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
-          const nb::dict& no_contact, bool contacts, const Point& gravity, const nb::dict& method,
-          bool loads_change, const std::vector<QuantityRequest>& quantities,
-          const std::vector<Observation>& observations) {
+          const nb::dict& hull_corners, const nb::dict& hull_faces, const nb::dict& no_contact, bool contacts,
+          const Point& gravity, const nb::dict& method, bool loads_change,
+          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
     scene.loads_change = loads_change;
@@ -242,8 +275,9 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_wire_points(wire_points, scene);
     read_fluids(fluids, scene);
     read_drives(drives, knots, scene);
-    scene.floaters = read_colliders(floaters, "floaters");
-    scene.colliders = read_colliders(colliders, "colliders");
+    const Hulls hulls = read_hulls(hull_corners, hull_faces);
+    scene.floaters = read_colliders(floaters, hulls, "floaters");
+    scene.colliders = read_colliders(colliders, hulls, "colliders");
     read_no_contact(no_contact, scene);
     new (self) RigidProgram(scene, quantities, observations);
 }
@@ -255,10 +289,11 @@ void bind_rigid(nb::module_& m) {
         m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"),
         nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"), nb::arg("springs"),
         nb::arg("terms"), nb::arg("wire_points"), nb::arg("fields"), nb::arg("fluids"), nb::arg("floaters"),
-        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("no_contact"), nb::arg("contacts"),
-        nb::arg("gravity"), nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"),
-        nb::arg("observations"),
+        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("hull_corners"),
+        nb::arg("hull_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
+        nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
+        "hulls are numbered in the order they come;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits and\n"
         "joint_springs name the joint they drive.");
 }

@@ -2,9 +2,21 @@
 
 #include <limits>
 
+#include "collision/cylinder.hpp"
+
 namespace spook {
 
 Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
+    const Vec3 grown{margin, margin, margin};
+    if (shape.kind == ShapeKind::hull) {
+        Vec3 low, high;
+        for (int i = 0; i < 3; ++i) {
+            const Vec3 axis{at.rotation(i, 0), at.rotation(i, 1), at.rotation(i, 2)};
+            high[i] = farthest(*shape.hull, axis);
+            low[i] = -farthest(*shape.hull, -axis);
+        }
+        return {at.position + low - grown, at.position + high + grown};
+    }
     Vec3 half;
     for (int i = 0; i < 3; ++i) switch (shape.kind) {
             case ShapeKind::sphere: half[i] = shape.radius; break;
@@ -16,9 +28,16 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
                           shape.half.y * std::abs(at.rotation(i, 1)) +
                           shape.half.z * std::abs(at.rotation(i, 2));
                 break;
+            case ShapeKind::hull: break;
+            case ShapeKind::cylinder: {
+                Vec3 axis;
+                axis[i] = 1.0;
+                half[i] = cylinder_reach(shape, column(at.rotation, 2), axis);
+                break;
+            }
             case ShapeKind::plane: half[i] = std::numeric_limits<double>::infinity(); break;
         }
-    half += {margin, margin, margin};
+    half += grown;
     return {at.position - half, at.position + half};
 }
 
@@ -27,6 +46,9 @@ double reach(const Primitive& shape) noexcept {
         case ShapeKind::sphere: return shape.radius;
         case ShapeKind::capsule: return shape.half_length + shape.radius;
         case ShapeKind::box: return norm(shape.half);
+        case ShapeKind::hull: return shape.hull->reach;
+        case ShapeKind::cylinder:
+            return std::sqrt(shape.radius * shape.radius + shape.half_length * shape.half_length);
         case ShapeKind::plane: break;
     }
     return std::numeric_limits<double>::infinity();

@@ -9,7 +9,7 @@ struct Bounds {
     Vec3 low, high;  // m
 };
 
-/// The smallest box round a sphere, capsule or box, grown by `margin` [m] on every side.
+/// The smallest box round a bounded shape, grown by `margin` [m] on every side.
 /// A plane has no such box: its bounds are infinite.
 Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept;
 

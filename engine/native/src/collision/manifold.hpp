@@ -1,11 +1,12 @@
-// What the narrow phase says of two primitives: up to eight contact points.
+// What the narrow phase says of two primitives: up to sixteen contact points.
 //
 // Normals point from the second to the first: pushing along +normal moves the first away. The gap is signed,
 // negative inside; the position lies midway between both surfaces. A feature names the pair of vertices, edges
 // or faces a point comes from; it stays the same while the touching features do, so that a solver can start
 // from the multipliers of the step before.
 //
-// Points are never thinned out. Two boxes face to face keep the whole clipped polygon, up to eight points: a
+// Points are never thinned out. Two boxes face to face keep the whole clipped polygon, up to eight points, two hulls up
+// to sixteen, as a face has at most eight corners: a
 // choice of four would cut corners off the area of support, so a box would tip too early, and would jump from
 // step to step while the box turns. Four coplanar points are redundant already, so the solver must bear
 // redundancy in any case.
@@ -26,7 +27,7 @@ struct ContactPoint {
 };
 
 struct Manifold {
-    static constexpr int capacity = 8;
+    static constexpr int capacity = 16;
     std::array<ContactPoint, capacity> points;
     int count = 0;
 

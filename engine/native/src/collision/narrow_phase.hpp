@@ -23,6 +23,15 @@ Manifold capsule_capsule(const Primitive&, const Pose&, const Primitive&, const 
 Manifold capsule_box(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold capsule_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold box_box(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+/// Two boxes or hulls, not both boxes: separating axes and clipped faces.
+Manifold solid_solid(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+Manifold sphere_hull(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+Manifold capsule_hull(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+/// Cylinders meet planes and balls only; other pairs give no point, and are refused before anything runs.
+Manifold sphere_cylinder(const Primitive&, const Pose&, const Primitive&, const Pose&,
+                         double margin) noexcept;
+Manifold cylinder_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+Manifold hull_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold box_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 
 }  // namespace spook

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <utility>
 
+#include "collision/polytope.hpp"
 #include "linear/vec.hpp"
 #include "run/named_enum.hpp"
 
 namespace spook {
 
 /// The order matters: the narrow phase knows each pair with the lower kind first.
-SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, plane)
+SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, hull, cylinder, plane)
 
 struct Pose {
     Vec3 position;                     // m
@@ -19,17 +22,26 @@ struct Pose {
 /// One convex primitive; fields not named for a kind are ignored.
 struct Primitive {
     ShapeKind kind = ShapeKind::sphere;
-    double radius = 0.0;         // sphere, capsule, m
-    double half_length = 0.0;    // capsule: half its cylinder, along local z, m
+    double radius = 0.0;         // sphere, capsule, cylinder, m
+    double half_length = 0.0;    // half of a cylinder, also of a capsule's, along local z, m
     Vec3 half;                   // box: half its edges, m
     Vec3 normal{0.0, 0.0, 1.0};  // plane: unit, out of the solid half-space, local axes
+    std::shared_ptr<const Polytope> hull{};
 
-    static Primitive sphere(double radius) noexcept { return {ShapeKind::sphere, radius, 0.0, {}, {}}; }
+    static Primitive sphere(double radius) noexcept { return {ShapeKind::sphere, radius, 0.0, {}, {}, {}}; }
     static Primitive capsule(double radius, double length) noexcept {
-        return {ShapeKind::capsule, radius, 0.5 * length, {}, {}};
+        return {ShapeKind::capsule, radius, 0.5 * length, {}, {}, {}};
     }
-    static Primitive box(Vec3 size) noexcept { return {ShapeKind::box, 0.0, 0.0, 0.5 * size, {}}; }
-    static Primitive plane(Vec3 normal) noexcept { return {ShapeKind::plane, 0.0, 0.0, {}, normal}; }
+    static Primitive box(Vec3 size) noexcept { return {ShapeKind::box, 0.0, 0.0, 0.5 * size, {}, {}}; }
+    static Primitive cylinder(double radius, double length) noexcept {
+        return {ShapeKind::cylinder, radius, 0.5 * length, {}, {}, {}};
+    }
+    static Primitive plane(Vec3 normal) noexcept { return {ShapeKind::plane, 0.0, 0.0, {}, normal, {}}; }
+    static Primitive convex(std::shared_ptr<const Polytope> hull) noexcept {
+        return {ShapeKind::hull, 0.0, 0.0, {}, {}, std::move(hull)};
+    }
+    /// Whether its surface is flat faces: it has corners, and sides that others can meet.
+    bool faceted() const noexcept { return kind == ShapeKind::box || kind == ShapeKind::hull; }
 };
 
 constexpr Vec3 column(const Mat3& a, int i) noexcept { return {a.m[i], a.m[3 + i], a.m[6 + i]}; }

@@ -32,35 +32,65 @@ void face_corners(Vec3 half, int face, Vec3* corners) noexcept {
     }
 }
 
+/// The part of a solid below n · p + height = 0, as cones over a point of the surface on its clipped faces.
+class Below {
+public:
+    Below(Vec3 n, double height) noexcept : n_(n), height_(height), tip_(-height * n) {}
+    void add_face(const Vec3* corners, int count) noexcept {
+        Vec3 kept[Polytope::most_round_a_face + 1];
+        int left = 0;
+        for (int k = 0; k < count; ++k) {
+            const Vec3 p = corners[k], q = corners[(k + 1) % count];
+            const double above = dot(n_, p) + height_, next = dot(n_, q) + height_;
+            if (above <= 0.0) kept[left++] = p;
+            if ((above < 0.0 && next > 0.0) || (above > 0.0 && next < 0.0))
+                kept[left++] = p + (above / (above - next)) * (q - p);
+        }
+        for (int k = 1; k + 1 < left; ++k) {
+            const Vec3 a = kept[0] - tip_, b = kept[k] - tip_, c = kept[k + 1] - tip_;
+            const double cone = dot(a, cross(b, c)) / 6.0;
+            volume_ += cone;
+            moment_ += 0.25 * cone * (a + b + c);
+        }
+    }
+    Submerged found(const Pose& at) const noexcept {
+        if (!(volume_ > 0.0)) return {0.0, at.position};
+        return {volume_, apply(at, tip_ + (1.0 / volume_) * moment_)};
+    }
+
+private:
+    Vec3 n_;
+    double height_;
+    Vec3 tip_;  // of the surface, below or above the centre
+    double volume_ = 0.0;
+    Vec3 moment_;
+};
+
+Submerged hull_below(const Polytope& polytope, const Pose& at, Vec3 up, double height) noexcept {
+    const Vec3 n = local(at.rotation, up);
+    if (height >= farthest(polytope, -n)) return {0.0, at.position};
+    Below below(n, height);
+    for (const Polytope::Face& face : polytope.faces) {
+        Vec3 corners[Polytope::most_round_a_face];
+        for (int k = 0; k < face.count; ++k) corners[k] = polytope.corner_of(face, k);
+        below.add_face(corners, face.count);
+    }
+    return below.found(at);
+}
+
 Submerged box_below(Vec3 half, const Pose& at, Vec3 up, double height) noexcept {
     const Vec3 n = local(at.rotation, up);
     const double reach =
         std::abs(n.x) * half.x + std::abs(n.y) * half.y + std::abs(n.z) * half.z;  // of the highest corner
     if (height >= reach) return {0.0, at.position};
     if (height <= -reach) return {8.0 * half.x * half.y * half.z, at.position};
-    const Vec3 tip = -height * n;  // of the surface, below or above the centre
-    double volume = 0.0;
-    Vec3 moment;
+    Below below(n, height);
     for (int face = 0; face < 6; ++face) {
-        Vec3 corners[4], kept[5];
+        Vec3 corners[4];
         face_corners(half, face, corners);
-        int count = 0;
-        for (int k = 0; k < 4; ++k) {
-            const Vec3 p = corners[k], q = corners[(k + 1) % 4];
-            const double above = dot(n, p) + height, next = dot(n, q) + height;
-            if (above <= 0.0) kept[count++] = p;
-            if ((above < 0.0 && next > 0.0) || (above > 0.0 && next < 0.0))
-                kept[count++] = p + (above / (above - next)) * (q - p);
-        }
-        for (int k = 1; k + 1 < count; ++k) {
-            const Vec3 a = kept[0] - tip, b = kept[k] - tip, c = kept[k + 1] - tip;
-            const double cone = dot(a, cross(b, c)) / 6.0;
-            volume += cone;
-            moment += 0.25 * cone * (a + b + c);
-        }
+        below.add_face(corners, 4);
     }
-    if (!(volume > 0.0)) return {0.0, at.position};
-    return {volume, apply(at, tip + (1.0 / volume) * moment)};
+    return below.found(at);
 }
 
 constexpr double NODE[] = {0.09501250983763744, 0.2816035507792589, 0.45801677765722737, 0.6178762444026438,
@@ -69,12 +99,12 @@ constexpr double WEIGHT[] = {0.18945061045506864,  0.18260341504492364, 0.169156
                              0.1495959888165767,   0.12462897125553407, 0.0951585116824926,
                              0.062253523938647456, 0.027152459411754176};
 
-/// A capsule along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
+/// A capsule, or without caps a cylinder, along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
 /// height + slope s above the slice's centre and rises across it with `tilt`.
 struct Capsule {
     double radius, half_length, height, slope, tilt;
 
-    double rho2(double s) const noexcept {
+    double rho2(double s) const noexcept {  // of a cylinder no slice is beyond
         const double beyond = std::max(0.0, std::abs(s) - half_length);
         return std::max(0.0, radius * radius - beyond * beyond);
     }
@@ -91,21 +121,24 @@ struct Capsule {
 Submerged capsule_below(const Primitive& shape, const Pose& at, Vec3 up, double height) noexcept {
     const Vec3 axis = column(at.rotation, 2);
     const double slope = dot(axis, up), r = shape.radius, half = shape.half_length;
-    const double reach = r + half * std::abs(slope);
-    if (height >= reach) return {0.0, at.position};
-    if (height <= -reach) return {volume(shape), at.position};
+    const bool caps = shape.kind == ShapeKind::capsule;
     const Vec3 across = up - slope * axis;
     const double tilt = norm(across);
+    const double reach = (caps ? r : r * tilt) + half * std::abs(slope), end = caps ? half + r : half;
+    if (height >= reach) return {0.0, at.position};
+    if (height <= -reach) return {volume(shape), at.position};
     const Capsule capsule{r, half, height, slope, tilt};
     // Where pieces end: the caps, and where the surface meets the side |over| = tilt ρ of cylinder and caps.
-    double ends[20] = {-half - r, -half, half, half + r};
-    int count = 4;
+    double ends[20] = {-end, end};
+    int count = 2;
+    if (caps) ends[count++] = -half, ends[count++] = half;
     const auto add = [&](double s) {
-        if (s > -half - r && s < half + r) ends[count++] = s;
+        if (s > -end && s < end) ends[count++] = s;
     };
     if (slope != 0.0)
         for (const double side : {-1.0, 1.0}) add((side * tilt * r - height) / slope);
-    for (const double middle : {-half, half}) {  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
+    for (const double middle : {-half, half}) {
+        if (!caps) break;  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
         const double over = height + slope * middle, root = r * r - over * over;
         if (root < 0.0) continue;
         for (const double side : {-1.0, 1.0}) add(middle - slope * over + side * tilt * std::sqrt(root));
@@ -141,6 +174,8 @@ double volume(const Primitive& shape) noexcept {
         case ShapeKind::sphere: return 4.0 / 3.0 * kPi * r * r * r;
         case ShapeKind::capsule: return kPi * r * r * (2.0 * shape.half_length + 4.0 / 3.0 * r);
         case ShapeKind::box: return 8.0 * shape.half.x * shape.half.y * shape.half.z;
+        case ShapeKind::hull: return shape.hull->volume;
+        case ShapeKind::cylinder: return 2.0 * kPi * r * r * shape.half_length;
         case ShapeKind::plane: return 0.0;
     }
     return 0.0;
@@ -157,6 +192,18 @@ double shadow(const Primitive& shape, const Pose& at, Vec3 direction) noexcept {
             return 4.0 * (std::abs(d.x) * half.y * half.z + std::abs(d.y) * half.x * half.z +
                           std::abs(d.z) * half.x * half.y);
         }
+        case ShapeKind::cylinder: {
+            const Vec3 axis = column(at.rotation, 2);
+            return kPi * r * r * std::abs(dot(axis, direction)) +
+                   4.0 * r * shape.half_length * norm(cross(axis, direction));
+        }
+        case ShapeKind::hull: {
+            const Vec3 d = local(at.rotation, direction);
+            double area = 0.0;
+            for (const Polytope::Face& face : shape.hull->faces)
+                area += 0.5 * std::abs(dot(face.normal, d)) * face.area;
+            return area;
+        }
         case ShapeKind::plane: return 0.0;
     }
     return 0.0;
@@ -166,8 +213,10 @@ Submerged submerged(const Primitive& shape, const Pose& at, Vec3 up, double leve
     const double height = dot(up, at.position) - level;  // of the centre above the surface
     switch (shape.kind) {
         case ShapeKind::sphere: return sphere_below(shape.radius, at.position, up, height);
+        case ShapeKind::cylinder:
         case ShapeKind::capsule: return capsule_below(shape, at, up, height);
         case ShapeKind::box: return box_below(shape.half, at, up, height);
+        case ShapeKind::hull: return hull_below(*shape.hull, at, up, height);
         case ShapeKind::plane: break;
     }
     return {0.0, at.position};

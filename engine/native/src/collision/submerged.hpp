@@ -11,8 +11,8 @@ struct Submerged {
     Vec3 centre;
 };
 
-/// The surface is up · x = level, `up` a unit vector. Sphere: the cap, in closed form. Box: its faces clipped, each cone
-/// over a point of the surface, which the lid does not add to. Capsule: discs across its axis, each cut by the
+/// The surface is up · x = level, `up` a unit vector. Sphere: the cap, in closed form. Box and hull: their faces clipped, each cone
+/// over a point of the surface, which the lid does not add to. Capsule and cylinder: discs across their axis, each cut by the
 /// surface in closed form, integrated piece by piece to rounding (16 points of Gauss a piece, between the places
 /// where the surface enters or leaves). A plane displaces nothing.
 Submerged submerged(const Primitive& shape, const Pose& at, Vec3 up, double level) noexcept;

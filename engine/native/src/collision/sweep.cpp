@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "collision/bounds.hpp"
+#include "collision/cylinder.hpp"
 #include "collision/segment.hpp"
+#include "collision/solid_pairs.hpp"
 #include "linear/elementary.hpp"
 
 namespace spook {
@@ -81,6 +83,28 @@ Separation box_box(const Primitive& first, const Pose& at_first, const Primitive
     return best;
 }
 
+Separation round_hull(const Primitive& round, const Pose& at, const Primitive& hull,
+                      const Pose& at_hull) noexcept {
+    Segment segment = core(round, at);
+    segment.centre = local(at_hull.rotation, segment.centre - at_hull.position);
+    if (segment.half == 0.0) {
+        const Nearest near = nearest(*hull.hull, segment.centre);
+        return {near.height - round.radius, at_hull.rotation * near.normal};
+    }
+    segment.direction = local(at_hull.rotation, segment.direction);
+    const SegmentSolid near = segment_solid(segment, *hull.hull);
+    return {near.gap - round.radius, at_hull.rotation * near.normal};
+}
+
+Separation solids(const Primitive& first, const Pose& at_first, const Primitive& second,
+                  const Pose& at_second) noexcept {
+    const SolidAxes axes = solid_axes(Solid(first, at_first), Solid(second, at_second), 1e300);
+    const SolidAxes::Best* best = &axes.first_face;
+    if (axes.second_face.gap > best->gap) best = &axes.second_face;
+    if (axes.edges.gap > best->gap) best = &axes.edges;
+    return {best->gap, best->normal};
+}
+
 Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& plane,
                       const Pose& at_plane) noexcept {
     const Vec3 n = at_plane.rotation * plane.normal;
@@ -89,6 +113,8 @@ Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& p
         case ShapeKind::sphere: return {height - shape.radius, n};
         case ShapeKind::capsule:
             return {height - shape.radius - shape.half_length * std::abs(dot(n, column(at.rotation, 2))), n};
+        case ShapeKind::cylinder: return {height - cylinder_reach(shape, column(at.rotation, 2), n), n};
+        case ShapeKind::hull: return {height - farthest(*shape.hull, -local(at.rotation, n)), n};
         default: return {height - box_reach(shape, at, n), n};
     }
 }
@@ -103,6 +129,15 @@ Separation separation(const Primitive& first, const Pose& at_first, const Primit
         return swapped;
     }
     if (second.kind == ShapeKind::plane) return from_plane(first, at_first, second, at_second);
+    if (second.kind == ShapeKind::cylinder) {
+        if (first.kind != ShapeKind::sphere) return {1e300, {0.0, 0.0, 1.0}};  // refused before
+        const Nearest near =
+            nearest_on_cylinder(second, local(at_second.rotation, at_first.position - at_second.position));
+        return {near.height - first.radius, at_second.rotation * near.normal};
+    }
+    if (second.kind == ShapeKind::hull)
+        return first.faceted() ? solids(first, at_first, second, at_second)
+                               : round_hull(first, at_first, second, at_second);
     if (first.kind == ShapeKind::box) return box_box(first, at_first, second, at_second);
     if (second.kind == ShapeKind::box) return round_box(first, at_first, second, at_second);
     return round_round(first, at_first, second, at_second);

@@ -16,7 +16,7 @@ constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
 std::uint64_t pair_of(IndexPair pair) noexcept {
     return (static_cast<std::uint64_t>(pair.first) << 24) | static_cast<std::uint64_t>(pair.second);
 }
-bool round_or_plane(const Primitive& shape) noexcept { return shape.kind != ShapeKind::box; }
+bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
 constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
 
 }  // namespace
@@ -123,10 +123,10 @@ void ContactStage::find_open() {
         detection_.touch(pair, reach, scratch_);
         const bool touching =
             std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
-        // Any two shapes apart give a point, if they are near enough to meet; but not boxes corner to corner.
-        const bool boxes = first.shape.kind == ShapeKind::box && second.shape.kind == ShapeKind::box;
+        // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner.
+        const bool solids = first.shape.faceted() && second.shape.faceted();
         if (!touching) {
-            if (!scratch_.empty() || boxes) open_.push_back(open);
+            if (!scratch_.empty() || solids) open_.push_back(open);
             continue;
         }
         for (const Contact& contact : scratch_) {

@@ -47,6 +47,7 @@ public:
     int count() const noexcept { return static_cast<int>(joints_.size()); }
     int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
     JointKind kind(int joint) const noexcept { return joints_[joint].constants.kind; }
+    const JointConstants& constants(int joint) const noexcept { return joints_[joint].constants; }
     bool is_distance(int joint) const noexcept { return kind(joint) == JointKind::distance; }
     /// The bodies of a block beyond its first two: relations and wires may have more.
     std::span<const int> others(int block) const noexcept;

@@ -8,7 +8,9 @@
 // and `pending` is the half stage they still have to be kicked. Rows are held rigidly: their compliance would only
 // add the static stretch eps F.
 //
-// Λ is sought (rigid_hold.cpp) from forces extrapolated from the same stage of the steps before.
+// Λ is sought (rigid_hold.cpp) from forces extrapolated from the same stage of the steps before. Small trees of
+// joints are solved in joint coordinates instead (joint_tree.hpp), extrapolated likewise; where that finds nothing,
+// Λ is sought after all.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,12 +29,14 @@ constexpr int DIFFERENCES = 8;  // of a stage's forces from step to step, the ze
 void RigidSystem::start_composition() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     const std::size_t stages = composition_stages(method_.composition).size();
-    live_.history.assign(static_cast<std::size_t>(DIFFERENCES) * rows * stages, 0.0);
+    in_tree_ = tree_.coordinates() > 0 && tree_.holds(live_.bodies);
+    unknowns_ = in_tree_ ? static_cast<std::size_t>(tree_.coordinates()) : rows;
+    live_.history.assign(static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stages, 0.0);
     live_.guess_order.assign(stages, 0);
     trial_ = live_.bodies;
     violation_.assign(rows, 0.0);
-    bias_.assign(rows, 0.0);
-    multiplier_.assign(rows, 0.0);
+    bias_.assign(std::max(rows, unknowns_), 0.0);
+    multiplier_.assign(std::max(rows, unknowns_), 0.0);
     prepare_hold();
     if (solver_ != RigidSolver::block) return;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
@@ -107,40 +111,72 @@ void RigidSystem::push(const double* multipliers) {
     }
 }
 
-/// The impulses a stage will need, from its forces in the steps before: their differences from step to step, as many as
-/// would have told the last one best.
-void RigidSystem::guess_impulses(std::size_t stage, double span) {
-    const std::size_t rows = static_cast<std::size_t>(rows_);
-    const double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * rows * stage;
+/// What a stage will need, impulses or moves of joints, from their paces in the steps before: their differences from
+/// step to step, as many as would have told the last one best.
+void RigidSystem::guess(std::size_t stage, double span) {
+    const double* difference =
+        live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
     for (int k = 0; k < live_.guess_order[stage]; ++k)
-        for (std::size_t row = 0; row < rows; ++row) multiplier_[row] += span * *difference++;
+        for (std::size_t i = 0; i < unknowns_; ++i) multiplier_[i] += span * *difference++;
 }
 
-/// The k-th difference of a new force is what k differences before it failed to tell.
-void RigidSystem::remember_impulses(std::size_t stage, double span) {
-    const std::size_t rows = static_cast<std::size_t>(rows_);
-    double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * rows * stage;
+/// The k-th difference of a new pace is what k differences before it failed to tell.
+void RigidSystem::remember(std::size_t stage, double span) {
+    double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
     // A loop can come to a singular position, where long extrapolation leads into another of its branches.
-    const bool loops = joints_.count() > static_cast<int>(tied_.size());
+    const bool loops = !in_tree_ && joints_.count() > static_cast<int>(tied_.size());
     const auto known =
         static_cast<int>(std::min<std::int64_t>(live_.stage_steps, loops ? 3 : DIFFERENCES - 1));
-    for (std::size_t row = 0; row < rows; ++row) bias_[row] = multiplier_[row] / span;
+    for (std::size_t i = 0; i < unknowns_; ++i) bias_[i] = multiplier_[i] / span;
     double least = std::numeric_limits<double>::infinity();
     bool falling = true;  // beyond the first that grows they tell of noise, or of a sudden change
     live_.guess_order[stage] = 1;
     for (int k = 0;; ++k) {
         double size = 0.0;
-        for (std::size_t row = 0; row < rows; ++row, ++difference) {
-            size += std::fabs(bias_[row]);
+        for (std::size_t i = 0; i < unknowns_; ++i, ++difference) {
+            size += std::fabs(bias_[i]);
             const double before = *difference;
-            *difference = bias_[row];
-            bias_[row] -= before;
+            *difference = bias_[i];
+            bias_[i] -= before;
         }
         if (k > 0 && falling && size < least) least = size, live_.guess_order[stage] = k;
         else falling = k == 0;
         if (k == known) return;
     }
+}
+
+void RigidSystem::forget(std::size_t stage) {
+    const std::size_t numbers = static_cast<std::size_t>(DIFFERENCES) * unknowns_;
+    std::fill_n(live_.history.begin() + static_cast<std::ptrdiff_t>(numbers * stage), numbers, 0.0);
+    live_.guess_order[stage] = 0;
+}
+
+/// Tied bodies to the end of a stage, on their rows. False if no solution was found.
+bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
+    if (in_tree_) {
+        guess(stage, tau);
+        if (tree_.stage(tau, live_.bodies, multiplier_.data(), live_.newton_iterations)) {
+            remember(stage, tau);
+            return true;
+        }
+        forget(stage);
+        std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
+    }
+    assemble_blocks();
+    if (!in_tree_) guess(stage, span);
+    push(multiplier_.data());
+    if (clock_) clock_->mark(Stage::assemble_rows);
+    if (!hold_rows(tau)) return false;
+    if (!in_tree_) remember(stage, span);
+    for (int i : tied_) {
+        BodyState& s = live_.bodies[i];
+        s.displacement = trial_[i].displacement;
+        if (constants_[i].particle) continue;
+        s.turn = trial_[i].turn;
+        refresh(constants_[i], s);
+    }
+    return true;
 }
 
 /// False if no solution was found.
@@ -149,19 +185,7 @@ bool RigidSystem::composed_stage(double tau, std::size_t stage) {
     kick_all(span);
     if (clock_) clock_->mark(Stage::apply_gravity);
     if (solver_ == RigidSolver::block) {
-        assemble_blocks();
-        guess_impulses(stage, span);
-        push(multiplier_.data());
-        if (clock_) clock_->mark(Stage::assemble_rows);
-        if (!hold_rows(tau)) return false;
-        remember_impulses(stage, span);
-        for (int i : tied_) {
-            BodyState& s = live_.bodies[i];
-            s.displacement = trial_[i].displacement;
-            if (constants_[i].particle) continue;
-            s.turn = trial_[i].turn;
-            refresh(constants_[i], s);
-        }
+        if (!hold_stage(tau, span, stage)) return false;
         if (clock_) clock_->mark(Stage::solve_block);
     } else {
         for (int i : tied_) integrate_body(i);

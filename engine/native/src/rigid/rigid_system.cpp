@@ -91,6 +91,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
     if (solver_ == RigidSolver::block) analyse_block();
+    if (composed_ && solver_ == RigidSolver::block) tree_.analyse(constants_, joints_, tied_, start_);
     reset(nullptr);
 }
 

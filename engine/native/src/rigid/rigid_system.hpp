@@ -14,6 +14,7 @@
 #include "linear/dense_rows.hpp"
 #include "linear/redundant_rows.hpp"
 #include "rigid/joint_set.hpp"
+#include "rigid/joint_tree.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
 #include "run/stages.hpp"
@@ -123,8 +124,10 @@ private:
         int locked = -1;       // a body of redundant rows that contradict each other by now
         int lost = -1;         // a body of rows that no motion satisfies
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
-        std::vector<double> history;  // stages × differences × rows: of the rows' forces from step to step, N
-        std::vector<int> guess_order;  // per stage: how many of them tell the next force
+        // Stages × differences × unknowns: of the rows' forces [N], or of the paces of joint coordinates, from step
+        // to step; per stage: how many of them tell the next.
+        std::vector<double> history;
+        std::vector<int> guess_order;
     };
 
 public:
@@ -168,8 +171,10 @@ private:
     void compose(std::int64_t steps);
     void composed_step(double h, int depth);
     bool composed_stage(double tau, std::size_t stage);
-    void guess_impulses(std::size_t stage, double span);
-    void remember_impulses(std::size_t stage, double span);
+    bool hold_stage(double tau, double span, std::size_t stage);
+    void guess(std::size_t stage, double span);
+    void remember(std::size_t stage, double span);
+    void forget(std::size_t stage);
     void kick_all(double span);
     void push(const double* multipliers);
     double violations_ahead(double tau);
@@ -281,6 +286,9 @@ private:
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body
     std::vector<double> first_right_, violation_, bias_, multiplier_;
+    JointTree tree_;
+    bool in_tree_ = false;
+    std::size_t unknowns_ = 0;  // of a stage: rows, or joint coordinates
     std::vector<double> change_, last_plain_, last_step_, mixing_, extent_;
     std::vector<Vec3> rate_;  // per tied body: turn over the stage, body axes
     std::vector<Mat3> axes_;  // per tied body, where the stage starts

@@ -1,0 +1,106 @@
+"""What smooth rigid scenes cost to a given error, in plain SPOOK steps of the same scene timed side by side.
+
+    python bench/bench_smooth.py
+
+Each line is a method and a time step whose error is looked at first, against the scene's closed form. A limit is a
+time on the machine of the other engines' tables over the time of a plain step there: door 0.98 µs, top 0.59 µs, forty
+four-bars 74 µs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from spook_tracker.engine import PLAIN, Method, Position, Program, Scene, Trace, compile, simulate
+from spook_tracker.scalar_tests import spinning_top, swinging_door
+from spook_tracker.scalar_tests.multibody import four_bars
+
+ORDER6, ORDER8 = Method(composition="order6"), Method(composition="order8")
+ROUNDS = 7
+
+
+@dataclass(frozen=True)
+class Row:
+    """A scene to an error: how, and what it may cost, in plain steps."""
+
+    name: str
+    scene: Callable[[float], Scene]
+    error: Callable[[float, Method], float]
+    target: float  # rad or m
+    method: Method
+    per_second: float
+    seconds: float  # simulated
+    limit: float  # plain steps
+    plain_step: float  # s
+
+
+def bars_error(time_step: float, method: Method) -> float:
+    """Largest error of the angle of forty four-bars in 10 s [rad]."""
+    observe = {"side": Trace(quantity=Position("side 0"))}
+    built = four_bars.scene(four_bars.MANY, time_step)
+    result = simulate(built, time_step=time_step, duration=10.0, method=method, observe=observe)
+    found, right = (
+        2.0 * result["side"][1:, :2],
+        four_bars.exact(four_bars.MANY, result.sample_times["side"][1:]),
+    )
+    turned = found[:, 0] * right[:, 1] - found[:, 1] * right[:, 0]
+    return float(np.abs(np.arctan2(turned, np.sum(found * right, axis=1))).max())
+
+
+def door_error(time_step: float, method: Method) -> float:
+    return swinging_door.ladder_error(simulate, time_step, method)
+
+
+def top_error(time_step: float, method: Method) -> float:
+    return spinning_top.ladder_error(simulate, time_step, method)
+
+
+def many(time_step: float) -> Scene:
+    return four_bars.scene(four_bars.MANY, time_step)
+
+
+ROWS = (
+    Row("door to 4e-7 rad", swinging_door.scene, door_error, 4e-7, ORDER8, 9, 10.0, 1500.0, 1 / 4000),
+    Row("top to 1e-5 m", spinning_top.scene, top_error, 1e-5, ORDER6, 26, 20.0, 5100.0, 1 / 4000),
+    Row("top to 1e-10 m", spinning_top.scene, top_error, 1e-10, ORDER8, 48, 20.0, 34000.0, 1 / 4000),
+    Row("40 four-bars to 1.8e-5 rad", many, bars_error, 1.8e-5, ORDER8, 9.6, 10.0, 1340.0, 1 / 1000),
+)
+
+
+def least(program: Program, steps: int) -> float:
+    """Processor time of a run [s]."""
+    return program.run(steps).cpu_seconds
+
+
+def main() -> None:
+    missed = False
+    print("smooth rigid scenes: error, ms, in plain steps (limit), ms per step and beside the steps")
+    for row in ROWS:
+        h = 1.0 / row.per_second
+        error = row.error(h, row.method)
+        steps = round(row.seconds * row.per_second)
+        program = compile(row.scene(h), time_step=h, method=row.method)
+        plain = compile(row.scene(row.plain_step), time_step=row.plain_step, method=PLAIN)
+        some = round(0.2 * row.limit)
+        times = [
+            (least(program, steps), least(program, 2 * steps), least(plain, some) / some)
+            for _ in range(ROUNDS)
+        ]
+        whole, twice, one = (min(column) for column in zip(*times, strict=True))
+        within = error <= row.target and whole / one <= row.limit
+        missed = missed or not within
+        each = (twice - whole) / steps
+        print(
+            f"  {row.name:28s} {error:9.1e} {1e3 * whole:8.2f} {whole / one:8.0f} ({row.limit:6.0f})"
+            f"  {1e3 * each:8.4f} {1e3 * (whole - steps * each):7.3f}  {'' if within else 'MISSED'}",
+            flush=True,
+        )
+    if missed:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()

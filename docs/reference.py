@@ -1,0 +1,86 @@
+"""Pages that are made from the code when the documentation is built: commands, tables and views, the library."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+import click
+
+
+def on_files(files: Any, config: Any) -> Any:
+    """MkDocs asks for the files of the site: those that nobody writes by hand come here."""
+    from mkdocs.structure.files import File
+
+    for name, page in PAGES.items():
+        files.append(File.generated(config, f"reference/{name}.md", content="\n".join(page()) + "\n"))
+    return files
+
+
+def commands() -> Iterator[str]:
+    """Every command with its options, as `--help` prints them."""
+    from spook_tracker.tracker.cli.main import main
+
+    yield "# Commands\n"
+    yield "Exit codes everywhere: 0 same, better or green; 1 a regression or a red test; 2 usage, no data; 3 not comparable.\n"
+    yield 'Completion for the shell: `eval "$(_TRACKER_COMPLETE=bash_source tracker)"` (or `zsh_source`, `fish_source`).\n'
+    yield from _command(main, "tracker")
+
+
+def _command(command: click.Command, name: str) -> Iterator[str]:
+    context = click.Context(command, info_name=name, max_content_width=100, terminal_width=100)
+    yield f"## {name}\n\n```text\n{click.unstyle(command.get_help(context))}\n```\n"
+    if isinstance(command, click.Group):
+        for word, inner in sorted(command.commands.items()):
+            yield from _command(inner, f"{name} {word}")
+
+
+def schema() -> Iterator[str]:
+    """Every table and view with its columns, as the models say them."""
+    from spook_tracker.tracker.store.models import Base
+    from spook_tracker.tracker.store.views import ABOUT, COLUMNS, columns_of
+
+    yield "# Tables and views\n"
+    yield "Made from the models. Times are UTC; ids are hashes of their content, 53 bits. `column_comments` holds this page.\n"
+    for view, words in ABOUT.items():
+        yield f"## View {view}\n\n{words}\n\n| column | holds |\n|---|---|"
+        yield from (f"| `{column}` | {COLUMNS[column]} |" for column in columns_of(view))
+        yield ""
+    for table in Base.metadata.sorted_tables:
+        yield f"## Table {table.name}\n\n{table.comment}\n\n| column | type | key | holds |\n|---|---|---|---|"
+        for column in table.columns:
+            key = "primary" if column.primary_key else ""
+            key += f" → `{next(iter(column.foreign_keys)).target_fullname}`" if column.foreign_keys else ""
+            yield f"| `{column.name}` | {_type(column)} | {key} | {column.comment} |"
+        yield ""
+
+
+def _type(column: Any) -> str:
+    return str(column.type) + ("" if not column.nullable else ", may be NULL")
+
+
+def library() -> Iterator[str]:
+    """The public names of the library and of the engine, with their docstrings."""
+    from spook_tracker import engine, tracker
+
+    yield "# The Python library\n"
+    for title, module, path in (
+        ("The tracker", tracker, "spook_tracker.tracker"),
+        ("The engine", engine, "spook_tracker.engine"),
+    ):
+        yield f"## {title}: `{path}`\n"
+        for name in sorted(module.__all__):
+            thing = getattr(module, name)
+            told = inspect.getdoc(thing) if inspect.isclass(thing) or inspect.isroutine(thing) else None
+            yield f"### {name}\n\n```text\n{_signature(name, thing)}{told or 'A value of the type ' + type(thing).__name__}\n```\n"
+
+
+def _signature(name: str, thing: Any) -> str:
+    try:
+        return f"{name}{inspect.signature(thing)}\n\n" if callable(thing) else ""
+    except (TypeError, ValueError):
+        return ""
+
+
+PAGES = {"commands": commands, "schema": schema, "library": library}

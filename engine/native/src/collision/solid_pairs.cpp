@@ -1,0 +1,196 @@
+// Boxes and convex hulls: separating axes, then the face of one clipped by the face of the other, or two edges.
+//
+// As for two boxes: the axis of largest separation wins; among near equals the first solid's faces, then the second's,
+// then edges, so that resting solids keep their reference face from step to step. Pairs of edges count only where their
+// arcs on the sphere of directions cross (Gregorius 2013), the others are no face of the Minkowski difference.
+#include "collision/solid_pairs.hpp"
+
+#include <algorithm>
+
+#include "collision/narrow_phase.hpp"
+#include "collision/segment.hpp"
+
+namespace spook {
+
+Solid::Solid(const Primitive& primitive, const Pose& at) noexcept
+    : shape(primitive.kind == ShapeKind::hull ? *primitive.hull : cube()), rotation(at.rotation) {
+    const bool box = primitive.kind == ShapeKind::box;
+    const Vec3 half = primitive.half;
+    for (int k = 0; k < count(); ++k) {
+        const Vec3 c = shape.corners[static_cast<std::size_t>(k)];
+        corners[k] = apply(at, box ? Vec3{half.x * c.x, half.y * c.y, half.z * c.z} : c);
+    }
+    thickness = box ? 2.0 * std::min({half.x, half.y, half.z}) : shape.thickness;
+}
+
+double Solid::lowest(Vec3 n) const noexcept {
+    double least = 1e300;
+    for (int k = 0; k < count(); ++k) least = std::min(least, dot(n, corners[k]));
+    return least;
+}
+
+namespace {
+
+/// The face of `one` that the other lies farthest beyond; `sign` turns its normal from second to first.
+SolidAxes::Best best_face(const Solid& one, const Solid& other, double sign) noexcept {
+    SolidAxes::Best best;
+    for (int k = 0; k < static_cast<int>(one.shape.faces.size()); ++k) {
+        const Vec3 n = one.normal(k);
+        const double gap = other.lowest(n) - dot(n, one.corner_of(one.face(k), 0));
+        if (gap > best.gap) best = {gap, sign * n, k, k};
+    }
+    return best;
+}
+
+}  // namespace
+
+SolidAxes solid_axes(const Solid& first, const Solid& second, double margin) noexcept {
+    SolidAxes axes;
+    axes.first_face = best_face(first, second, -1.0);
+    axes.second_face = best_face(second, first, 1.0);
+    if (std::max(axes.first_face.gap, axes.second_face.gap) > margin) return axes;
+    const auto &ours = first.shape.edges, &theirs = second.shape.edges;
+    for (std::size_t i = 0; i < ours.size(); ++i) {
+        const Vec3 a = first.normal(ours[i].left), b = first.normal(ours[i].right);
+        const Vec3 along = first.corners[ours[i].to] - first.corners[ours[i].from], ba = cross(b, a);
+        for (std::size_t j = 0; j < theirs.size(); ++j) {
+            const Vec3 c = -second.normal(theirs[j].left), d = -second.normal(theirs[j].right);
+            const double cba = dot(c, ba), dba = dot(d, ba);
+            if (!(cba * dba < 0.0)) continue;
+            const Vec3 dc = cross(d, c);
+            const double adc = dot(a, dc), bdc = dot(b, dc);
+            if (!(adc * bdc < 0.0 && cba * bdc > 0.0)) continue;
+            const Vec3 other = second.corners[theirs[j].to] - second.corners[theirs[j].from];
+            const Vec3 axis = cross(along, other);
+            const double length = norm(axis);
+            if (length <= 1e-4 * norm(along) * norm(other)) continue;  // parallel edges are covered by faces
+            Vec3 n = (1.0 / length) * axis;
+            if (dot(n, a + b) > 0.0) n = -n;  // away from the first's outside: from second to first
+            const double gap = dot(n, first.corners[ours[i].from] - second.corners[theirs[j].from]);
+            if (gap > axes.edges.gap) axes.edges = {gap, n, static_cast<int>(i), static_cast<int>(j)};
+        }
+    }
+    return axes;
+}
+
+namespace {
+
+struct Vertex {
+    Vec3 place;
+    std::uint32_t feature;
+};
+
+struct Polygon {
+    static constexpr int most = 2 * Polytope::most_round_a_face + 2;
+    Vertex vertices[most];
+    int count = 0;
+    void add(Vertex vertex) noexcept {
+        if (count < most) vertices[count++] = vertex;
+    }
+};
+
+/// Keeps what lies at or below the plane through `on` with the outward normal `out`; `side` numbers the plane.
+Polygon clipped(const Polygon& in, Vec3 on, Vec3 out, double slop, std::uint32_t side) noexcept {
+    Polygon kept;
+    for (int k = 0; k < in.count; ++k) {
+        const Vertex &from = in.vertices[k], &to = in.vertices[(k + 1) % in.count];
+        const double d0 = dot(out, from.place - on), d1 = dot(out, to.place - on);
+        const bool in0 = d0 <= slop, in1 = d1 <= slop;
+        if (in0) kept.add(from);
+        if (in0 != in1)
+            kept.add({from.place + clamped(d0 / (d0 - d1), 0.0, 1.0) * (to.place - from.place),
+                      Polytope::most_round_a_face + 2 * side + (in1 ? 1u : 0u)});
+    }
+    return kept;
+}
+
+/// The manifold of `reference`'s face against the face of `incident` that looks most against it; `flip` is −1 if the
+/// face's normal points from first to second.
+void add_faces(Manifold& manifold, const Solid& reference, int index, const Solid& incident, double flip,
+               double margin, double slop) noexcept {
+    const Polytope::Face& face = reference.face(index);
+    const Vec3 n = reference.normal(index);
+    int opposite = 0;
+    double against = 1e300;
+    for (int k = 0; k < static_cast<int>(incident.shape.faces.size()); ++k) {
+        const double cosine = dot(n, incident.normal(k));
+        if (cosine < against - 1e-9) against = cosine, opposite = k;
+    }
+    Polygon polygon;
+    const Polytope::Face& other = incident.face(opposite);
+    for (int k = 0; k < other.count; ++k)
+        polygon.add({incident.corner_of(other, k), static_cast<std::uint32_t>(k)});
+    for (int k = 0; k < face.count; ++k) {
+        const Vec3 from = reference.corner_of(face, k), along = reference.corner_of(face, k + 1) - from;
+        const Vec3 out = cross(along, n);
+        polygon = clipped(polygon, from, (1.0 / norm(out)) * out, slop, static_cast<std::uint32_t>(k));
+    }
+    const double plane = dot(n, reference.corner_of(face, 0));
+    // Which faces: the same for all points of a manifold, so that it need not be unique.
+    const std::uint32_t faces = static_cast<std::uint32_t>(37 * index + 5 * opposite + (flip > 0.0)) % 1024u;
+    for (int k = 0; k < polygon.count; ++k) {
+        const Vec3 p = polygon.vertices[k].place;
+        const double height = dot(n, p) - plane;
+        if (height > margin) continue;
+        bool repeated = false;
+        for (int j = 0; j < k && !repeated; ++j) repeated = norm(p - polygon.vertices[j].place) <= slop;
+        if (!repeated)
+            manifold.add(p - 0.5 * height * n, flip * n, height, (faces << 5) | polygon.vertices[k].feature);
+    }
+}
+
+void add_edges(Manifold& manifold, const Solid& first, const Solid& second, const SolidAxes::Best& edges,
+               double margin) noexcept {
+    auto segment = [](const Solid& solid, int edge) noexcept {
+        const Polytope::Edge& e = solid.shape.edges[static_cast<std::size_t>(edge)];
+        const Vec3 along = 0.5 * (solid.corners[e.to] - solid.corners[e.from]);
+        const double half = norm(along);
+        return Segment{0.5 * (solid.corners[e.to] + solid.corners[e.from]), (1.0 / half) * along, half};
+    };
+    const Segment one = segment(first, edges.first), two = segment(second, edges.second);
+    const SegmentPair closest = closest_parameters(one, two);
+    const Vec3 p = one.at(closest.first), q = two.at(closest.second);
+    const double gap = dot(edges.normal, p - q);
+    const std::uint32_t feature =
+        (1u << 15) | static_cast<std::uint32_t>(137 * edges.first + edges.second) % 32768u;
+    if (gap <= margin) manifold.add(0.5 * (p + q), edges.normal, gap, feature);
+}
+
+/// Where no polygon is left: the corner of `other` that is deepest below the face.
+void add_deepest(Manifold& manifold, const Solid& reference, int index, const Solid& other,
+                 double flip) noexcept {
+    const Vec3 n = reference.normal(index);
+    int deepest = 0;
+    for (int k = 1; k < other.count(); ++k)
+        if (dot(n, other.corners[k]) < dot(n, other.corners[deepest])) deepest = k;
+    const double gap = dot(n, other.corners[deepest] - reference.corner_of(reference.face(index), 0));
+    manifold.add(other.corners[deepest] - 0.5 * gap * n, flip * n, gap, static_cast<std::uint32_t>(deepest));
+}
+
+}  // namespace
+
+Manifold solid_solid(const Primitive& one, const Pose& at_first, const Primitive& two, const Pose& at_second,
+                     double margin) noexcept {
+    const Solid first(one, at_first), second(two, at_second);
+    const SolidAxes axes = solid_axes(first, second, margin);
+    const double face = std::max(axes.first_face.gap, axes.second_face.gap);
+    Manifold manifold;
+    if (face > margin || axes.edges.gap > margin) return manifold;
+    const double smallest = 0.5 * std::min(first.thickness, second.thickness);
+    const double prefer = 1e-4 * smallest, slop = 1e-7 * smallest;
+    if (axes.edges.gap > face + prefer) {
+        add_edges(manifold, first, second, axes.edges, margin);
+        return manifold;
+    }
+    const bool theirs = axes.second_face.gap > axes.first_face.gap + prefer;
+    if (theirs) add_faces(manifold, second, axes.second_face.second, first, 1.0, margin, slop);
+    else add_faces(manifold, first, axes.first_face.first, second, -1.0, margin, slop);
+    if (manifold.count > 0 || face > 0.0) return manifold;
+    // Overlapping, yet no corner of a face inside the other: only near ties of the axes end here.
+    if (axes.edges.first >= 0) add_edges(manifold, first, second, axes.edges, margin);
+    else if (theirs) add_deepest(manifold, second, axes.second_face.second, first, 1.0);
+    else add_deepest(manifold, first, axes.first_face.first, second, -1.0);
+    return manifold;
+}
+
+}  // namespace spook

@@ -1,0 +1,323 @@
+// Which scenes are forests of joint coordinates, and what closes their loops; see joint_tree_stage.cpp for the stages.
+#include "rigid/joint_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rigid/rotation.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int MOST_IN_A_TREE = 12;  // coordinates: beyond it blocks of bodies and rows are cheaper
+constexpr int MOST_ROWS = 200;      // that close loops
+constexpr int FARTHEST = 24;        // off the diagonal: wider bands cost more than blocks
+
+/// What a joint lets its bodies do. False: not known here.
+bool freedom(const JointConstants& joint, bool backwards, int& turns, int& slides, Vec3* slide_axes) {
+    const JointHolds holds = joint.holds;
+    if (holds.rows() == 0 || holds.turning == Turning::cross) return false;
+    turns = holds.turning == Turning::free ? 3 : holds.turning == Turning::swing ? 1 : 0;
+    slides = 0;
+    for (int k = 0; k < 3; ++k)
+        if (k < holds.linear_first || k >= holds.linear_end) slide_axes[slides++] = joint.axes[k];
+    // Slides are along the first body's axes, which the second carries as well if it cannot turn off them.
+    const bool along_axis = slides == 0 || (holds.linear_first == 1 && turns == 1);
+    return !backwards || turns == 0 || along_axis;
+}
+
+}  // namespace
+
+void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                        std::span<const int> tied, const LargeArray<BodyState>& start) {
+    constants_ = constants;
+    joints_ = &joints;
+    coordinates_ = 0;
+    if (hang(tied) && close(start) && order()) return;
+    coordinates_ = 0;
+}
+
+/// The forest, by breadth: every body as near to the world as it can be.
+bool JointTree::hang(std::span<const int> tied) {
+    struct Hung {
+        int body, joint, parent;  // parent: a body, −1 the world
+    };
+    const auto blocks = joints_->blocks();
+    const auto moving = [&](int body) { return body >= 0 && constants_[body].moves(); };
+    for (const JointBlock& block : blocks) {
+        if (block.axial || joints_->kind(block.joint) == JointKind::relation ||
+            joints_->kind(block.joint) == JointKind::wire)
+            return false;
+        for (int body : {block.first, block.second})
+            if (body >= 0 && constants_[body].motion == Motion::kinematic) return false;
+    }
+    std::vector<int> hung(constants_.size(), -1);  // place in `found`
+    std::vector<Hung> found;
+    const auto hang_on = [&](int parent) {
+        for (std::size_t k = 0; k < blocks.size(); ++k) {
+            const JointBlock& block = blocks[k];
+            for (const bool backwards : {false, true}) {
+                const int holder = backwards ? block.second : block.first;
+                const int body = backwards ? block.first : block.second;
+                if (!moving(body) || hung[body] >= 0) continue;
+                if (parent < 0 ? moving(holder) : holder != parent) continue;
+                int turns = 0, slides = 0;
+                Vec3 axes[3];
+                const JointConstants& joint = joints_->constants(block.joint);
+                if (norm(joint.span) > 1e-12 * (norm(joint.first_arm) + norm(joint.second_arm)) ||
+                    !freedom(joint, backwards, turns, slides, axes))
+                    continue;
+                hung[body] = static_cast<int>(found.size());
+                found.push_back({body, static_cast<int>(k), parent});
+            }
+        }
+    };
+    if (tied.size() > 2000) return false;
+    hang_on(-1);
+    for (std::size_t next = 0; next < found.size(); ++next) hang_on(found[next].body);
+    if (found.size() != tied.size()) return false;
+
+    nodes_.clear();
+    node_of_.assign(constants_.size(), -1);
+    trees_ = 0;
+    double scale = 0.0;
+    const auto add = [&](const auto& self, const Hung& one) -> void {
+        Node node;
+        node.body = one.body;
+        node.joint = blocks[one.joint].joint;
+        node.parent = one.parent < 0 ? -1 : node_of_[one.parent];
+        const JointConstants& joint = joints_->constants(node.joint);
+        node.backwards = blocks[one.joint].first == one.body;
+        Vec3 axes[3];
+        freedom(joint, node.backwards, node.turns, node.slides, axes);
+        std::copy_n(axes, std::min(node.slides, 2), node.slide_axes);
+        node.axis = joint.axes[0];
+        node.parent_arm = node.backwards ? joint.second_arm : joint.first_arm;
+        node.arm = node.backwards ? joint.first_arm : joint.second_arm;
+        const double arms = norm(node.parent_arm) + norm(node.arm);
+        node.extent = arms > 0.0 ? arms : 1.0;
+        const BodyConstants& body = constants_[one.body];
+        node.mass = body.mass;
+        node.inertia = body.inertia;
+        node.tree = one.parent < 0 ? trees_++ : nodes_[static_cast<std::size_t>(node.parent)].tree;
+        node.first = coordinates_;
+        coordinates_ += node.coordinates();
+        const Vec3 i = body.inertia;
+        scale += (i.x + i.y + i.z) / 3.0 + body.mass * dot(node.arm, node.arm);
+        const std::size_t at = nodes_.size();
+        node_of_[one.body] = static_cast<int>(at);
+        nodes_.push_back(node);
+        for (const Hung& next : found)
+            if (next.parent == one.body) self(self, next);
+        nodes_[at].end = static_cast<int>(nodes_.size());
+    };
+    for (const Hung& one : found) {
+        if (constants_[one.body].particle) return false;
+        if (one.parent < 0) add(add, one);
+    }
+    scale_ = scale / static_cast<double>(std::max<std::size_t>(1, nodes_.size()));
+    std::vector<int> in_tree(static_cast<std::size_t>(trees_), 0);
+    for (const Node& node : nodes_) in_tree[node.tree] += node.coordinates();
+    courses_.assign(nodes_.size(), Course{});
+    pushes_.assign(nodes_.size(), {});
+    twists_.assign(nodes_.size(), {});
+    return coordinates_ > 0 && *std::max_element(in_tree.begin(), in_tree.end()) <= MOST_IN_A_TREE;
+}
+
+/// The joints that are left, and which of their rows say more than the forest does.
+bool JointTree::close(const LargeArray<BodyState>& start) {
+    const auto blocks = joints_->blocks();
+    loops_.clear();
+    ahead_ = start;
+    take(start);
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        const JointBlock& block = blocks[k];
+        Closing loop{};
+        loop.block = static_cast<int>(k);
+        loop.first = block.first < 0 ? -1 : node_of_[block.first];
+        loop.second = block.second < 0 ? -1 : node_of_[block.second];
+        const auto hangs = [&](int node) { return node >= 0 && nodes_[node].joint == block.joint; };
+        if (hangs(loop.first) || hangs(loop.second) || (loop.first < 0 && loop.second < 0)) continue;
+        loop.rows = loop.kept = block.size;
+        for (int i = 0; i < block.size; ++i) {
+            loop.row[i] = i;
+            loop.extent[i] = joints_->gain(loop.block, i).extent;
+        }
+        for (int node = 0; node < static_cast<int>(nodes_.size()); ++node) {
+            const auto moves = [&](int end) { return end >= node && end < nodes_[node].end; };
+            if (moves(loop.first) == moves(loop.second)) continue;
+            for (int i = 0; i < nodes_[node].coordinates(); ++i) loop.columns.push_back({node, i});
+        }
+        loops_.push_back(loop);
+    }
+    drop_fulfilled_rows();
+    rows_ = 0;
+    int reduced = 0;
+    for (Closing& loop : loops_) {
+        loop.at = rows_;
+        loop.reduced = reduced;
+        rows_ += loop.kept;
+        reduced += loop.kept * static_cast<int>(loop.columns.size());
+    }
+    if (rows_ > std::min(MOST_ROWS, coordinates_ - 1)) return false;
+    start_rows_.assign(static_cast<std::size_t>(reduced), 0.0);
+    end_rows_ = start_rows_;
+    multiplier_.assign(static_cast<std::size_t>(rows_), 0.0);
+    right_.assign(static_cast<std::size_t>(coordinates_ + rows_), 0.0);
+    step_.assign(static_cast<std::size_t>(coordinates_), 0.0);
+    return independent(start);
+}
+
+/// A row is an analytic function of the joint coordinates: where it vanishes at places picked blindly it always does.
+void JointTree::drop_fulfilled_rows() {
+    if (loops_.empty()) return;
+    constexpr int PLACES = 3;
+    constexpr double GOLDEN = 0.6180339887498949;
+    for (Closing& loop : loops_) loop.kept = 0;
+    double number = 0.0;
+    for (int round = 0; round < PLACES; ++round) {
+        for (std::size_t k = 0; k < nodes_.size(); ++k) {
+            const auto pick = [&number] {
+                number += GOLDEN;
+                number -= std::floor(number);
+                return number - 0.5;
+            };
+            const Node& node = nodes_[k];
+            const Vec3 e = node.turns == 1   ? pick() * node.axis
+                           : node.turns == 3 ? Vec3{pick(), pick(), pick()}
+                                             : Vec3{};
+            courses_[k].moved = {std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z};
+            for (int i = 0; i < node.slides; ++i) courses_[k].slid[i] = pick() * node.extent;
+        }
+        place();
+        for (Closing& loop : loops_) {
+            const JointBlock& block = joints_->blocks()[loop.block];
+            double violation[6];
+            joint_violation(joints_->constants(block.joint), state(block.first, ahead_),
+                            state(block.second, ahead_), violation);
+            for (int i = 0; i < loop.rows; ++i) {
+                const bool known = std::find(loop.row, loop.row + loop.kept, i) != loop.row + loop.kept;
+                if (!known && !(std::fabs(violation[i]) < 1e-12 * loop.extent[i])) loop.row[loop.kept++] = i;
+            }
+        }
+    }
+    for (Closing& loop : loops_) std::sort(loop.row, loop.row + loop.kept);
+    std::erase_if(loops_, [](const Closing& loop) { return loop.kept == 0; });
+}
+
+/// Whether the rows that close loops are independent of each other at the start.
+bool JointTree::independent(const LargeArray<BodyState>& start) {
+    const std::size_t width = static_cast<std::size_t>(coordinates_);
+    std::vector<double> known;  // orthonormal
+    for (const Closing& loop : loops_) {
+        double* reduced = start_rows_.data() + loop.reduced;
+        LoopRows rows;
+        find_rows(loop, start, rows);
+        reduce(loop, rows, false, reduced);
+        for (int i = 0; i < loop.kept; ++i) {
+            std::vector<double> row(width, 0.0);
+            for (const Closing::Column& column : loop.columns)
+                row[static_cast<std::size_t>(nodes_[column.node].first + column.coordinate)] = *reduced++;
+            const auto size = [&] {
+                double sum = 0.0;
+                for (double entry : row) sum += entry * entry;
+                return std::sqrt(sum);
+            };
+            const double whole = size();
+            for (int again = 0; again < 2; ++again)
+                for (std::size_t at = 0; at < known.size(); at += width) {
+                    double share = 0.0;
+                    for (std::size_t j = 0; j < width; ++j) share += known[at + j] * row[j];
+                    for (std::size_t j = 0; j < width; ++j) row[j] -= share * known[at + j];
+                }
+            const double left = size();
+            if (!(left > 1e-6 * whole) || !(whole > 1e-9 * loop.extent[loop.row[i]])) return false;
+            for (double entry : row) known.push_back(entry / left);
+        }
+    }
+    return true;
+}
+
+/// Trees and loops next to each other where they meet (Cuthill and McKee 1969), so that the system is a band.
+bool JointTree::order() {
+    const std::size_t trees = static_cast<std::size_t>(trees_), count = trees + loops_.size();
+    std::vector<std::vector<int>> met(count);
+    for (std::size_t l = 0; l < loops_.size(); ++l)
+        for (const Closing::Column& column : loops_[l].columns) {
+            const int tree = nodes_[column.node].tree;
+            if (std::find(met[trees + l].begin(), met[trees + l].end(), tree) != met[trees + l].end())
+                continue;
+            met[trees + l].push_back(tree);
+            met[static_cast<std::size_t>(tree)].push_back(static_cast<int>(trees + l));
+        }
+    std::vector<char> seen(count, 0);
+    const auto spread = [&](int from) {
+        std::vector<int> found{from};
+        std::vector<char> here(count, 0);
+        here[static_cast<std::size_t>(from)] = 1;
+        for (std::size_t next = 0; next < found.size(); ++next) {
+            std::vector<int> around = met[static_cast<std::size_t>(found[next])];
+            std::stable_sort(around.begin(), around.end(), [&](int a, int b) {
+                return met[static_cast<std::size_t>(a)].size() < met[static_cast<std::size_t>(b)].size();
+            });
+            for (int other : around)
+                if (!here[static_cast<std::size_t>(other)]) {
+                    here[static_cast<std::size_t>(other)] = 1;
+                    found.push_back(other);
+                }
+        }
+        return found;
+    };
+    std::vector<int> first(count, 0);
+    std::vector<std::vector<int>> numbers(count);  // coordinates, or rows after all coordinates
+    for (const Node& node : nodes_)
+        for (int i = 0; i < node.coordinates(); ++i)
+            numbers[static_cast<std::size_t>(node.tree)].push_back(node.first + i);
+    for (std::size_t l = 0; l < loops_.size(); ++l)
+        for (int i = 0; i < loops_[l].kept; ++i)
+            numbers[trees + l].push_back(coordinates_ + loops_[l].at + i);
+    place_of_.assign(static_cast<std::size_t>(coordinates_ + rows_), 0);
+    int next = 0;
+    for (std::size_t from = 0; from < count; ++from) {
+        if (seen[from]) continue;
+        for (int one : spread(spread(static_cast<int>(from)).back())) {
+            seen[static_cast<std::size_t>(one)] = 1;
+            for (int number : numbers[static_cast<std::size_t>(one)])
+                place_of_[static_cast<std::size_t>(number)] = next++;
+        }
+    }
+    int reach = 0;
+    const auto meet = [&](int a, int b) { reach = std::max(reach, std::abs(place_of_[a] - place_of_[b])); };
+    for (std::size_t t = 0; t < trees; ++t)
+        for (int a : numbers[t])
+            for (int b : numbers[t]) meet(a, b);
+    for (const Closing& loop : loops_)
+        for (const Closing::Column& column : loop.columns)
+            for (int i = 0; i < loop.kept; ++i)
+                meet(nodes_[column.node].first + column.coordinate, coordinates_ + loop.at + i);
+    for (Closing& loop : loops_)
+        for (const Closing::Column& column : loop.columns)
+            loop.places.push_back(place_of_[nodes_[column.node].first + column.coordinate]);
+    system_.prepare(coordinates_ + rows_, reach);
+    return reach <= FARTHEST;
+}
+
+bool JointTree::holds(const LargeArray<BodyState>& bodies) {
+    take(bodies);
+    for (Course& motion : courses_) {
+        motion.moved = {};
+        motion.slid[0] = motion.slid[1] = 0.0;
+    }
+    place();
+    for (const Node& node : nodes_) {
+        const BodyState &is = bodies[node.body], &held = ahead_[node.body];
+        const Quat off = conjugate(held.turn) * is.turn;
+        if (!(norm(is.displacement - held.displacement) <= 1e-9 * node.extent) ||
+            !(norm({off.x, off.y, off.z}) <= 1e-9))
+            return false;
+    }
+    return true;
+}
+
+}  // namespace spook

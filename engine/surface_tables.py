@@ -1,0 +1,79 @@
+"""Surfaces of a scene as tables for the native side: a row for every primitive, and the hulls they name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from spook_tracker.engine.bodies import RigidBody
+from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.joints import Distance, Joint
+from spook_tracker.engine.program import table
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
+
+ORIGIN = (0.0, 0.0, 0.0)
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def surfaces(scene: Scene, hulls: dict[ConvexHull, int]) -> list[dict[str, Any]]:
+    """A row for every primitive; hulls are numbered as they are met, equal ones once."""
+    colliders: list[dict[str, Any]] = []
+    for index, body in enumerate(scene.bodies):
+        if not isinstance(body, RigidBody) or body.shape is None:
+            continue
+        placed = (
+            [(part.position, part.orientation, part.shape) for part in body.shape.parts]
+            if isinstance(body.shape, Compound)
+            else [(ORIGIN, UPRIGHT, body.shape)]
+        )
+        for position, orientation, shape in placed:
+            row: dict[str, Any] = {"body": index, "position": position, "orientation": orientation}
+            row |= {"kind": shape.kind, "radius": 0.0, "length": 0.0, "size": ORIGIN, "normal": ORIGIN}
+            row["hull"] = hulls.setdefault(shape, len(hulls)) if isinstance(shape, ConvexHull) else -1
+            colliders.append(row | shape.columns())
+    return colliders
+
+
+def hull_tables(hulls: Mapping[ConvexHull, int]) -> dict[str, Any]:
+    """Corners of hulls, and the loops of corners round their faces."""
+    corners = [
+        {"hull": index, "position": corner} for hull, index in hulls.items() for corner in hull.corners
+    ]
+    loops = [
+        {"hull": index, "face": face, "corner": corner}
+        for hull, index in hulls.items()
+        for face, loop in enumerate(hull.faces)
+        for corner in loop
+    ]
+    return {"hull_corners": table(corners), "hull_faces": table(loops)}
+
+
+def check_cylinders(scene: Scene) -> None:
+    """Raises SceneError where a cylinder may touch what it cannot meet yet."""
+    solid = [body for body in scene.bodies if isinstance(body, RigidBody) and body.shape is not None]
+    round_ones = [body for body in solid if any(isinstance(part, Cylinder) for part in _parts(body))]
+    if not round_ones or not scene.contacts:
+        return
+    apart = {frozenset(pair) for pair in scene.no_contact}
+    apart |= {
+        frozenset(str(end) for end in c.between) for c in scene.constraints if isinstance(c, Joint | Distance)
+    }
+    for one in round_ones:
+        for other in solid:
+            if one is other or frozenset((one.name, other.name)) in apart:
+                continue
+            if "dynamic" not in (one.motion, other.motion):
+                continue
+            for part in _parts(other):
+                if not isinstance(part, Plane | Sphere):
+                    raise SceneError(
+                        f"cylinder {one.name!r} may touch the {part.kind} {other.name!r}, and cylinders meet only planes "
+                        "and spheres; list both in no_contact or use another shape"
+                    )
+
+
+def _parts(body: RigidBody) -> list[Shape]:
+    if isinstance(body.shape, Compound):
+        return [part.shape for part in body.shape.parts]
+    return [] if body.shape is None else [body.shape]

@@ -1,0 +1,47 @@
+"""Engines that are wrong on purpose: each still has its place in the sources and a test that is named for it."""
+
+from __future__ import annotations
+
+import datetime
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from bench import mutants
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+
+ROOT = Path(__file__).parent.parent
+ROOMS = {
+    "particles", "linear", "strings", "composition", "recorder", "rotation", "joints", "loads", "collision",
+    "contacts", "friction", "tracker",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mutant", mutants.MUTANTS, ids=lambda mutant: mutant.name)
+def test_a_mutant_has_one_place_in_the_sources_and_a_test_that_is_named_for_it(
+    mutant: mutants.Mutant,
+) -> None:
+    for file, old, new in mutant.changes:
+        assert (ROOT / file).read_text(encoding="utf-8").count(old) == 1, "bring bench/mutants.py up to date"
+        assert old != new
+    if mutant.of_the_suite:
+        file, _, name = mutant.caught_by.partition("::")
+        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8")
+    else:
+        assert mutant.caught_by in CATALOGUE
+
+
+def test_every_room_has_a_mutant_and_no_two_have_one_name() -> None:
+    assert {mutant.room for mutant in mutants.MUTANTS} == ROOMS
+    assert max(Counter(mutant.name for mutant in mutants.MUTANTS).values()) == 1
+    assert len(mutants.MUTANTS) >= 24
+
+
+def test_a_few_each_night_are_all_of_them_in_time() -> None:
+    first = datetime.date(2026, 11, 22)
+    nights = -(-len(mutants.MUTANTS) // 4) + 1
+    seen = {m.name for n in range(nights) for m in mutants.tonights(4, first + datetime.timedelta(days=n))}
+
+    assert len(mutants.tonights(4, first)) == 4
+    assert seen == {mutant.name for mutant in mutants.MUTANTS}

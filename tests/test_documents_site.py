@@ -1,0 +1,162 @@
+"""The documentation as a site: it builds, what it tells to type runs, and what is made from the code is complete."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from click.testing import CliRunner
+from sqlalchemy import text
+
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.views import ABOUT
+from tests.run_documents import run
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
+
+
+def generated() -> Any:
+    spec = importlib.util.spec_from_file_location("reference_pages", DOCS / "reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("TRACKER_DB", raising=False)
+    page = (DOCS / "tutorial" / "first-night.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^ {4}(tracker .*)$", page, re.MULTILINE)
+    said = []
+
+    for line in lines:
+        done = CliRunner().invoke(main, shlex.split(line)[1:], prog_name="tracker")
+        assert done.exit_code == 0, (line, done.output)
+        said.append(done.output)
+
+    assert len(lines) == 4
+    assert "1.635 m" in said[0], "the number the page names"
+    assert re.search(r"≤ 4\.90\d* m", said[0])
+    assert "identical" in said[2]
+    assert (tmp_path / "public" / "index.html").is_file()
+
+
+def test_the_queries_run_on_both_databases(session: Any) -> None:
+    record(session, run())
+    queries = blocks("how-to/sql.md", "sql")
+
+    for query in queries:
+        session.execute(text(query)).all()
+
+    assert len(queries) >= 4
+    told = session.execute(text(queries[-1])).all()
+    assert any(column == "limit_low" for column, _ in told)
+
+
+def test_the_python_beside_the_queries_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sqlalchemy.orm import Session
+
+    from spook_tracker.tracker.store.database import open_database
+
+    engine = open_database(f"sqlite:///{tmp_path}/tracker.db")
+    with Session(engine) as session:
+        record(session, run())
+    engine.dispose()
+    monkeypatch.chdir(tmp_path)
+
+    for block in blocks("how-to/sql.md", "python"):
+        exec(block, {})
+
+
+def test_every_cell_of_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads((ROOT / "examples" / "first_night.ipynb").read_text(encoding="utf-8"))["cells"]
+    names: dict[str, Any] = {}
+
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            exec("".join(cell["source"]), names)
+
+    assert names["verdict"] == "identical"
+    assert names["result"].steps == 100
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="MkDocs is not installed here")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stderr
+    pages = {str(page.relative_to(tmp_path / "site")) for page in (tmp_path / "site").rglob("*.html")}
+    assert {"index.html", "tutorial/first-night.html", "reference/schema.html"} <= pages
+    for page in (tmp_path / "site").rglob("*.html"):
+        assert not re.search(r'(src|href)="https?://[^"]*\.(js|css)', page.read_text(encoding="utf-8")), page
+
+
+def test_the_page_of_tables_is_complete() -> None:
+    page = "\n".join(generated().schema())
+
+    for table in models.Base.metadata.tables.values():
+        assert f"## Table {table.name}" in page
+        assert all(f"| `{column.name}` |" in page for column in table.columns)
+    assert all(f"## View {view}" in page for view in ABOUT)
+
+
+def test_the_page_of_commands_is_complete() -> None:
+    page = "\n".join(generated().commands())
+
+    def names(group: click.Group, before: str) -> list[str]:
+        found = []
+        for name, command in group.commands.items():
+            found.append(f"{before} {name}")
+            found += names(command, found[-1]) if isinstance(command, click.Group) else []
+        return found
+
+    assert [name for name in names(main, "tracker") if f"## {name}\n" not in page] == []
+
+
+def test_the_page_of_the_library_is_complete() -> None:
+    from spook_tracker import engine, tracker
+
+    page = "\n".join(generated().library())
+
+    assert [name for name in (*engine.__all__, *tracker.__all__) if f"### {name}\n" not in page] == []
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_shell_can_complete(shell: str) -> None:
+    variables = {"_TRACKER_COMPLETE": f"{shell}_source"}
+
+    done = CliRunner(env=variables).invoke(main, [], prog_name="tracker", complete_var="_TRACKER_COMPLETE")
+
+    assert "_TRACKER_COMPLETE" in done.output
+    assert "tracker" in done.output
+
+
+def test_each_line_of_the_threat_model_names_tests_that_are_there() -> None:
+    rows = [line for line in (ROOT / "SECURITY.md").read_text().splitlines() if line.startswith("| ")][2:]
+
+    assert len(rows) > 10
+    for row in rows:
+        named = re.findall(r"`(tests/\w+\.py)`", row)
+        assert named, row
+        assert all((ROOT / name).is_file() for name in named), row

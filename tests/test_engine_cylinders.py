@@ -1,0 +1,200 @@
+"""Cylinders: on planes, under balls, in water; and what they cannot meet is refused by name."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from spook_tracker.engine import (
+    Ball,
+    Box,
+    Capsule,
+    Compound,
+    ContactForce,
+    ConvexHull,
+    Cylinder,
+    Energy,
+    Final,
+    Fluid,
+    Material,
+    Part,
+    Penetration,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    SceneError,
+    Shape,
+    Sphere,
+    Trace,
+    Velocity,
+    compile,
+    simulate,
+)
+
+H = 1.0 / 60.0
+DOWN = (0.0, 0.0, -10.0)
+ROUGH = Material(friction=0.5)
+GROUND = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=ROUGH)
+
+
+def can(**fields: Any) -> RigidBody:
+    given = {"mass": 2.0, "shape": Cylinder(0.3, 0.5), "position": (0.0, 0.0, 0.25), "material": ROUGH}
+    return RigidBody(name="can", **(given | fields))
+
+
+def turned(axis: Any, angle: float) -> tuple[float, float, float, float]:
+    w, x, y, z = Rotation.from_rotvec(angle * np.asarray(axis) / np.linalg.norm(axis)).as_quat(
+        scalar_first=True
+    )
+    return (w, x, y, z)
+
+
+def depth(*bodies: RigidBody) -> float:
+    found = simulate(Scene(bodies=bodies), time_step=H, steps=1, observe={"d": Trace(quantity=Penetration())})
+    return float(found["d"].max())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_its_depth_below_a_plane_is_that_of_its_lowest_point(seed: int) -> None:
+    """The lowest point, found by minimising over the rim's angle."""
+    rng = np.random.default_rng(seed)
+    turn = Rotation.random(rng=rng)
+    w, x, y, z = turn.as_quat(scalar_first=True)
+
+    def height(angle: Any, side: float) -> float:
+        return float(turn.apply((0.3 * math.cos(angle[0]), 0.3 * math.sin(angle[0]), side))[2])
+
+    lowest = min(
+        minimize(height, (start,), (side,), tol=1e-12).fun
+        for side in (-0.25, 0.25)
+        for start in (0.0, 2.0, 4.0)
+    )
+    body = can(position=(0.0, 0.0, -lowest - 1e-3), orientation=(w, x, y, z))
+
+    assert depth(GROUND, body) == pytest.approx(1e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_ball_touches_it_where_a_search_finds_the_nearest_point(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = Rotation.random(rng=rng)
+    w, x, y, z = turn.as_quat(scalar_first=True)
+    away = rng.standard_normal(3)
+    ball = 0.8 * away / np.linalg.norm(away)
+    inside = turn.inv().apply(ball)
+    nearest = minimize(
+        lambda p: float(np.sum((p - inside) ** 2)),
+        (0.0, 0.0, 0.0),
+        constraints=(
+            {"type": "ineq", "fun": lambda p: 0.3**2 - p[0] ** 2 - p[1] ** 2},
+            {"type": "ineq", "fun": lambda p: 0.25 - p[2]},
+            {"type": "ineq", "fun": lambda p: 0.25 + p[2]},
+        ),
+        tol=1e-14,
+    )
+    distance = math.sqrt(nearest.fun)
+    fixed = can(motion="static", mass=None, position=(0, 0, 0), orientation=(w, x, y, z))
+    for closer, expected in ((1e-3, 1e-3), (-1e-3, 0.0)):
+        other = RigidBody(name="ball", mass=1.0, shape=Sphere(distance + closer), position=tuple(ball))
+        assert depth(fixed, other) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("orientation", [(1.0, 0.0, 0.0, 0.0), turned((1, 0, 0), math.pi / 2)])
+def test_it_rests_on_its_foot_and_on_its_side(orientation: Any) -> None:
+    height = 0.25 if orientation[0] == 1.0 else 0.3
+    found = simulate(
+        Scene(bodies=(GROUND, can(position=(0, 0, height), orientation=orientation)), gravity=DOWN),
+        time_step=H,
+        steps=120,
+        observe={"x": Final(quantity=Position("can")), "force": Final(quantity=ContactForce("can"))},
+    )
+
+    np.testing.assert_allclose(found["x"], (0, 0, height), atol=1e-9)
+    np.testing.assert_allclose(found["force"], (0, 0, 20.0), atol=1e-8)
+
+
+@pytest.mark.parametrize("away", [0.0, 0.3, math.pi / 4, 1.1])
+@pytest.mark.parametrize(("share", "falls"), [(0.98, False), (1.02, True)])
+def test_it_tips_over_its_rim_in_any_direction(away: float, share: float, falls: bool) -> None:
+    """Leaning by atan(2 r/l) its centre is over the rim's lowest point."""
+    lean = share * math.atan(0.3 / 0.25)
+    axis = (-math.sin(away), math.cos(away), 0.0)
+    height = 0.3 * math.sin(lean) + 0.25 * math.cos(lean)
+    body = can(position=(0, 0, height), orientation=turned(axis, lean), material=Material(friction=1.0))
+    found = simulate(
+        Scene(bodies=(GROUND, body), gravity=DOWN),
+        time_step=1.0 / 240.0,
+        steps=360,
+        observe={"x": Final(quantity=Position("can")), "energy": Trace(quantity=Energy())},
+    )
+
+    assert float(found["x"][2]) == pytest.approx(0.3 if falls else 0.25, abs=2e-3)
+    assert np.diff(found["energy"]).max() < 0.05  # J of 6
+
+
+def test_rolling_down_it_has_the_inertia_of_its_kind() -> None:
+    """a = g sin θ/(1 + I/(m r²)) = (2/3) g sin θ."""
+    body = can(position=(0, 0, 0.3), orientation=turned((1, 0, 0), math.pi / 2))
+    found = simulate(
+        Scene(bodies=(GROUND, body), gravity=(1.0, 0.0, -10.0)),
+        time_step=H,
+        steps=60,
+        observe={"v": Final(quantity=Velocity("can"))},
+    )
+
+    np.testing.assert_allclose(found["v"], (2.0 / 3.0, 0, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("level", [-0.2, -0.05, 0.1, 0.22])
+@pytest.mark.parametrize("lean", [0.0, 0.4, 1.2, math.pi / 2])
+def test_water_lifts_what_a_grid_of_points_finds_under_it(level: float, lean: float) -> None:
+    body = can(position=(0, 0, 0), orientation=turned((0, 1, 0), lean))
+    scene = Scene(bodies=(body,), forces=(Fluid(name="water", density=1000.0, level=level),), gravity=DOWN)
+    found = simulate(scene, time_step=1e-6, steps=1, observe={"v": Final(quantity=Velocity("can"))})
+    lifted = (float(found["v"][2]) / 1e-6 + 10.0) * 2.0 / (1000.0 * 10.0)  # m³
+    count = 120
+    middles = (np.arange(count) + 0.5) / count
+    r, angle, along = np.meshgrid(0.3 * middles, 2 * math.pi * middles, 0.5 * middles - 0.25, indexing="ij")
+    height = Rotation.from_rotvec((0, lean, 0)).apply(
+        np.stack((r * np.cos(angle), r * np.sin(angle), along), axis=-1).reshape(-1, 3)
+    )[:, 2]
+    cell = r.reshape(-1) * (0.3 / count) * (2 * math.pi / count) * (0.5 / count)
+
+    assert lifted == pytest.approx(float(cell[height < level].sum()), abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Box((1, 1, 1)),
+        Capsule(0.1, 0.2),
+        Cylinder(0.1, 0.2),
+        ConvexHull(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))),
+    ],
+)
+def test_what_it_cannot_meet_is_refused_by_name(other: Shape) -> None:
+    box = RigidBody(name="shelf", motion="static", shape=other, position=(9.0, 0, 0))
+    scene = Scene(bodies=(can(), box), gravity=DOWN)
+    with pytest.raises(SceneError, match=f"'can' may touch the {other.kind} 'shelf'") as caught:
+        compile(scene, time_step=H)
+    assert "no_contact" in str(caught.value) and "\n" not in str(caught.value)
+
+    compile(Scene(bodies=(can(), box), no_contact=(("shelf", "can"),)), time_step=H)
+    compile(Scene(bodies=(can(), box), contacts=False), time_step=H)
+    compile(Scene(bodies=(can(), box), constraints=(Ball(name="b", between=("shelf", "can")),)), time_step=H)
+    held = can(shape=Compound((Part(shape=Cylinder(0.1, 0.1)),)), inertia=(1, 1, 1))
+    with pytest.raises(SceneError, match="no_contact"):
+        compile(Scene(bodies=(held, box)), time_step=H)
+
+
+@pytest.mark.parametrize("field", ["radius", "length"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, "wide"])
+def test_a_size_that_cannot_be_is_refused_in_a_sentence(field: str, value: Any) -> None:
+    with pytest.raises(SceneError, match=f"cylinder.*{field}"):
+        Cylinder(**({"radius": 1.0, "length": 1.0} | {field: value}))

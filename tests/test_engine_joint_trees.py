@@ -1,0 +1,156 @@
+"""Compositions in joint coordinates take the steps of the dense oracle, which knows rows only, to rounding."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    AngularVelocity,
+    Cylindrical,
+    Distance,
+    Final,
+    Hinge,
+    MaximumAbsolute,
+    Method,
+    Orientation,
+    Particle,
+    Planar,
+    PointOnLine,
+    Position,
+    Prismatic,
+    Scene,
+    Trace,
+    Velocity,
+    Violation,
+    simulate,
+)
+from spook_tracker.scalar_tests.multibody import four_bars
+from tests import rigid_scenes
+from tests.oracle_rigid_composition import ComposedOracle
+
+ORDER4 = Method(composition="order4")
+OBSERVE = {
+    "x": Trace(quantity=Position()),
+    "q": Trace(quantity=Orientation()),
+    "v": Trace(quantity=Velocity()),
+    "w": Trace(quantity=AngularVelocity()),
+}
+
+
+def rigid(scene: Scene) -> Scene:
+    rows = tuple(dataclasses.replace(row, compliance=0.0) for row in scene.constraints)
+    return dataclasses.replace(scene, constraints=rows)
+
+
+def hung(*kinds: str, twice: bool = False) -> Scene:
+    """A branching tree of joints from the world, in both directions; `twice`: the first body on a second hinge."""
+    rng = np.random.default_rng(len(kinds))
+    bodies = [rigid_scenes.rigid_body(rng, i) for i in range(len(kinds))]
+    rows = []
+    for i, kind in enumerate(kinds):
+        parent = (i - 1) // 2
+        ends = (f"b{parent}" if i else WORLD, f"b{i}")
+        at = rigid_scenes.between(bodies, parent, i) if i else (0.5, 0.0, 0.0)
+        rows.append(rigid_scenes.joint(rng, kind, *(ends[::-1] if i % 2 else ends), at))
+    if twice:
+        first = rows[0]
+        assert isinstance(first, Hinge) and first.at is not None and first.axis is not None
+        along = np.asarray(first.axis, dtype=float) / np.linalg.norm(first.axis)
+        x, y, z = (np.asarray(first.at) + 0.7 * along).tolist()
+        rows.append(dataclasses.replace(first, name="second hinge", at=(x, y, z)))
+    return rigid(Scene(bodies=tuple(bodies), constraints=tuple(rows), gravity=rigid_scenes.GRAVITY))
+
+
+SCENES = {
+    "hinges": hung("hinge", "hinge", "hinge", "hinge"),
+    "every joint": hung("prismatic", "ball", "hinge", "lock", "ball"),
+    "a hinge too many": hung("hinge", "ball", "prismatic", twice=True),
+    "a loop": rigid(dataclasses.replace(four_bars.scene(2, 0.02), gravity=(0.3, -9.81, 0.0))),
+    "a ring, held twice": rigid(rigid_scenes.loop(np.random.default_rng(3))),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_joint_coordinates_take_the_dense_steps(name: str) -> None:
+    scene, h, steps = SCENES[name], 0.02, 2
+    oracle = ComposedOracle(scene, h)
+
+    run = simulate(scene, time_step=h, steps=steps, method=ORDER4, observe=OBSERVE)
+
+    for k in range(1, steps + 1):
+        oracle.step()
+        same = np.sign(np.sum(run["q"][k] * oracle.q, axis=1))[:, None]
+        for quantity, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
+            assert np.abs(run[quantity][k] - exact).max() < 1e-9, quantity
+        assert np.abs(same * run["q"][k] - oracle.q).max() < 1e-10
+
+
+@pytest.mark.parametrize("kind", [Cylindrical, Planar, PointOnLine])
+def test_freer_joints_move_as_their_rows_have_it(kind: type[Any]) -> None:
+    """A particle on a distance elsewhere makes everybody's rows be solved, which other tests hold to the equations."""
+    free, axis = hung("ball", "hinge"), np.array([0.6, 0.0, 0.8])
+    slide = kind(name="slide", between=(WORLD, "b0"), at=(0.5, 0.0, 0.0), axis=tuple(axis), compliance=0.0)
+    scene = dataclasses.replace(free, constraints=(slide, free.constraints[1]))
+    dot = Particle(name="dot", mass=1.0, position=(50.0, 0.0, 0.0))
+    pin = Distance(name="pin", between=((50.0, 0.0, 1.0), "dot"), compliance=0.0)
+    beside = dataclasses.replace(scene, bodies=(*scene.bodies, dot), constraints=(*scene.constraints, pin))
+
+    trees, rows = (
+        simulate(s, time_step=0.02, steps=25, method=ORDER4, observe=OBSERVE) for s in (scene, beside)
+    )
+
+    assert trees.state_hash != rows.state_hash
+    for quantity in OBSERVE:
+        assert np.abs(trees[quantity] - rows[quantity][:, :2]).max() < 1e-9, quantity
+
+
+def test_violations_stay_at_rounding_over_many_steps() -> None:
+    """The joints of the tree hold by construction, those that close a loop by Newton's method."""
+    observe = {"g": MaximumAbsolute(quantity=Violation("right 1"))}
+
+    run = simulate(four_bars.scene(2, 0.02), time_step=0.02, steps=2000, method=ORDER4, observe=observe)
+
+    assert run["g"].max() < 1e-12
+
+
+def test_far_from_the_origin_nothing_is_lost() -> None:
+    """Joint coordinates are differences: a thousand kilometres away the same motion, to the digits that places have."""
+    near = hung("hinge", "ball", "prismatic")
+    away = np.array([1e6, -2e6, 0.0])
+
+    def moved(point: object) -> tuple[float, float, float]:
+        x, y, z = (np.asarray(point, dtype=float) + away).tolist()
+        return (x, y, z)
+
+    far = Scene(
+        bodies=tuple(dataclasses.replace(b, position=moved(b.position)) for b in near.bodies),
+        constraints=tuple(dataclasses.replace(j, at=moved(j.at)) for j in near.constraints),  # type: ignore[arg-type]
+        gravity=near.gravity,
+    )
+    observe = {"x": Final(quantity=Position())}
+    ends = [
+        simulate(scene, time_step=0.02, steps=100, method=ORDER4, observe=observe)["x"]
+        for scene in (near, far)
+    ]
+
+    assert np.abs(ends[1] - away - ends[0]).max() < 1e-8
+
+
+def test_a_slide_goes_far() -> None:
+    """A coordinate without an end: 490 m of fall along an axis, against the closed form."""
+    body = rigid_scenes.rigid_body(np.random.default_rng(1), 0)
+    still = dataclasses.replace(body, velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0))
+    rail = Prismatic(
+        name="rail", between=(WORLD, "b0"), at=still.position, axis=(0.0, 0.0, 1.0), compliance=0.0
+    )
+    scene = Scene(bodies=(still,), constraints=(rail,), gravity=(0.0, 0.0, -9.81))
+    observe = {"x": Final(quantity=Position("b0"))}
+
+    end = simulate(scene, time_step=0.1, steps=100, method=ORDER4, observe=observe)["x"]
+
+    assert end[2] - still.position[2] == pytest.approx(-0.5 * 9.81 * 100.0, rel=1e-13)

@@ -1,0 +1,214 @@
+"""A team's nights from the first on, by the reusable workflow's own steps in a scratch repository.
+
+First night, a regression, a pull request that does not help and one that does, recovery. The workflows themselves
+are read by an auditor.
+"""
+
+from __future__ import annotations
+
+import lzma
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+yaml = pytest.importorskip("yaml", reason="PyYAML is not installed here")
+from tests.workflow_service import Service  # noqa: E402 (needs yaml)
+
+ROOT = Path(__file__).resolve().parents[1]
+TRACK = ROOT / ".github" / "workflows" / "track.yml"
+EXAMPLE = ROOT / "examples" / "pebble"
+BUILD = "cmake -S . -B build && cmake --build build"
+GRAVITY = "velocities[p] += time_step * gravity[p % 3];"
+CMAKE = shutil.which("cmake", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+AUDITOR = Path(sys.executable).with_name("zizmor")
+
+
+def git(folder: Path, *words: str) -> str:
+    who = ("-c", "user.name=Somebody", "-c", "user.email=somebody@example.org")
+    done = subprocess.run(["git", *who, *words], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+class Team:
+    """A clone to work in, the place it is pushed to, and the service that watches there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.clone = folder / "pebble"
+        ignored = shutil.ignore_patterns("build", "public", "__pycache__", "*.db*")
+        shutil.copytree(EXAMPLE, self.clone, ignore=ignored)
+        settings = self.clone / "tracker.toml"
+        settings.write_text(settings.read_text().replace(",standard", "").partition("[limits]")[0])
+        git(self.clone, "init", "-q", "-b", "main")
+        self.commit("Throw stones")
+        self.origin = folder / "origin.git"
+        git(folder, "clone", "-q", "--bare", str(self.clone), str(self.origin))
+        git(self.clone, "remote", "add", "origin", str(self.origin))
+        programs = folder / "programs"
+        programs.mkdir()
+        for name, line in (("pip", "exit 0"), ("tracker", f'exec {sys.executable} -m spook_tracker "$@"')):
+            (programs / name).write_text(f"#!/bin/sh\n{line}\n")
+            (programs / name).chmod(0o755)
+        (programs / "cmake").symlink_to(str(CMAKE))
+        self.service = Service(self.origin, folder / "ci", programs)
+
+    def commit(self, subject: str) -> str:
+        git(self.clone, "add", ".")
+        git(self.clone, "commit", "-q", "-m", subject)
+        return git(self.clone, "rev-parse", "HEAD")
+
+    def change(self, subject: str, branch: str, old: str, new: str) -> str:
+        git(self.clone, "checkout", "-q", "-B", branch)
+        source = self.clone / "src" / "pebble.cpp"
+        text = source.read_text()
+        assert old in text
+        source.write_text(text.replace(old, new))
+        found = self.commit(subject)
+        git(self.clone, "push", "-q", "origin", branch)
+        return found
+
+    def night(self) -> dict:
+        return self.service.run(TRACK, "schedule", "main", build=BUILD, options="--quick --workers 1")
+
+    def pull_request(self, branch: str) -> dict:
+        return self.service.run(TRACK, "pull_request", branch, build=BUILD)
+
+    def months(self) -> dict[str, int]:
+        """Runs in each file of the history's branch."""
+        names = git(self.origin, "ls-tree", "--name-only", "tracker-history").splitlines()
+        shown = {
+            name: subprocess.run(
+                ["git", "show", f"tracker-history:{name}"], cwd=self.origin, capture_output=True, check=True
+            ).stdout
+            for name in names
+        }
+        return {name: len(lzma.decompress(content).splitlines()) for name, content in shown.items()}
+
+
+@pytest.mark.skipif(CMAKE is None, reason="CMake is not installed here")
+def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> None:
+    team = Team(tmp_path)
+
+    first = team.night()
+    assert {name: job.result for name, job in first.items()} == {
+        "night": "success", "keep": "success", "publish": "success", "verdict": "success", "change": "skipped",
+    }, first["night"].log  # fmt: skip
+    assert "measured for the first time" in first["night"].summary
+    assert list(team.months().values()) == [1]
+
+    bad = team.change(
+        "Pull a little harder", "main", GRAVITY, GRAVITY.replace("time_step", "1.01 * time_step")
+    )
+    red = team.night()
+    assert (red["night"].result, red["publish"].result) == ("success", "success"), "the site comes out first"
+    assert red["verdict"].result == "failure"
+    assert "throw/default/height\\_error" in red["night"].summary
+    assert bad[:10] in red["night"].summary
+    assert re.search(r"^::error title=throw%3A .*height_error", red["night"].log, re.MULTILINE)
+    assert list(team.months().values()) == [2]
+
+    team.change("Pull harder still", "worse", "1.01 * time_step", "1.02 * time_step")
+    worse = team.pull_request("worse")
+    assert worse["change"].result == "failure"
+    assert worse["night"].result == "skipped"
+    assert "**regressed**" in worse["change"].summary
+    assert "::error title=pebble became worse::" in worse["change"].log
+
+    git(team.clone, "checkout", "-q", "main")
+    team.change("Pull as it should", "mend", "1.01 * time_step", "time_step")
+    mended = team.pull_request("mend")
+    assert mended["change"].result == "success", mended["change"].log
+    assert "**identical**" in mended["change"].summary
+    assert list(team.months().values()) == [2], "a proposed change is not kept"
+
+    git(team.clone, "checkout", "-q", "main")
+    git(team.clone, "merge", "-q", "--no-ff", "-m", "Merge the mending", "mend")
+    git(team.clone, "push", "-q", "origin", "main")
+    well = team.night()
+    assert well["verdict"].result == "success"
+    assert "::error" not in well["night"].log
+    assert list(team.months().values()) == [3]
+    assert len(git(team.origin, "log", "--format=%h", "tracker-history").splitlines()) == 3
+
+
+WORKFLOWS = [*sorted((ROOT / ".github" / "workflows").glob("*.yml")), ROOT / "action.yml"]
+
+
+@pytest.mark.skipif(not AUDITOR.exists(), reason="zizmor is not installed here")
+def test_the_auditor_finds_nothing_in_the_workflows() -> None:
+    command = [
+        str(AUDITOR),
+        "--offline",
+        "--config",
+        ".github/zizmor.yml",
+        ".github",
+        "action.yml",
+        "examples",
+    ]
+
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stdout
+    assert "No findings" in done.stdout + done.stderr
+
+
+@pytest.mark.skipif(not AUDITOR.exists(), reason="zizmor is not installed here")
+def test_the_auditor_would_find_an_action_by_tag(tmp_path: Path) -> None:
+    workflow = (ROOT / ".github" / "workflows" / "nightly.yml").read_text()
+    (tmp_path / "w.yml").write_text(re.sub(r"(actions/cache)@\w+", r"\1@v5", workflow))
+
+    done = subprocess.run(
+        [str(AUDITOR), "--offline", str(tmp_path / "w.yml")], capture_output=True, check=False
+    )
+
+    assert done.returncode != 0
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
+def test_every_action_is_pinned_by_hash_with_its_version_beside_it(workflow: Path) -> None:
+    for line in workflow.read_text().splitlines():
+        if "uses:" in line and "OWNER" not in line:
+            assert re.search(r"uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+$", line), line
+
+
+def test_whatever_may_write_installs_and_builds_nothing() -> None:
+    for workflow in WORKFLOWS[:-1]:
+        said = yaml.safe_load(workflow.read_text())
+        assert said["permissions"] in ({}, {"contents": "read"}), workflow.name
+        for name, job in said["jobs"].items():
+            if "write" in job.get("permissions", {}).values():
+                shell = " ".join(step.get("run", "") for step in job["steps"])
+                assert not re.search(r"\b(pip|make|cmake|npm|python)\b", shell), (workflow.name, name)
+
+
+def test_the_targets_that_workflows_make_are_there() -> None:
+    targets = set(re.findall(r"^([\w-]+)(?: [\w-]+)*:", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    weekly = yaml.safe_load((ROOT / ".github" / "workflows" / "weekly.yml").read_text())
+
+    made = set(weekly["jobs"]["heavy"]["strategy"]["matrix"]["target"])
+    for workflow in WORKFLOWS[:-1]:
+        made |= set(re.findall(r"\bmake ([a-z][\w-]*)", workflow.read_text().replace('"$TARGET"', "")))
+
+    assert made - targets - {"tidy-deep"} == set()
+
+
+def test_the_template_for_gitlab_is_yaml_and_shell() -> None:
+    said = yaml.safe_load((ROOT / "examples" / "gitlab" / ".gitlab-ci.yml").read_text())
+
+    for job in said.values():
+        for line in (*job.get("before_script", ()), *job.get("script", ())):
+            assert isinstance(line, str), line
+            subprocess.run(["bash", "-n", "-c", line], check=True)
+
+
+def test_a_team_needs_ten_lines() -> None:
+    lines = (EXAMPLE / ".github" / "workflows" / "physics.yml").read_text().splitlines()
+
+    assert len(lines) <= 10
+    given = yaml.safe_load("\n".join(lines))["jobs"]["track"]["with"]
+    assert set(given) <= set(yaml.safe_load(TRACK.read_text())[True]["workflow_call"]["inputs"])

@@ -1,0 +1,145 @@
+"""Files as other benchmark tools write them come in as run times, each in its own unit, and are not judged exactly."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.measure.other_tools import of_other_tools
+
+COMMIT = "a" * 40
+PYTEST = {
+    "machine_info": {"node": "desk", "cpu": {"brand_raw": "Example"}},
+    "commit_info": {"id": COMMIT, "time": "2026-11-01T10:00:00+00:00", "dirty": False, "project": "ours", "branch": "main"},
+    "benchmarks": [
+        {"name": "test_step", "fullname": "bench/test_step.py::test_step", "params": None, "stats":
+            {"min": 0.5, "max": 0.7, "mean": 0.6, "median": 0.6, "stddev": 0.1, "rounds": 3, "data": [0.6, 0.5, 0.7]}},
+        {"name": "test_few", "fullname": "bench/test_step.py::test_few", "params": None, "stats":
+            {"min": 2.0, "max": 4.0, "mean": 3.0, "median": 3.0, "stddev": 1.0, "rounds": 9}},
+    ],
+    "datetime": "2026-11-01T11:00:00+00:00",
+    "version": "5.1.0",
+}  # fmt: skip
+GOOGLE = {
+    "context": {"date": "2026-11-01T11:00:00+00:00", "host_name": "desk", "executable": "./build/bench_solver", "num_cpus": 2},
+    "benchmarks": [
+        {"name": "BM_Solve/64", "run_name": "BM_Solve/64", "run_type": "iteration", "real_time": 250.0, "cpu_time": 240.0, "time_unit": "us"},
+        {"name": "BM_Solve/64", "run_name": "BM_Solve/64", "run_type": "iteration", "real_time": 260.0, "cpu_time": 240.0, "time_unit": "us"},
+        {"name": "BM_Solve/64_mean", "run_name": "BM_Solve/64", "run_type": "aggregate", "real_time": 9.0, "cpu_time": 9.0, "time_unit": "us"},
+        {"name": "BM_Old", "real_time": 3.0, "cpu_time": 3.0},
+    ],
+}  # fmt: skip
+ASV = {
+    "commit_hash": COMMIT, "env_name": "py", "date": 1761990000000, "params": {"machine": "desk"}, "python": "3.12",
+    "result_columns": ["result", "params", "version"], "version": 2,
+    "results": {
+        "bench.Suite.time_step": [[0.25], [], "v"],
+        "bench.Suite.time_many": [[0.5, None, 1.5], [["1", "2", "3"]], "v"],
+        "bench.Suite.track_drift": [[0.125], [], "v"],
+        "bench.Suite.time_broken": [None, [], "v"],
+    },
+}  # fmt: skip
+ACTION = {
+    "lastUpdate": 1761990000000,
+    "repoUrl": "https://example.org/ours",
+    "entries": {"Engine": [
+        {"commit": {"id": COMMIT, "timestamp": "2026-11-01T10:00:00Z"}, "date": 1761990000000, "tool": "cargo",
+         "benches": [{"name": "step", "value": 500.0, "unit": "ns/iter", "range": "± 3"}]},
+        {"commit": {"id": "b" * 40, "timestamp": "2026-11-02T10:00:00Z"}, "date": 1762080000000, "tool": "customBiggerIsBetter",
+         "benches": [{"name": "speed", "value": 9.0, "unit": "bodies"}]},
+        {"commit": {"id": "c" * 40, "timestamp": "2026-11-03T10:00:00Z"}, "date": 1762170000000, "tool": "pytest",
+         "benches": [{"name": "rate", "value": 7.0, "unit": "iter/sec"}]},
+    ]},
+}  # fmt: skip
+
+
+def read(said: Any, before: bytes = b"") -> Any:
+    return of_other_tools(before + json.dumps(said).encode(), "file")
+
+
+def values(run: Any) -> dict[str, tuple[float, str, str]]:
+    told = {d.key: d for d in run.series}
+    return {
+        s.series.split("/default/")[0]: (float(s.value), told[s.series].unit, told[s.series].better)
+        for s in run.samples
+    }
+
+
+def test_pytest_benchmark_keeps_every_repeat_and_the_commit() -> None:
+    (run,) = read(PYTEST)
+
+    assert values(run) == {
+        "bench/test_step.py::test_step": (0.5, "s", "smaller"), "bench/test_step.py::test_few": (2.0, "s", "smaller"),
+    }  # fmt: skip
+    assert run.samples[0].timing.seconds == (0.6, 0.5, 0.7)
+    assert (run.engine.name, run.engine.git_hash, run.machine.fingerprint) == ("ours", COMMIT, "desk")
+
+
+def test_google_benchmark_in_seconds_without_its_aggregates() -> None:
+    (run,) = read(GOOGLE)
+
+    assert values(run) == {
+        "BM_Solve/64": (pytest.approx(2.5e-4), "s", "smaller"),
+        "BM_Old": (pytest.approx(3e-9), "s", "smaller"),
+    }
+    assert len(run.samples[0].timing.seconds) == 2
+    assert run.engine.name == "bench_solver"
+
+
+def test_asv_with_parameters_and_what_is_no_time() -> None:
+    (run,) = read(ASV)
+
+    assert values(run) == {
+        "bench.Suite.time_step": (0.25, "s", "smaller"), "bench.Suite.time_many[0]": (0.5, "s", "smaller"),
+        "bench.Suite.time_many[2]": (1.5, "s", "smaller"), "bench.Suite.track_drift": (0.125, "1", "smaller"),
+    }  # fmt: skip
+    assert run.engine.git_hash == COMMIT
+
+
+def test_github_action_benchmark_is_a_history() -> None:
+    runs = read(ACTION, b"window.BENCHMARK_DATA = ")
+
+    assert [next(iter(values(run).values())) for run in runs] == [
+        (pytest.approx(5e-7), "s", "smaller"), (9.0, "bodies", "larger"), (7.0, "iter/sec", "larger"),
+    ]  # fmt: skip
+    assert [run.engine.git_hash[0] for run in runs] == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize("said", [PYTEST, GOOGLE, ASV, ACTION])
+def test_times_are_judged_as_noisy_and_decide_nothing(said: Any) -> None:
+    for run in read(said):
+        assert {(d.kind, d.role) for d in run.series} == {("time", "reported")}
+
+
+def test_the_same_file_twice_is_one_run() -> None:
+    assert read(PYTEST)[0].id == read(PYTEST)[0].id
+    assert read(PYTEST)[0].id != read(PYTEST | {"datetime": "2026-11-02T11:00:00+00:00"})[0].id
+
+
+@pytest.mark.parametrize("said", [{}, [], 3, {"benchmarks": []}, {"results": []}, {"schema_version": 1}])
+def test_what_is_nobody_elses_is_left_to_others(said: Any) -> None:
+    assert read(said) is None
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        PYTEST | {"benchmarks": [{}]},
+        PYTEST | {"benchmarks": [{"fullname": "x", "stats": {"data": [-1.0]}}]},
+        PYTEST | {"benchmarks": [{"fullname": "x", "stats": {"data": ["fast"]}}]},
+        GOOGLE | {"benchmarks": [{"name": "x", "real_time": 1.0, "time_unit": "years"}]},
+        ASV | {"date": "yesterday"},
+        ASV | {"date": 1e300},
+        ACTION | {"entries": {"x": [{}]}},
+        ACTION | {"entries": 3},
+    ],
+)
+def test_what_makes_no_sense_is_one_sentence(said: Any) -> None:
+    with pytest.raises(DocumentError) as refused:
+        read(said)
+
+    assert str(refused.value).startswith("file")
+    assert len(str(refused.value)) < 400

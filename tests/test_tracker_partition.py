@@ -1,0 +1,73 @@
+"""The SQL for TimescaleDB and Citus, run on a real PostgreSQL whose extensions are stood in for by what they demand.
+
+TimescaleDB wants the time in every unique key of a hypertable; Citus the distribution column in every one, and that
+references from distributed tables go to reference tables. The stand-ins look all of this up in the server's catalogue.
+"""
+
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import text
+
+from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.partition import is_large, statements
+
+IN_EVERY_KEY = """
+CREATE FUNCTION in_every_key(laid regclass, wanted text) RETURNS void LANGUAGE plpgsql AS $$
+BEGIN
+    IF EXISTS (SELECT FROM pg_index i WHERE i.indrelid = laid AND i.indisunique AND NOT EXISTS (
+        SELECT FROM pg_attribute a WHERE a.attrelid = laid AND a.attname = wanted AND a.attnum = ANY (i.indkey)))
+    THEN RAISE EXCEPTION '% is not in every unique key of %', wanted, laid; END IF;
+END $$"""
+STAND_INS = {
+    "timescaledb": (
+        """CREATE FUNCTION create_hypertable(relation regclass, dimension name,
+            chunk_time_interval interval DEFAULT NULL, migrate_data boolean DEFAULT false) RETURNS void
+            LANGUAGE sql AS $$ SELECT in_every_key(relation, dimension) $$""",
+    ),
+    "citus": (
+        "CREATE TABLE referred (name text)",
+        """CREATE FUNCTION create_reference_table(laid regclass) RETURNS void LANGUAGE sql AS
+            $$ INSERT INTO referred VALUES (laid::text) $$""",
+        """CREATE FUNCTION create_distributed_table(laid regclass, wanted text, colocate_with regclass DEFAULT NULL)
+            RETURNS void LANGUAGE plpgsql AS $$
+            BEGIN
+                PERFORM in_every_key(laid, wanted);
+                IF EXISTS (SELECT FROM pg_constraint c WHERE c.conrelid = laid AND c.contype = 'f'
+                    AND c.confrelid::regclass::text NOT IN (SELECT name FROM referred))
+                THEN RAISE EXCEPTION '% refers to a table that is not a reference table', laid; END IF;
+            END $$""",
+    ),
+}
+
+
+@pytest.mark.parametrize("extension", ["timescaledb", "citus"])
+def test_the_statements_ask_for_nothing_the_keys_do_not_give(postgresql_url: str, extension: str) -> None:
+    engine = open_database(postgresql_url)
+    with engine.begin() as connection:
+        for statement in (IN_EVERY_KEY, *STAND_INS[extension]):
+            connection.execute(text(statement.replace(":", "\\:")))
+        first, *rest = statements(extension)  # type: ignore[arg-type]
+        assert first == f"CREATE EXTENSION IF NOT EXISTS {extension};"
+        for statement in rest:
+            connection.execute(text(statement))
+    engine.dispose()
+
+
+def test_every_table_has_its_place() -> None:
+    tables = models.Base.metadata.sorted_tables
+    large = [table.name for table in tables if is_large(table)]
+    by_time, over_servers = list(statements("timescaledb"))[1:], list(statements("citus"))[1:]
+
+    assert [sql.split("'")[1] for sql in by_time] == large
+    assert sorted(sql.split("'")[1] for sql in over_servers) == sorted(table.name for table in tables)
+
+
+def test_the_stand_in_would_see_a_key_without_the_time(postgresql_url: str) -> None:
+    engine = open_database(postgresql_url)
+    with engine.begin() as connection:
+        connection.execute(text(IN_EVERY_KEY.replace(":", "\\:")))
+        with pytest.raises(Exception, match="not in every unique key"):
+            connection.execute(text("SELECT in_every_key('run', 'started_at')"))
+    engine.dispose()

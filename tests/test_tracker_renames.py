@@ -1,0 +1,72 @@
+"""A test or a metric that is renamed in the catalogue goes on where it stood under its old name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from click.testing import CliRunner
+
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.library import record, run
+
+OLD = CATALOGUE["falling_object"]
+METRIC = OLD.measurements[0].metrics[0]
+NEW = replace(
+    OLD,
+    formerly=("falling_object",),
+    measurements=tuple(
+        replace(
+            m,
+            metrics=tuple(
+                replace(metric, name="renamed", formerly=(METRIC.name,))
+                if metric.name == METRIC.name
+                else metric
+                for metric in m.metrics
+            ),
+            measure=lambda simulate, m=m: {
+                "renamed" if name == METRIC.name else name: value
+                for name, value in m.measure(simulate).items()
+            },
+        )
+        for m in OLD.measurements
+    ),
+)
+
+
+BEFORE, AFTER = {"falling_object": OLD}, {"dropped_object": NEW}
+
+
+def measured(catalogue: str) -> Any:
+    return run(catalogue=f"{__name__}:{catalogue}", workers=0)
+
+
+def test_a_renamed_test_and_metric_name_their_earlier_keys() -> None:
+    before = {found.key for found in measured("BEFORE").series}
+    after = measured("AFTER").series
+
+    assert all(before & set(found.aliases) for found in after)
+    assert not any(found.test == "falling_object" for found in after)
+
+
+def test_the_history_of_a_renamed_test_is_one(tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/t.db"
+    record(measured("BEFORE"), database)
+    record(measured("AFTER"), database)
+    shown = CliRunner().invoke(main, ["trend", "dropped_object", "renamed", "--db", database]).output
+
+    assert "(values: 2," in shown
+    assert CliRunner().invoke(main, ["compare", "previous", "latest", "--db", database]).exit_code in (0, 3)
+
+
+def test_a_new_name_alone_is_not_another_definition() -> None:
+    from spook_tracker.tracker.measure.question import metric_series
+
+    first = OLD.measurements[0]
+    renamed = replace(METRIC, name="renamed", formerly=(METRIC.name,))
+
+    old, new = (metric_series("t", OLD, first, metric).test_version for metric in (METRIC, renamed))
+    assert old == new
+    assert metric_series("t", OLD, first, replace(METRIC, name="renamed")).test_version != old

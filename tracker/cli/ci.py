@@ -1,0 +1,148 @@
+"""`tracker ci`: the two jobs a team's CI has, each one line there, whatever the service.
+
+Where it runs on GitHub ($GITHUB_STEP_SUMMARY, $GITHUB_ACTIONS), what came of it stands in the job's summary and in
+annotations beside the commit. The history travels as a folder of files, one a month.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from spook_tracker.tracker.cli.options import (
+    GREEN,
+    RED,
+    accepted_option,
+    database_option,
+    example,
+    executor_option,
+    limit_option,
+    source_options,
+    website_options,
+    workers_option,
+)
+
+HISTORY = click.option(
+    "--history",
+    metavar="DIR",
+    default="history",
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Where the files of the months lie.",
+)
+
+
+@click.group("ci", epilog=example("tracker ci night", "tracker ci change"))
+def ci() -> None:
+    """A night, or a proposed change, in a CI service: history in, measure, judge, tell, history out."""
+
+
+@ci.command(epilog=example("tracker ci night --history history --out public"))
+@HISTORY
+@click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
+@click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
+@click.option(
+    "--site", metavar="URL", default="", help="Where the website will be, for links in the summary."
+)
+@executor_option
+@workers_option
+@limit_option
+@website_options
+@accepted_option
+@source_options
+@database_option
+@click.pass_context
+def night(
+    context: click.Context, /, history: Path, out: Path, site: str, accepted: Path | None, database: str,
+    **asked: Any,
+) -> None:  # fmt: skip
+    """`tracker nightly` between the history that was kept and the history to keep."""
+    from spook_tracker.tracker.cli.history import accepted_levels, history_of
+    from spook_tracker.tracker.cli.main import nightly
+    from spook_tracker.tracker.cli.report_ci import commands_of, night_markdown
+    from spook_tracker.tracker.library import judge
+    from spook_tracker.tracker.store.months import export_months
+
+    _bring_in(history, database)
+    same = {"json_file": None, "junit_file": None, "with_database": False}
+    code = _code_of(context, nightly, out=out, accepted=accepted, database=database, **same, **asked)
+    with history_of(database) as kept:
+        run = kept.resolve("latest")
+        findings = judge(kept, run.id, accepted_levels(accepted))
+        written = export_months(kept, history)
+    click.echo(f"history: {', '.join(path.name for path in written) or 'nothing new'} in {history}")
+    _tell(night_markdown(run, findings, site), commands_of(findings))
+    context.exit(code)
+
+
+@ci.command(epilog=example("tracker ci change --base last-green"))
+@HISTORY
+@click.option(
+    "--base", metavar="V", default="last-green", show_default=True, help="What it is compared with."
+)
+@executor_option
+@workers_option
+@limit_option
+@accepted_option
+@source_options
+@database_option
+@click.pass_context
+def change(
+    context: click.Context, /, history: Path, base: str, accepted: Path | None, database: str, **asked: Any
+) -> None:
+    """Measure a proposed change and compare it with the history; nothing of it is kept."""
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.history import accepted_levels, history_of
+    from spook_tracker.tracker.cli.main import run_command
+    from spook_tracker.tracker.cli.report_comment import workflow_commands
+    from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
+    from spook_tracker.tracker.library import compare
+
+    known = _bring_in(history, database)
+    same: dict[str, Any] = {"tests": (), "json_file": None, "junit_file": None}
+    same |= dict.fromkeys(("sweep", "stability", "figures", "no_record", "everything"), False)
+    code = _code_of(context, run_command, database=database, **same, **asked)
+    if not known:
+        _tell("No history yet: this run has nothing to be compared with.\n", [])
+        context.exit(code)
+    with history_of(database) as kept:
+        document = compare(kept, base, "latest", accepted_levels(accepted))
+    say(compare_table(document))
+    _tell(compare_markdown(document), workflow_commands(document).splitlines())
+    context.exit(document.exit_code)
+
+
+def _bring_in(folder: Path, database: str) -> int:
+    """Record what the folder holds; returns how many runs that is."""
+    from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.months import import_months, is_month
+
+    files = sorted(path for path in folder.glob("*") if is_month(path)) if folder.is_dir() else []
+    with session_on(database) as session:
+        stored, present = import_months(session, files)
+    click.echo(f"history: {stored} runs recorded, {present} were there already")
+    return stored + present
+
+
+def _code_of(context: click.Context, command: click.Command, **arguments: Any) -> int:
+    """Its exit code; what is neither green nor red ends this command, too."""
+    try:
+        context.invoke(command, **arguments)
+    except click.exceptions.Exit as ended:
+        if ended.exit_code not in (GREEN, RED):
+            raise
+        return ended.exit_code
+    return GREEN
+
+
+def _tell(markdown: str, commands: list[str]) -> None:
+    """To the service, where there is one that listens."""
+    if summary := os.environ.get("GITHUB_STEP_SUMMARY"):
+        with Path(summary).open("a", encoding="utf-8") as file:
+            file.write(markdown + "\n")
+    if os.environ.get("GITHUB_ACTIONS") == "true":
+        for command in commands:
+            click.echo(command)

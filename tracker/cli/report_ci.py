@@ -1,0 +1,57 @@
+"""What a CI service shows of a night: a summary in Markdown, and annotations beside the commit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from spook_tracker.tracker.cli.report_comment import command_of
+from spook_tracker.tracker.cli.report_compare import escape, summary, value
+from spook_tracker.tracker.document.wording import clock, page_of, version
+from spook_tracker.tracker.judge.causes import causes_tonight
+from spook_tracker.tracker.judge.tonight import Finding
+
+MOST = 40  # rows of a summary
+MOST_ANNOTATIONS = 10  # GitHub shows as many of a step
+
+
+def night_markdown(run: object, findings: Sequence[Finding], site: str = "") -> str:
+    """One sentence, what broke by cause, and a row for each red series; `site` is the address of the website."""
+    engine, started = run.engine, run.started  # type: ignore[attr-defined]
+    red = [finding for finding in findings if finding.red]
+    lines = [f"### {escape(engine.name)} {escape(version(engine))}, {clock(started)} UTC", ""]
+    lines += [escape(click.unstyle(summary(findings))), ""]
+    causes = causes_tonight(findings)
+    if len(causes) < len(red):
+        lines += [*(f"- {escape(cause.sentence)}" for cause in causes), ""]
+    if red:
+        lines += ["| series | what | before | now | since |", "|---|---|---:|---:|---|"]
+    for finding in red[:MOST]:
+        cells = (_linked(finding, site), *map(escape, (finding.name, *_values(finding), finding.blame)))
+        lines.append("| " + " | ".join(cells) + " |")
+    if len(red) > MOST:
+        lines.append(f"\nand {len(red) - MOST} more")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def commands_of(findings: Sequence[Finding]) -> list[str]:
+    """A workflow command of GitHub for each red series, the worst first; nothing in it can end it or begin another."""
+    red = [finding for finding in findings if finding.red]
+    return [
+        command_of(f"{f.test}: {f.name}", f"{f.series}: {' → '.join(_values(f))}; {f.verdict.sentence}")
+        for f in red[:MOST_ANNOTATIONS]
+    ]
+
+
+def _values(finding: Finding) -> tuple[str, str]:
+    judged, definition = finding.judged, finding.definition
+    if judged is None or definition is None:
+        return "", ""
+    before = judged.against.sample.value if judged.against else None
+    return value(before), value(judged.night.sample.value, definition.unit)
+
+
+def _linked(finding: Finding, site: str) -> str:
+    name = escape(finding.series)
+    return f"[{name}]({site.rstrip('/')}/{page_of(finding.test)})" if site else name
