@@ -288,12 +288,12 @@ MUTANTS = (
     ),
     wrong(
         "joints",
-        "free-gears",
-        "relations do not see how fast their joints turn",
+        "worn-gears",
+        "the ratio of a pair of gears is off by a thousandth",
         "gears",
         "rigid/general_rows.cpp",
-        "sum.rate += c * row.rate;",
-        "sum.rate += 0.0 * c * row.rate;",
+        "const double c = term.coefficient;",
+        "const double c = 0.001 + term.coefficient;",
     ),
     wrong(
         "joints",
@@ -486,6 +486,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="mutants to try; all if none is named")
     parser.add_argument("--tonight", type=int, metavar="N", help="N of them, others every night")
+    parser.add_argument("--commit", default="HEAD", metavar="REV", help="which engine to spoil")
     parser.add_argument(
         "--keep", type=Path, metavar="DIR", help="build there, and leave it for the next time"
     )

@@ -45,3 +45,13 @@ def test_a_few_each_night_are_all_of_them_in_time() -> None:
 
     assert len(mutants.tonights(4, first)) == 4
     assert seen == {mutant.name for mutant in mutants.MUTANTS}
+
+
+def test_the_command_reads_its_options(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Down to the commit that is looked for: the rest builds engines."""
+    monkeypatch.setattr("sys.argv", ["mutants.py", "sticky", "--commit", "nobody"])
+
+    with pytest.raises(mutants.commits.CommitError, match="git knows no commit 'nobody'"):
+        mutants.main()
