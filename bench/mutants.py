@@ -401,12 +401,12 @@ MUTANTS = (
         "return 0.0, None",
     ),
     judged(
-        "sum-of-ratios",
-        "the slow-down of a ladder is the sum over its rungs, not their mean",
-        "test_tracker_noise.py::test_one_slow_rung_is_not_a_slower_engine",
-        "judge/timing_statistics.py",
-        "for a, b in rungs) / len(rungs))",
-        "for a, b in rungs))",
+        "larger-is-not-better",
+        "where larger is better, more is called worse",
+        "test_judge_rules.py::test_where_larger_is_better_less_is_worse",
+        "judge/slower.py",
+        "return -change if larger_is_better else change",
+        "return change",
     ),
 )
 

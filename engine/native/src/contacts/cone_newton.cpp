@@ -13,8 +13,10 @@ namespace {
 constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
 constexpr double known = 1e-13;                     // of a start that is an answer already
 constexpr double refined = 1e-16;                   // of the square of what a direction is to answer
-constexpr int patience = 40;                        // iterations without a residual of half the best
+constexpr int patience = 60;                        // iterations without half the residual, or half the blur
 constexpr double narrow = 0.03;                     // a step so short has left the path
+constexpr double centre = 0.01;                  // of the blur's square: what is left where the path is met
+constexpr double fastest = 1e-3, slowest = 0.9;  // the blur's next part of itself, learnt on the way
 
 }  // namespace
 
@@ -325,7 +327,9 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     measure(system);
     Left left = worst(), best = left;
     keep();
-    double blur = 0.2 * left.map;
+    double blur = 0.2 * left.map, met = blur,
+           lowest = blur;  // where the path was met last, and nearest to its end
+    double shrink = fastest;
     int stalled = 0;
     const double goal = left.speed > known * speed_ ? tightest * speed_ : unbounded;
     while (best.speed > goal && report.iterations < max_iterations && stalled < patience) {
@@ -337,24 +341,31 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         if (!step(system, blur)) break;
         ++report.iterations;
         const Search found = search(blur);
-        if (found.length == 0.0) {  // off the path: nearer to its middle it is wider
-            blur *= 10.0;
-            ++stalled;
-            continue;
+        if (found.length > 0.0) {
+            for (ConeUnit& unit : units_)
+                for (int i = 0; i < unit.size; ++i) unit.z[i] += found.length * unit.dz[i];
+            measure(system);
+            left = worst();
         }
-        for (ConeUnit& unit : units_)
-            for (int i = 0; i < unit.size; ++i) unit.z[i] += found.length * unit.dz[i];
-        measure(system);
-        left = worst();
         stalled = left.speed < 0.5 * best.speed ? 0 : stalled + 1;
         if (left.speed < best.speed) {
             best = left;
             keep();
         }
-        if (found.after < 1e-4 * blur * blur) blur = std::min(blur, std::max(1e-3 * blur, 0.01 * left.map));
-        else if (found.length < narrow) blur *= 2.0;
+        if (found.length < narrow) {  // off the path: back towards where it was met, then less far at once
+            shrink = std::min(std::sqrt(shrink), slowest);
+            blur = blur < met ? shrink * met : 2.0 * blur;
+            met = std::max(met, blur);
+            continue;
+        }
+        if (found.after < centre * blur * blur) {
+            if (blur < 0.5 * lowest) lowest = blur, stalled = 0;
+            met = blur;
+            if (found.length == 1.0) shrink = std::max(shrink * shrink, fastest);
+        }
+        if (found.after < 1e-4 * blur * blur) blur = std::min(blur, std::max(shrink * blur, 0.01 * left.map));
         else if (found.after < 0.25 * found.before)
-            blur = std::min(blur, std::max(0.05 * blur, 0.2 * left.map));
+            blur = std::min(blur, std::max(std::max(0.05, shrink) * blur, 0.2 * left.map));
     }
     for (std::size_t k = 0; k < units_.size(); ++k) {
         ConeUnit& unit = units_[k];

@@ -38,7 +38,7 @@ struct ConeReport {
 class ConeNewton {
 public:
     double relief = 1e-7;  // of a row's own (G M⁻¹ Gᵀ)ᵢᵢ, in the factored matrix only
-    int max_iterations = 150;
+    int max_iterations = 100;
     int max_directions = 6;  // of a step, against the matrix without relief
 
     /// Starts from the multipliers in `system` and fills velocities and multipliers with the best it met. Points obey the

@@ -21,6 +21,7 @@ constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redunda
 constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr int quick_rounds = 4;         // what rests or moves on as it did is found within these, exactly
 constexpr int longest_wait = 16;        // solves
+constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 
 void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexcept {
     for (int i = point.row; i < point.row + point.size; ++i) {
@@ -96,7 +97,6 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
 void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<FrictionPoint>& points,
                       FrictionModel model, FrictionReport& report) {
     if (start.rows.empty()) return;
-    constexpr double poor = 1e-4;
     double speed = 0.0;
     for (std::size_t b = 0; b < start.mass.size(); ++b) {
         Vec6 v = start.momentum[b];
@@ -123,22 +123,6 @@ bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& 
     // Rigid joints need the factor of the whole, not a relief.
     return std::all_of(system.rows.begin(), system.rows.end(),
                        [](const RowBlock& block) { return block.lower[0] == 0.0; });
-}
-
-/// True when Newton's method solved it; else the system is as it was: wedged, or rigid contacts that contradict.
-bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
-                     FrictionReport& report) {
-    MixedSystem start = system;
-    const ConeReport found = direct.newton.solve(system, points);
-    report.rounds += found.iterations;
-    if (!found.converged) {
-        system = std::move(start);
-        return false;
-    }
-    report.residual = found.residual;
-    report.converged = true;
-    for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
-    return true;
 }
 
 /// Pivoting with bounds and directions renewed until the law holds; `quick`: given up where it is not near.
@@ -256,6 +240,24 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
     return false;
 }
 
+/// What Newton's method found; the report says how near the law it is. False if that is poor, and the system as it was:
+/// wedged, or rigid contacts that contradict. What is near is not handed on to pivoting: where Newton's method stalls,
+/// thousands of pivots were seen to end no nearer.
+bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
+                     FrictionReport& report) {
+    MixedSystem start = system;
+    const ConeReport found = direct.newton.solve(system, points);
+    report.rounds += found.iterations;
+    if (!(found.residual <= poor)) {
+        system = std::move(start);
+        return false;
+    }
+    report.residual = found.residual;
+    report.converged = found.converged;
+    for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
+    return true;
+}
+
 }  // namespace
 
 bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
@@ -294,16 +296,20 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
                                      FrictionModel model, DirectSolver& direct, int max_rounds) {
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
+    MixedSystem start;
     if (is_for_newton(system, points, model)) {
         if (settle_quickly(system, points, model, direct, report)) return report;
         if (solve_by_newton(system, points, direct, report)) return report;
-    }
-    MixedSystem start;
-    if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
-                                       [](const RowBlock& block) { return block.lower[0] == 0.0; }))
         start = system;
-    if (settle_by_rounds(system, points, model, direct.pivot, max_rounds, false, report) || !report.finite)
-        return report;
+        report.residual = unbounded;
+    } else {
+        if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
+                                           [](const RowBlock& block) { return block.lower[0] == 0.0; }))
+            start = system;
+        if (settle_by_rounds(system, points, model, direct.pivot, max_rounds, false, report) ||
+            !report.finite)
+            return report;
+    }
     finish_by_sweeps(system, start, points, model, report);
     return report;
 }

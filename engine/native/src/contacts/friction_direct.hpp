@@ -31,8 +31,9 @@ struct DirectSolver {
 /// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
 /// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// Systems of contacts alone with more than 24 blocks, under the cone or without friction, get a few of these rounds,
-/// which settle what rests exactly, and go to Newton's method then (`contacts/cone_newton.hpp`); what it does not
-/// settle to 1e-9 of the speeds starts anew as above. Where the few rounds failed they wait, up to 16 solves.
+/// which settle what rests exactly, and go to Newton's method then (`contacts/cone_newton.hpp`): what it leaves within
+/// 1e-4 of the speeds is the answer, and converged within 1e-9; else sweeps finish. Where the few rounds failed they
+/// wait, up to 16 solves.
 /// On return FrictionPoint::normal is the normal impulse.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);
