@@ -344,7 +344,8 @@ TEST = ScalarTest(
                     name=order,
                     method=Method(composition=order),
                     expected_order=float(order[-1]),
-                    order_range=(1 / 80, 1 / 48),
+                    # Order 8 at 1/80 is off by 1e-12 m, a few roundings of the 1600 steps.
+                    order_range=(1 / 64, 1 / 32) if order == "order8" else (1 / 80, 1 / 48),
                 )
                 for order in ORDERS
             ),
