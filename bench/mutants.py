@@ -128,7 +128,7 @@ MUTANTS = (
         "particles",
         "fast-clock",
         "places move on by 1.0001 steps",
-        "falling_object",
+        "pendulum",
         (
             (
                 f"{SRC}/particles/particle_system.cpp",
