@@ -25,10 +25,11 @@ Polytope::Polytope(std::vector<Vec3> given, std::vector<int> rounds, const std::
         face.area = 0.5 * norm(twice);
         face.normal = (1.0 / norm(twice)) * twice;
         for (int k = 0; k < count; ++k) face.offset += dot(face.normal, corner_of(face, k)) / count;
-        for (int k = 0; k < count; ++k)
-            sides[{loops[static_cast<std::size_t>(begin + k)],
-                   loops[static_cast<std::size_t>(begin + (k + 1) % count)]}] =
+        for (int k = 0; k < count; ++k) {
+            const int from = begin + k, to = begin + (k + 1) % count;
+            sides[{loops[static_cast<std::size_t>(from)], loops[static_cast<std::size_t>(to)]}] =
                 static_cast<int>(faces.size());
+        }
         volume += face.offset * face.area / 3.0;
         faces.push_back(face);
         begin += count;

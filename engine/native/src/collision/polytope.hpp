@@ -35,8 +35,8 @@ struct Polytope {
 
     /// The corner k of a face, 0 … count − 1 and round again.
     Vec3 corner_of(const Face& face, int k) const noexcept {
-        return corners[static_cast<std::size_t>(
-            loops[static_cast<std::size_t>(face.begin + k % face.count)])];
+        const int place = face.begin + k % face.count;
+        return corners[static_cast<std::size_t>(loops[static_cast<std::size_t>(place)])];
     }
 };
 

@@ -19,7 +19,8 @@ struct Solid {
     const Polytope::Face& face(int k) const noexcept { return shape.faces[static_cast<std::size_t>(k)]; }
     Vec3 normal(int k) const noexcept { return rotation * face(k).normal; }
     Vec3 corner_of(const Polytope::Face& face, int k) const noexcept {
-        return corners[shape.loops[static_cast<std::size_t>(face.begin + k % face.count)]];
+        const int place = face.begin + k % face.count;
+        return corners[shape.loops[static_cast<std::size_t>(place)]];
     }
     double lowest(Vec3 n) const noexcept;  // least n · corner
 };

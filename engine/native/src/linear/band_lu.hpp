@@ -24,7 +24,8 @@ public:
     int reach() const noexcept { return reach_; }
     void clear() noexcept { std::fill(values_.begin(), values_.end(), 0.0); }
     double& at(int i, int j) noexcept {
-        return values_[static_cast<std::size_t>(i * width_ + j - i + reach_)];
+        const int place = i * width_ + j - i + reach_;
+        return values_[static_cast<std::size_t>(place)];
     }
 
     /// False when a pivot is zero or not finite.

@@ -164,7 +164,8 @@ bool JointTree::close(const LargeArray<BodyState>& start) {
     start_rows_.assign(static_cast<std::size_t>(reduced), 0.0);
     end_rows_ = start_rows_;
     multiplier_.assign(static_cast<std::size_t>(rows_), 0.0);
-    right_.assign(static_cast<std::size_t>(coordinates_ + rows_), 0.0);
+    const int unknowns = coordinates_ + rows_;
+    right_.assign(static_cast<std::size_t>(unknowns), 0.0);
     step_.assign(static_cast<std::size_t>(coordinates_), 0.0);
     return independent(start);
 }
@@ -217,8 +218,10 @@ bool JointTree::independent(const LargeArray<BodyState>& start) {
         reduce(loop, rows, false, reduced);
         for (int i = 0; i < loop.kept; ++i) {
             std::vector<double> row(width, 0.0);
-            for (const Closing::Column& column : loop.columns)
-                row[static_cast<std::size_t>(nodes_[column.node].first + column.coordinate)] = *reduced++;
+            for (const Closing::Column& column : loop.columns) {
+                const int place = nodes_[column.node].first + column.coordinate;
+                row[static_cast<std::size_t>(place)] = *reduced++;
+            }
             const auto size = [&] {
                 double sum = 0.0;
                 for (double entry : row) sum += entry * entry;
@@ -277,7 +280,8 @@ bool JointTree::order() {
     for (std::size_t l = 0; l < loops_.size(); ++l)
         for (int i = 0; i < loops_[l].kept; ++i)
             numbers[trees + l].push_back(coordinates_ + loops_[l].at + i);
-    place_of_.assign(static_cast<std::size_t>(coordinates_ + rows_), 0);
+    const int unknowns = coordinates_ + rows_;
+    place_of_.assign(static_cast<std::size_t>(unknowns), 0);
     int next = 0;
     for (std::size_t from = 0; from < count; ++from) {
         if (seen[from]) continue;
