@@ -24,10 +24,7 @@ SPANS = (4, 6)  # last nights looked at together
 BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # by permutation, of a shift in one series on one night
-RARER = 4.013  # standard deviations, by the t test: one in 33 000
-REMEMBERED = (
-    4.265  # the same of nights that remember each other, by a model of how: one in a hundred thousand
-)
+RARER = 4.265  # standard deviations, by the t test: one in a hundred thousand
 LEAST = 0.01  # relative: no shift below is told
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
 CLIP = 6.0  # noises: what lies further out counts as if it lay there
@@ -97,8 +94,7 @@ def standard_error(base: Values, span: int) -> float:
         return math.inf
     own = sum((1.0 - k / span) * memory**k for k in range(1, span))
     variance = float(np.var(base, ddof=1)) / (1.0 - together / count if memory else 1.0)
-    clear = student(independent - 1.0, REMEMBERED if memory else RARER)
-    return clear * math.sqrt(variance * ((1.0 + 2.0 * own) / span + together / count))
+    return student(independent - 1.0) * math.sqrt(variance * ((1.0 + 2.0 * own) / span + together / count))
 
 
 def remembered(base: Values) -> float:
@@ -118,9 +114,9 @@ def remembered(base: Values) -> float:
     return min(strongest, 0.98)
 
 
-def student(freedom: float, deviations: float = RARER) -> float:
-    """The quantile of Student's t that is as rare as so many deviations of a normal one (Wallace 1959)."""
-    z = deviations * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0)
+def student(freedom: float) -> float:
+    """The quantile of Student's t that is exceeded with one probability in 100 000 (Wallace 1959)."""
+    z = RARER * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0)
     return math.sqrt(freedom * math.expm1(min(z * z / freedom, 700.0)))
 
 
