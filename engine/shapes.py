@@ -6,6 +6,7 @@ A new shape says here what it is called, which columns the native side gets and 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
@@ -15,7 +16,7 @@ from spook_tracker.engine.check import Rotation, Vector
 from spook_tracker.engine.errors import SceneError
 
 
-class Shape:
+class Shape(ABC):
     """Base of every shape; `inertia(mass)` gives the principal moments [kg m²] at uniform density."""
 
     __slots__ = ()
@@ -30,8 +31,8 @@ class Shape:
         """What it is drawn with: see DrawnSolid."""
         return ()
 
-    def inertia(self, mass: float) -> Vector:
-        raise NotImplementedError
+    @abstractmethod
+    def inertia(self, mass: float) -> Vector: ...
 
 
 @dataclass(frozen=True, slots=True)

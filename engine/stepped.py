@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import subprocess
 import time
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import ClassVar, Protocol
 
@@ -48,7 +49,7 @@ class World(Protocol):
         ...
 
 
-class Stepped:
+class Stepped(ABC):
     """The part of an adapter that is the same for every engine that can be stepped."""
 
     name: ClassVar[str]
@@ -63,9 +64,9 @@ class Stepped:
         """Which commit this is."""
         return self._info
 
+    @abstractmethod
     def world(self, task: Task) -> World:
         """The scene of a task, ready to be stepped. May raise NotSupported."""
-        raise NotImplementedError
 
     def record(self, task: Task) -> Recording:
         """Step the world and keep what the task asks for."""

@@ -23,7 +23,9 @@ def test_a_mutant_has_one_place_in_the_sources_and_a_test_that_is_named_for_it(
     mutant: mutants.Mutant,
 ) -> None:
     for file, old, new in mutant.changes:
-        assert (ROOT / file).read_text(encoding="utf-8").count(old) == 1, "bring bench/mutants.py up to date"
+        assert (ROOT / file).read_text(encoding="utf-8").count(old) == 1, (
+            "bring bench/mutant_list.py up to date"
+        )
         assert old != new
     if mutant.of_the_suite:
         file, _, name = mutant.caught_by.partition("::")

@@ -1,0 +1,124 @@
+"""Where limits of contact scenes come from: equations of motion, moments, and limit analysis, without the engine."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from spook_tracker.engine import RigidBody
+from spook_tracker.scalar_tests import masonry_arch, rolling_coin, turntable, vehicle
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+
+
+def test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn() -> None:
+    turn = turntable.CIRCLE * turntable.TIME_STEP
+    places = turntable.recursion(turntable.TIME_STEP, turntable.STEPS)
+    angles = np.unwrap(np.angle(np.diff(places)))
+    found = (angles[-1] - angles[0]) / ((turntable.STEPS - 1) * turn) - 1.0
+
+    assert found == pytest.approx(math.atan(turn) / turn - 1.0, rel=1e-9)
+    assert found == pytest.approx(-(turn**2) / 3.0, rel=1e-4)
+    assert CATALOGUE["turntable"].measurements[0].metrics[0].passes(found)
+
+
+@pytest.mark.parametrize("motion", [rolling_coin.COIN, rolling_coin.DISK])
+def test_the_coin_rolls_steadily_by_the_equations_of_motion(motion: rolling_coin.Steady) -> None:
+    """Newton's and Euler's equations with a contact that does not slip, solved for the accelerations at the start."""
+    (body,) = [b for b in rolling_coin.scene(motion).bodies if b.name == "coin"]
+    assert isinstance(body, RigidBody) and body.inertia is not None and body.mass is not None
+    c, s = math.cos(motion.lean), math.sin(motion.lean)
+    turn = np.array([(c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)])
+    inertia = turn @ np.diag(body.inertia) @ turn.T
+    v, w, up = np.array(body.velocity), np.array(body.angular_velocity), np.array((0.0, 0.0, motion.rate))
+    arm = np.array((motion.reach, 0.0, -motion.height))
+    cross = np.array([(0, -arm[2], arm[1]), (arm[2], 0, -arm[0]), (-arm[1], arm[0], 0)])
+    one, none = np.eye(3), np.zeros((3, 3))
+    matrix = np.block([[body.mass * one, none, -one], [none, inertia, -cross], [one, -cross, none]])
+    right = np.concatenate(
+        (
+            (0.0, 0.0, -body.mass * rolling_coin.GRAVITY),
+            -np.cross(w, inertia @ w),
+            -np.cross(w, np.cross(up, arm)),
+        )
+    )
+    found = np.linalg.solve(matrix, right)
+    friction = math.hypot(found[6], found[7]) / found[8]
+
+    np.testing.assert_allclose(v + np.cross(w, arm), 0.0, atol=1e-12)
+    np.testing.assert_allclose(found[:3], np.cross(up, v), atol=1e-9)
+    np.testing.assert_allclose(found[3:6], np.cross(up, w), atol=1e-9)
+    assert friction < rolling_coin.FRICTION
+
+
+def test_the_loads_of_a_braking_vehicle_balance_its_moments() -> None:
+    v = vehicle
+    parts = [(v.CHASSIS, 0.0, v.RADIUS + v.RISE)] + [(v.WHEEL, x, v.RADIUS) for x, _ in v.WHEELS.values()]
+    # Two loads: forces upwards, and moments about the road under the chassis' centre, of weights and of m a.
+    matrix = np.array([(1.0, 1.0), (v.FRONT, -v.REAR)])
+    weights = v.GRAVITY * sum(m for m, _, _ in parts)
+    moment = sum(m * (v.GRAVITY * x + v.BRAKING * z) for m, x, z in parts)
+    front, rear = np.linalg.solve(matrix, (weights, moment))
+
+    assert v.front_load(-v.BRAKING) == pytest.approx(front, rel=1e-12)
+    assert v.front_load(-v.BRAKING, rise=v.TIPPING) == pytest.approx(weights, rel=1e-12)
+    assert rear > 0.0 and pytest.approx(0.19e-6, rel=0.02) == v.SINK
+
+
+def arch_statics(count: int, thickness: float, *, round_stones: bool = False) -> tuple[float, float] | None:
+    """The least and largest thrust over the weight of an arch without sliding; None if no thrust line fits.
+
+    Two forces a joint, at its inner and outer edge, none of them pulling; three balances a stone.
+    """
+    joints = [math.pi * k / count for k in range(count + 1)]
+    inner, outer = 1.0 - 0.5 * thickness, 1.0 + 0.5 * thickness
+    balance, load = np.zeros((3 * count, 4 * (count + 1))), np.zeros(3 * count)
+    for k in range(count):
+        half = 0.5 * math.pi / count
+        # Centre of mass on the bisector: of a sector of a ring, or of the trapezium between its joints.
+        if round_stones:
+            area = (outer**2 - inner**2) * half
+            radius = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2) * math.sin(half) / half
+        else:
+            area = (outer**2 - inner**2) * math.sin(half) * math.cos(half)
+            radius = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2) * math.cos(half)
+        bisector = joints[k] + half
+        centre = radius * np.array([math.cos(bisector), math.sin(bisector)])
+        for joint, sign in ((k, 1.0), (k + 1, -1.0)):
+            outwards = np.array([math.cos(joints[joint]), math.sin(joints[joint])])
+            for edge, at in enumerate((inner, outer)):
+                arm = at * outwards - centre
+                for part, force in enumerate((np.array([-outwards[1], outwards[0]]), outwards)):
+                    column = 4 * joint + 2 * edge + part
+                    balance[3 * k : 3 * k + 2, column] = sign * force
+                    balance[3 * k + 2, column] = sign * (arm[0] * force[1] - arm[1] * force[0])
+        load[3 * k + 1] = area
+    push = np.zeros(balance.shape[1])
+    push[[1, 3]] = 1.0  # along the radius at the first foot: level
+    bounds = [(0.0, None), (None, None)] * (2 * (count + 1))
+    ends = [linprog(side * push, A_eq=balance, b_eq=load, bounds=bounds) for side in (1.0, -1.0)]
+    if any(end.status != 0 for end in ends):
+        return None
+    thrusts = sorted(abs(end.fun) / load.sum() for end in ends)
+    return thrusts[0], thrusts[1]
+
+
+def least_thickness(count: int, *, round_stones: bool = False) -> float:
+    low, high = 0.05, 0.2
+    for _ in range(34):
+        middle = 0.5 * (low + high)
+        if arch_statics(count, middle, round_stones=round_stones) is None:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def test_an_arch_is_as_thin_as_limit_analysis_allows() -> None:
+    for count, known in ((5, 0.0966), (9, 0.1021), (21, 0.1068)):
+        assert least_thickness(count, round_stones=True) == pytest.approx(known, abs=5e-5)
+        assert masonry_arch.LEAST[count] == pytest.approx(least_thickness(count), abs=5e-7)
+        thrust = arch_statics(count, 1.02 * masonry_arch.LEAST[count])
+        assert thrust == pytest.approx(masonry_arch.THRUST[count], abs=2e-5)
