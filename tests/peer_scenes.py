@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,8 @@ from spook_tracker.engine import (
     Velocity,
     Violation,
 )
+from spook_tracker.engine import simulate as ours
+from tests import rigid_scenes
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²
 G = 9.81
@@ -270,3 +274,45 @@ def started(simulate: Any) -> tuple[float, float]:
     speeds = np.array([body.velocity for body in scene.bodies])
     spins = np.array([body.angular_velocity for body in scene.bodies if isinstance(body, RigidBody)])
     return float(np.abs(run["speeds"][0] - speeds).max()), float(np.abs(run["spins"][0] - spins).max())
+
+
+def parted_from_ours(simulate: Any, kind: str) -> float:
+    """Two bodies turned at random, from rest, on a joint of that kind: how far they are from where our engine has
+    them after half a second, over the way they went. Both converge to one motion."""
+    drawn = rigid_scenes.one_joint(np.random.default_rng(7), kind, bodies=2)
+    joint = drawn.constraints[0]
+    names = [name for name in ("name", "between", "at", "axis", "cross_axis") if hasattr(joint, name)]
+    rigid = type(joint)(**{name: getattr(joint, name) for name in names}, compliance=0.0)
+    still = [replace(b, velocity=(0, 0, 0), angular_velocity=(0, 0, 0)) for b in drawn.bodies]  # type: ignore[arg-type]
+    hold = Ball(name="hold", between=("world", "b0"), at=(0.5, 0.0, 0.0), compliance=0.0)
+    scene = Scene(bodies=tuple(still), constraints=(hold, rigid), gravity=rigid_scenes.GRAVITY)
+    observe = {"path": Trace(quantity=Position(), every=500)}
+
+    theirs, mine = (
+        asked(scene, time_step=1e-3, duration=0.5, observe=observe)["path"] for asked in (simulate, ours)
+    )
+    moved = float(np.abs(mine[-1] - mine[0]).max())
+    assert moved > 0.02
+    return float(np.abs(theirs[-1] - mine[-1]).max()) / moved
+
+
+def set_going(
+    simulate: Any, *, slides: bool = True, bodies: Sequence[Particle] = (), joints: Sequence[Distance] = ()
+) -> Any:
+    """Speeds (2, n, 3) m/s before and after one step of a hinged body, one on a slide (or free) and those given."""
+    turning = RigidBody(
+        name="turning",
+        mass=1.0,
+        inertia=(1.0, 1.0, 1.0),
+        position=(1.0, 0.0, 0.0),
+        velocity=(0.0, 2.0, 0.0),
+        angular_velocity=(0.0, 0.0, 2.0),
+    )
+    sliding = RigidBody(
+        name="sliding", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0, 0, 2.0), velocity=(3.0, 0.0, 0.0)
+    )
+    hinge = Hinge(name="hinge", between=("world", "turning"), at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    slide = Prismatic(name="slide", between=("world", "sliding"), axis=(1.0, 0.0, 0.0))
+    held = (hinge, slide) if slides else (hinge,)
+    scene = Scene(bodies=(turning, sliding, *bodies), constraints=(*held, *joints), gravity=(0.0, 0.0, 0.0))
+    return simulate(scene, time_step=1e-3, steps=1, observe={"v": Trace(quantity=Velocity())})["v"]

@@ -32,10 +32,9 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
-from spook_tracker.engine import simulate as ours
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from tests import peer_scenes, rigid_scenes
+from tests import peer_scenes
 
 pytest.importorskip("dartpy", reason="the extra dart is not installed: pip install 'spook-tracker[dart]'")
 STEP = 1.0 / 60.0  # s
@@ -95,43 +94,13 @@ def test_the_force_of_a_joint_is_the_weight_it_holds(kind: Any, backwards: bool)
 )
 def test_joints_between_moving_bodies_move_as_in_our_engine(kind: str, configuration: str) -> None:
     """Two bodies turned at random, from rest: both engines converge to one motion; impulses less well."""
-    drawn = rigid_scenes.one_joint(np.random.default_rng(7), kind, bodies=2)
-    joint = drawn.constraints[0]
-    names = [name for name in ("name", "between", "at", "axis", "cross_axis") if hasattr(joint, name)]
-    rigid = type(joint)(**{name: getattr(joint, name) for name in names}, compliance=0.0)
-    still = [replace(b, velocity=(0, 0, 0), angular_velocity=(0, 0, 0)) for b in drawn.bodies]  # type: ignore[arg-type]
-    hold = Ball(name="hold", between=("world", "b0"), at=(0.5, 0.0, 0.0), compliance=0.0)
-    scene = Scene(bodies=tuple(still), constraints=(hold, rigid), gravity=rigid_scenes.GRAVITY)
-    observe = {"path": Trace(quantity=Position(), every=500)}
-
-    theirs = run(configuration)(scene, time_step=1e-3, duration=0.5, observe=observe)
-    mine = ours(scene, time_step=1e-3, duration=0.5, observe=observe)
-
-    moved = float(np.abs(mine["path"][-1] - mine["path"][0]).max())
-    assert moved > 0.02
-    assert theirs["path"][-1] == pytest.approx(mine["path"][-1], abs=0.02 * moved)
+    assert peer_scenes.parted_from_ours(run(configuration), kind) < 0.02
 
 
 @pytest.mark.parametrize("configuration", BOTH)
 def test_speeds_at_the_start_are_those_of_the_scene(configuration: str) -> None:
     """A hinged body and one on a slide, set going, are read back before any step."""
-    turning = RigidBody(
-        name="turning",
-        mass=1.0,
-        inertia=(1.0, 1.0, 1.0),
-        position=(1.0, 0.0, 0.0),
-        velocity=(0.0, 2.0, 0.0),
-        angular_velocity=(0.0, 0.0, 2.0),
-    )
-    sliding = RigidBody(
-        name="sliding", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0, 0, 2.0), velocity=(3.0, 0.0, 0.0)
-    )
-    hinge = Hinge(name="hinge", between=("world", "turning"), at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-    slide = Prismatic(name="slide", between=("world", "sliding"), axis=(1.0, 0.0, 0.0))
-    joints = (hinge, slide) if configuration == "joints" else (hinge,)
-    speeds = {"speeds": Trace(quantity=Velocity())}
-    scene = Scene(bodies=(turning, sliding), constraints=joints, gravity=(0.0, 0.0, 0.0))
-    found = run(configuration)(scene, time_step=1e-3, steps=1, observe=speeds)["speeds"]
+    found = peer_scenes.set_going(run(configuration), slides=configuration == "joints")
 
     assert found[0] == pytest.approx(np.array([[0.0, 2.0, 0.0], [3.0, 0.0, 0.0]]), abs=1e-12)
     assert found[1] == pytest.approx(found[0], abs=5e-3)
