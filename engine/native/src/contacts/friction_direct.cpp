@@ -21,6 +21,7 @@ constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redunda
 constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr int quick_rounds = 4;         // what rests or moves on as it did is found within these, exactly
 constexpr int longest_wait = 16;        // solves
+constexpr int lost_rounds = 8;          // in a row without an end of the pivoting: it goes in circles
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 
 void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexcept {
@@ -160,6 +161,7 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     bool same_matrix = false;
     Acceleration acceleration;
     double accepted = settled;
+    int lost = 0;
     std::vector<double> used(points.size()), given(points.size());
     const int round_limit = solver.round_limit;
     if (quick) solver.round_limit = quick_rounds;
@@ -202,6 +204,8 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
         if (report.residual <= accepted && report.converged) return true;
         if (quick && !report.converged) return false;
+        lost = report.converged ? 0 : lost + 1;
+        if (lost >= lost_rounds) break;
         if (points.empty() || model == FrictionModel::box) {
             report.residual = unbounded;  // the pivoting itself gave up
             break;
