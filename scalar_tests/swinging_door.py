@@ -225,7 +225,7 @@ TEST = ScalarTest(
     ),
     theory=(
         "J φ'' = −m g sin β d sin φ, J = m (a² + b²)/12 + m d².",
-        "T = 4 √(J/(m g sin β d)) K(sin φ₀/2).",
+        "T = 4 √(J/(m g sin β d)) K(sin(φ₀/2)).",
     ),
     reference="Complete elliptic integral (closed form).",
     conclusion="Green: hinges let the door swing freely and hold the rest. Red: they brake, drift or leak energy.",

@@ -10,6 +10,7 @@ import numpy as np
 from spook_tracker.engine import (
     PLAIN,
     AngularVelocity,
+    Box,
     ContactForce,
     Cylinder,
     Final,
@@ -73,6 +74,7 @@ def scene(slope: float = 0.0, speed: float = 0.0, locked: bool = False, rise: fl
         name="chassis",
         mass=CHASSIS,
         inertia=(400.0, 1500.0, 1700.0),
+        shape=Box((3.6, 1.2, 0.5)),  # touches nothing
         position=(0.0, 0.0, RADIUS + rise),
         velocity=(speed, 0.0, 0.0),
     )
@@ -105,7 +107,7 @@ def scene(slope: float = 0.0, speed: float = 0.0, locked: bool = False, rise: fl
         bodies=(road, chassis, *wheels),
         constraints=tuple(axles),
         gravity=(GRAVITY * math.sin(tilt), 0.0, -GRAVITY * math.cos(tilt)),
-        no_contact=tuple(sides),
+        no_contact=(*sides, *(("chassis", name) for name in ("road", *WHEELS))),
     )
 
 
@@ -228,7 +230,7 @@ TEST = ScalarTest(
         ("gravity", "9.81 m/s²"),
     ),
     theory=(
-        "Rolling: a = M g sin θ/(M + 4 I/r²).",
+        "Rolling: a = g sin θ · M/(M + 4 I/r²).",
         "Locked: a = −µ g. Σ m a h about the rear footprints moves load to the front: N_f L = (m_c b + 2 m_w L) g + "
         "µ g (m_c h + 4 m_w r).",
         "The stopping way is v²/(2 µ g), v h/2 less when summed at the ends of steps.",

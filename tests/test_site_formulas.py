@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ElementTree
 
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.tracker.website.formulas import formula, runs
+from spook_tracker.tracker.website.formulas import FUNCTIONS, formula, runs
 from tests.synthetic_history import HOSTILE
 
 SIGNS = "abz IEm=+−/·²₀ⁿ√()[]_^|½θ′%.,: 12<>&\"'"
@@ -47,6 +48,12 @@ def shape(line: str) -> str:
         ("⁴⁄₃ θ̈₁ = 0", "mfrac[43]msub[θ̈1]=0"),
         ("(1 − e)²/x", "mfrac[msup[(1−e)2]x]"),
         ("a = F/(m + J/r²)", "a=mfrac[Fm+J/msup[r2]]"),
+        (
+            "a = g sin θ/(M + m)",
+            "a=gsinθ/(M+m)",
+        ),  # whether the sine ends before the stroke, the line does not say
+        ("K(sin² φ/2)", "K(msup[sin2]φ/2)"),
+        ("sin(φ/2)/r", "mfrac[sin(φ/2)r]"),
     ],
 )
 def test_a_formula_has_the_shape_it_says(line: str, expected: str) -> None:
@@ -95,6 +102,14 @@ def test_every_line_of_the_catalogue_is_read_and_loses_no_letter() -> None:
 
     assert len(lines) > 100
     assert unread == ["ω = min(T t/J,"]  # goes on with words
+
+
+def test_no_line_of_the_catalogue_leaves_open_where_the_argument_of_a_function_ends() -> None:
+    functions = "|".join(FUNCTIONS)
+    open_ended = re.compile(rf"\b(?:{functions})[²³]? +[^\s(]*/\S")
+
+    assert open_ended.search("a = g sin θ/(M + m)")
+    assert [line for test in CATALOGUE.values() for line in test.theory if open_ended.search(line)] == []
 
 
 def _unraised(text: str) -> str:

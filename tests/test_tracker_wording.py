@@ -113,3 +113,7 @@ def test_a_sentence_opens_with_a_capital_but_a_formula_does_not() -> None:
     assert wording.opening("largest deviation") == "Largest deviation"
     assert wording.opening("max|x - x0|") == "max|x - x0|"
     assert wording.opening("h w at the edge") == "h w at the edge"
+
+
+def test_a_title_that_begins_with_an_owner_begins_with_a_capital() -> None:
+    assert wording.opening("centre's distance") == "Centre's distance"

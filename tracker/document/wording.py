@@ -135,7 +135,7 @@ def margin(definition: SeriesDefinition, value: float) -> Margin:
 
 def opening(text: str) -> str:
     """The text with a capital letter where it begins with a plain word; a formula stays as it is."""
-    first = text.split(" ", 1)[0].rstrip(",:;")
+    first = text.split(" ", 1)[0].rstrip(",:;").replace("'", "").replace("’", "")
     return text[:1].upper() + text[1:] if len(first) > 1 and first.isalpha() and first.islower() else text
 
 

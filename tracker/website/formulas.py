@@ -49,6 +49,7 @@ VULGAR = re.compile(r"[½⅓⅔¼¾⅕⅖⅗⅘⅙⅛]")
 FUNCTION = re.compile(r"[a-z]{2,}(?![a-z])")
 CAPITALS = re.compile(r"[A-Z]{2}")
 SMALL_FRACTION = re.compile(r"([⁰-⁹¹²³]+)⁄([₀-₉]+)")
+APPLIED = re.compile(rf"^(?:<msup>)?<mi>(?:{'|'.join(FUNCTIONS)})</mi>(?:<mrow>.*</mrow></msup>)?$")
 LOW_NAME = re.compile(r"[A-Za-zα-ω0-9]+")
 BRACKETED = re.compile(r"<mrow><mo[^>]*>\(</mo>(.*)<mo[^>]*>\)</mo></mrow>")
 DEEPEST = 20  # brackets in each other; more is no formula that anybody reads
@@ -164,9 +165,13 @@ class _Reader:
                 parts.append(_operator(sign))
                 touching = True
             else:
+                # What a function takes after a blank may end before a stroke or behind it: the line does not say.
+                argument = not touching and bool(parts) and APPLIED.search(parts[-1]) is not None
                 if not touching:
                     parts.append(THIN)
+                self.small += argument
                 parts.append(self.fraction(parts))
+                self.small -= argument
                 touching = False
         self.at += len(end)
         return "".join(parts)
@@ -183,7 +188,7 @@ class _Reader:
                 self.at += 1
                 told += f"{_operator('/')}{''.join(self.factors())}"
                 continue
-            self.at, self.small = begin, 1
+            self.at, self.small = begin, 1  # once more, now as what stands over a bar
             over = _unbracketed(self.factors())
             while True:
                 self.at += 1

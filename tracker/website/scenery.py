@@ -299,7 +299,8 @@ def _describe(drawn: SceneDrawing) -> str:
     """What the picture shows, in words."""
     counts: dict[str, int] = {}
     for solid in drawn.solids:
-        name = f"fixed {solid.kind}" if solid.fixed and solid.kind != "plane" else solid.kind
+        kind = "many-sided solid" if solid.kind == "facets" else solid.kind
+        name = f"fixed {kind}" if solid.fixed and kind != "plane" else kind
         counts[name] = counts.get(name, 0) + 1
     for link in drawn.links:
         counts[link.kind] = counts.get(link.kind, 0) + 1
