@@ -14,7 +14,7 @@ from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
 from spook_tracker.tracker.store.database import in_words, one_writer
-from spook_tracker.tracker.store.models import identity
+from spook_tracker.tracker.store.identity import identity
 
 ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
 CHUNK = 500  # ids in one IN (...), well below every database's limit
