@@ -18,7 +18,7 @@ from spook_tracker.tracker.document.run_document import RunDocument, SeriesHisto
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
 from spook_tracker.tracker.judge.series_history import Told
-from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.tonight import Finding, to_be_timed_again
 from spook_tracker.tracker.store.history import History
 
 __all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish", "record", "run"]
@@ -32,12 +32,32 @@ def run(
     `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
     tracker.measure.run.Questions (catalogue, engine, limit, limits).
     """
-    from spook_tracker.tracker.measure.run import Questions, Request
     from spook_tracker.tracker.measure.run import run as measure
 
-    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit", "limits") if name in asked}
-    request = Request(tests=tuple(tests), **asked)
-    return measure(Questions(**where), request, watch or (lambda progress: None))
+    source, request = _asked(tests, asked)
+    return measure(source, request, watch or (lambda progress: None))
+
+
+def time_again(
+    document: RunDocument,
+    tests: Iterable[str],
+    watch: Callable[[Any], None] | None = None,
+    **asked: Any,
+) -> RunDocument:
+    """The document with the ladders of these tests timed once more; `asked` as for the run it comes from."""
+    from spook_tracker.tracker.measure.again import timed_again
+
+    source, request = _asked((), asked)
+    return timed_again(source, request, document, tests, watch or (lambda progress: None))
+
+
+def _asked(tests: Iterable[str], asked: dict[str, Any]) -> tuple[Any, Any]:
+    """What is asked of whom: fields of a Request, and those of Questions, told apart."""
+    from spook_tracker.tracker.measure.run import Questions, Request
+
+    where = {name: asked[name] for name in ("catalogue", "engine", "limit", "limits") if name in asked}
+    rest = {name: value for name, value in asked.items() if name not in where}
+    return Questions(**where), Request(**{"tests": tuple(tests), **rest})
 
 
 def record(document: RunDocument, database: str) -> bool:
@@ -200,6 +220,7 @@ def nightly(
     """
     from spook_tracker.tracker.measure.run import Interrupted
     from spook_tracker.tracker.store.database import session_on
+    from spook_tracker.tracker.store.record import add_again
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
 
@@ -213,6 +234,11 @@ def nightly(
         tell(document)
         history = History(session)
         findings = judge(history, document.id, accepted)
+        if seem_slower := to_be_timed_again(findings):
+            document = time_again(document, seem_slower, **asked)
+            add_again(session, document)
+            history = History(session)
+            findings = judge(history, document.id, accepted)
         tell(findings)
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared

@@ -22,7 +22,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.document.wording import instant
-from spook_tracker.tracker.judge.calibration import ladder_timing
+from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
@@ -301,7 +301,7 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
             timing = ladder_timing(p.sample.timing for p in found if p.sample.timing)
             sample = Sample(
                 series=key,
-                value=Number(timing.seconds[0]),
+                value=Number(that_counts(timing).seconds[0]),
                 outcome="value",
                 passed=True,
                 set_point_held=True,

@@ -50,7 +50,7 @@ RUN = (
 )
 SAMPLE = "s.run_key, s.series_id, s.definition_id, s.value, s.special, s.outcome, s.passed, s.set_point_held"
 EVIDENCE = """, e.failure, e.state_hash, e.counters, t.seconds, t.runs_per_repeat, t.instructions, t.stage_seconds,
-    t.cpu_seconds, t.calibration"""
+    t.cpu_seconds, t.calibration, t.again"""
 BESIDE = """
     LEFT JOIN evidence e ON e.started_at = s.started_at AND e.run_key = s.run_key AND e.series_id = s.series_id
     LEFT JOIN timing t ON t.started_at = s.started_at AND t.run_key = s.run_key AND t.series_id = s.series_id"""
@@ -324,7 +324,7 @@ class History:
             if evidence and row[8] is not None:
                 more = {"failure": row[8], "state_hash": row[9], "counters": rows.counters_of(row[10])}
             if evidence and row[11] is not None:
-                more["timing"] = rows.timing_of(*row[11:17])
+                more["timing"] = rows.timing_of(*row[11:18])
             read = Sample(
                 series=definition.key,
                 value=rows.joined(row[3], row[4]),

@@ -290,6 +290,7 @@ class Timing(Base):
     calibration: Mapped[str] = _text(
         "JSON list: seconds of the calibration kernel beside each repeat; empty if not taken"
     )
+    again: Mapped[str] = _text("JSON object: the same timed once more that night; empty if it was not")
 
 
 class Figure(Base):

@@ -166,6 +166,7 @@ def timing_row(timing: document.Timing) -> Row:
         "stage_seconds": json_of(timing.stage_seconds),
         "cpu_seconds": json_of(timing.cpu_seconds) if timing.cpu_seconds else "",
         "calibration": json_of(timing.calibration) if timing.calibration else "",
+        "again": json_of(timing.again) if timing.again else "",
     }
 
 
@@ -175,7 +176,13 @@ _COUNTERS = msgspec.json.Decoder(dict[str, int])
 
 
 def timing_of(
-    seconds: str, runs_per_repeat: int, instructions: int | None, stages: str, cpu: str, calibration: str
+    seconds: str,
+    runs_per_repeat: int,
+    instructions: int | None,
+    stages: str,
+    cpu: str,
+    calibration: str,
+    again: str,
 ) -> document.Timing:
     return document.Timing(
         seconds=_SECONDS.decode(seconds),
@@ -184,6 +191,7 @@ def timing_of(
         stage_seconds=_BY_STAGE.decode(stages),
         cpu_seconds=_SECONDS.decode(cpu) if cpu else (),
         calibration=_SECONDS.decode(calibration) if calibration else (),
+        again=decode(again, document.Again) if again else None,
     )
 
 
