@@ -18,23 +18,26 @@ import tempfile
 import time
 
 from spook_tracker.tracker import library
-from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.database import session_on
+from spook_tracker.tracker.store.record import record
 
 TESTS = ("pendulum", "n_pendulum", "falling_object")
 SPIN = "while True: sum(i * i for i in range(10_000))"  # what a busy process does
 
 
-def night(database: str, tests: tuple[str, ...]) -> tuple[int, list[str], list[str]]:
-    """One night recorded and judged: how many values it gave, what is red, and what is slow but not confirmed."""
+def night(database: str, tests: tuple[str, ...]) -> tuple[int, list[str], list[str], int]:
+    """One night recorded and judged: how many values it gave, what is red, what is suspected, how many
+    rungs were timed again."""
     document = library.run(tests, sweep=True)
-    library.record(document, database)
-    with History.open(database) as history:
-        findings = library.judge(history, document.id)
+    with session_on(database) as session:
+        record(session, document)
+        document, findings = library.judged_again(session, document, sweep=True)
+    again = sum(sample.timing is not None and sample.timing.again is not None for sample in document.samples)
     red = [
         f"{finding.series}: {finding.name}, {finding.verdict.sentence}" for finding in findings if finding.red
     ]
     suspected = [f.series for f in findings if f.judged is not None and f.judged.state == "suspected"]
-    return len(findings), red, suspected
+    return len(findings), red, suspected, again
 
 
 def main() -> int:
@@ -53,10 +56,11 @@ def main() -> int:
             database = asked.db or f"sqlite:///{folder}/aa.db"
             for number in range(1, asked.nights + 1):
                 start = time.perf_counter()
-                judged, red, suspected = night(database, tuple(asked.tests))
+                judged, red, suspected, again = night(database, tuple(asked.tests))
                 nights_red, values = nights_red + bool(red), values + judged
                 print(
-                    f"night {number}: {judged} series judged, {len(red)} red, {len(suspected)} suspected; "
+                    f"night {number}: {judged} series judged, {len(red)} red, {len(suspected)} suspected, "
+                    f"{again} rungs timed again; "
                     f"{time.perf_counter() - start:.0f} s, load {os.getloadavg()[0]:.1f}",
                     *red,
                     sep="\n  red: ",

@@ -185,6 +185,23 @@ def publish(
     return build(history, out, accepted, offered, title, home_page)
 
 
+def judged_again(
+    session: Any, document: RunDocument, accepted: Sequence[Accepted] = (), **asked: Any
+) -> tuple[RunDocument, list[Finding]]:
+    """What became of a run just recorded; what seems slower is timed once more at once, stored, and judged again.
+
+    `asked` as for the run it comes from.
+    """
+    from spook_tracker.tracker.store.record import add_again
+
+    findings = judge(History(session), document.id, accepted)
+    if seem_slower := to_be_timed_again(findings):
+        document = time_again(document, seem_slower, **asked)
+        add_again(session, document)
+        findings = judge(History(session), document.id, accepted)
+    return document, findings
+
+
 @dataclass(frozen=True, kw_only=True)
 class NightlyReport:
     """One night: what was measured, what became of it, and what was published."""
@@ -220,7 +237,6 @@ def nightly(
     """
     from spook_tracker.tracker.measure.run import Interrupted
     from spook_tracker.tracker.store.database import session_on
-    from spook_tracker.tracker.store.record import add_again
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
 
@@ -232,13 +248,8 @@ def nightly(
             raise
         store(session, document)
         tell(document)
+        document, findings = judged_again(session, document, accepted, **asked)
         history = History(session)
-        findings = judge(history, document.id, accepted)
-        if seem_slower := to_be_timed_again(findings):
-            document = time_again(document, seem_slower, **asked)
-            add_again(session, document)
-            history = History(session)
-            findings = judge(history, document.id, accepted)
         tell(findings)
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared
