@@ -314,13 +314,14 @@ class DocumentHistory:
         return {s.series: (definitions[s.series], s) for s in run.samples}
 
     def samples_of(
-        self, run_ids: Sequence[str], tests: set[str] | None = None
+        self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
     ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
+        chosen = None if keys is None else set(keys)
         return {
             run_id: {
                 key: pair
                 for key, pair in self.samples(run_id).items()
-                if tests is None or pair[0].test in tests
+                if (tests is None or pair[0].test in tests) and (chosen is None or key in chosen)
             }
             for run_id in run_ids
         }
