@@ -90,18 +90,30 @@ inline void gather(const double* k, Inertia6& m) noexcept {
 }
 
 /// (K⁻¹ + c eᵢ eᵢᵀ)⁻¹. The direction's own row is divided, not subtracted from: a soft one keeps its digits.
+template <int I, int A, int B> inline void soften_entry(double* k, double share) noexcept {
+    if constexpr (A != I && B != I && A <= B) k[at(A, B)] -= share * k[at(I, B)];
+}
+template <int I, int A> inline void soften_row(double* k, double gain) noexcept {
+    if constexpr (A != I) {
+        const double share = gain * k[at(I, A)];
+        soften_entry<I, A, 0>(k, share);
+        soften_entry<I, A, 1>(k, share);
+        soften_entry<I, A, 2>(k, share);
+        soften_entry<I, A, 3>(k, share);
+        soften_entry<I, A, 4>(k, share);
+        soften_entry<I, A, 5>(k, share);
+    }
+}
 template <int I> inline void soften(double* k, double softness) noexcept {
     const double keeps = 1.0 / (1.0 + softness * k[at(I, I)]), gain = softness * keeps;
-#pragma GCC unroll 6
-    for (int i = 0; i < 6; ++i) {
-        if (i == I) continue;
-        const double share = gain * k[at(I, i)];
-#pragma GCC unroll 6
-        for (int j = i; j < 6; ++j)
-            if (j != I) k[at(i, j)] -= share * k[at(I, j)];
-    }
-#pragma GCC unroll 6
-    for (int j = 0; j < 6; ++j) k[at(I, j)] *= keeps;
+    soften_row<I, 0>(k, gain);
+    soften_row<I, 1>(k, gain);
+    soften_row<I, 2>(k, gain);
+    soften_row<I, 3>(k, gain);
+    soften_row<I, 4>(k, gain);
+    soften_row<I, 5>(k, gain);
+    k[at(I, 0)] *= keeps, k[at(I, 1)] *= keeps, k[at(I, 2)] *= keeps;
+    k[at(I, 3)] *= keeps, k[at(I, 4)] *= keeps, k[at(I, 5)] *= keeps;
 }
 
 inline constexpr double SLIGHT = 1e-17;  // of the square of a tilt: what K need not know of it
