@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -20,6 +20,7 @@ help:
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
+	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
@@ -86,6 +87,9 @@ mutation: develop
 
 detectors: develop
 	$(BIN)/python bench/detectors.py --page docs/detectors.md
+
+aa: develop
+	$(BIN)/python bench/aa.py
 
 bench: develop
 	$(BIN)/python bench/run.py

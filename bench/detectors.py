@@ -1,7 +1,7 @@
 """`make detectors`: what the judge of run times finds and what it cries over, beside asv's steps and Otava.
 
-Synthetic noise and steps (tests/noise_battery.py) and, with --recorded, histories that continuous integration of
-other projects has published (the data.js of github-action-benchmark). Alarms are starts of red stretches after
+Synthetic noise and steps (tests/noise_battery.py), and histories that continuous integration of other projects has
+published (tests/data/recorded: each file says whose, at which commit). Alarms are starts of red stretches after
 sixty nights of learning; the other tools see each history whole, which favours them, and a step of theirs counts
 where it is upward and above 5 %, asv's own threshold for a regression. Delays are of night after night for all.
 asv and apache-otava are asked where they are installed (asv with NumPy, Otava 0.8 pins its own: another
@@ -28,7 +28,8 @@ from tests import noise_battery as battery
 LEARNING, NIGHTS = 60, 560
 AFTER = 15  # nights looked at after a step
 UPWARD = 0.05
-FEWEST_POINTS = 80  # of a recorded history
+NEAR = 10  # nights: a step may be told so much before or after another tells it
+RECORDED = Path(__file__).resolve().parent.parent / "tests" / "data" / "recorded"
 Detector = Callable[[Sequence[float]], list[int]]  # places where it says that it became slower
 
 
@@ -123,34 +124,39 @@ def steps(found: dict[str, Detector], series: int) -> list[str]:
 
 
 def histories_of(file: Path) -> list[list[float]]:
-    """The series of a data.js of github-action-benchmark whose values are times, in the order of the commits."""
-    text = file.read_text(encoding="utf-8")
-    entries = json.loads(text[text.index("{") :].rstrip().rstrip(";"))["entries"]
-    by_name: dict[str, list[float]] = {}
-    for runs in entries.values():
-        for run in runs:
-            for bench in run["benches"]:
-                if "ns" in bench["unit"] or "s/iter" in bench["unit"]:
-                    by_name.setdefault(bench["name"], []).append(float(bench["value"]))
-    return [values for values in by_name.values() if len(values) >= FEWEST_POINTS and min(values) > 0.0]
+    """The series of a recorded history: tests/data/recorded says where its numbers are from."""
+    return list(json.loads(file.read_text(encoding="utf-8"))["values"].values())
 
 
 def recorded(found: dict[str, Detector], files: Sequence[Path]) -> list[str]:
+    """Alarms of each detector, and how many of ours stand within a few nights of a step that another sees."""
     rows = []
     for file in files:
+        near = alone = 0
+        counts = dict.fromkeys(found, 0)
         histories = histories_of(file)
-        points = sum(map(len, histories))
-        cells = [f"{file.stem}: {len(histories)} series, {points} values"]
-        cells += [str(alarms(detect, histories)[0]) for detect in found.values()]
-        rows.append(cells)
-    return table(["alarms on recorded histories", *found], rows) if rows else []
+        for values in histories:
+            places = {name: [p for p in detect(values) if p >= LEARNING] for name, detect in found.items()}
+            others = [p for name, theirs in places.items() if name != "ours" for p in theirs]
+            for name, theirs in places.items():
+                counts[name] += len(theirs)
+            seen = sum(any(abs(p - q) <= NEAR for q in others) for p in places["ours"])
+            near, alone = near + seen, alone + len(places["ours"]) - seen
+        cells = [f"{file.stem}: {len(histories)} series, {sum(map(len, histories))} values"]
+        rows.append([*cells, *(str(count) for count in counts.values()), f"{near} and {alone}"])
+    head = ["alarms on recorded histories", *found, f"ours within {NEAR} nights of another's, and not"]
+    return table(head, rows) if rows else []
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--series", type=int, default=20, help="of each kind")
     parser.add_argument(
-        "--recorded", type=Path, nargs="*", default=[], help="files data.js, named by project"
+        "--recorded",
+        type=Path,
+        nargs="*",
+        default=sorted(RECORDED.glob("*.json")),
+        help="files as in tests/data",
     )
     parser.add_argument("--page", type=Path, help="write the tables here")
     given = parser.parse_args()

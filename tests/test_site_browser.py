@@ -222,6 +222,29 @@ def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
     assert ranges == [[1, 2], [0, 0.3]]
 
 
+def test_a_ladder_stands_beside_the_night_that_the_reader_chooses(driver: Any, site: Path) -> None:
+    visit(driver, site, "tests/pendulum.html")
+    driver.execute_async_script(DRAWN)
+    shown = """return [...new Set([...document.querySelector('[id^="l-length-seconds"] .plot').data]
+        .filter((t) => t.meta.night && t.visible !== false).map((t) => t.name.split(', ').pop()))]"""
+    assert driver.execute_script(shown) == ["the night before"]
+
+    driver.execute_script(
+        "const s = document.getElementById('night'); s.value = 'week'; s.dispatchEvent(new Event('change'));"
+    )
+    assert driver.execute_script(shown) == ["a week before"]
+    address = driver.current_url
+    driver.get("about:blank")
+    arrive(driver, address)
+    driver.execute_async_script(DRAWN)
+    assert "night=week" in address
+    assert driver.execute_script(shown) == ["a week before"]
+
+    driver.execute_script("location.hash = '#night=none'")
+    wait_for(driver, "document.getElementById('night').value === 'none'")
+    assert driver.execute_script(shown) == []
+
+
 def test_the_filter_of_the_index_is_kept_in_the_address(driver: Any, site: Path) -> None:
     visit(driver, site, "index.html#show=fail")
     hidden = "return [...document.querySelectorAll('#filter ~ div tbody tr')].map((r) => r.hidden)"

@@ -125,7 +125,7 @@ def pretend_a_newer_tracker(monkeypatch, tmp_path, body):
         f"revision = {number!r}\ndown_revision = {REVISIONS[-1]!r}\n\n"
         f"def upgrade():\n{body}\n\ndef downgrade():\n    pass\n"
     )
-    monkeypatch.setattr("spook_tracker.tracker.store.database.resource", lambda name: folder)
+    monkeypatch.setattr("spook_tracker.tracker.store.head.resource", lambda name: folder)
     monkeypatch.setattr("spook_tracker.tracker.store.revisions.resource", lambda name: folder)
     return number
 

@@ -18,7 +18,7 @@ from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.border import checked, clean_text
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.models import identity
+from spook_tracker.tracker.store.identity import identity
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.rows import joined, split
 from tests.run_documents import KEY, definition, run, sample

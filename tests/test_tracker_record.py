@@ -122,6 +122,7 @@ def test_storage_knows_every_field_of_the_document():
         "stage_seconds",
         "cpu_seconds",
         "calibration",
+        "again",
     )
     assert document.RunDocument.__struct_fields__ == (
         "schema_version", "id", "idempotency_key", "started", "finished", "trigger", "tracker_version",

@@ -18,7 +18,7 @@ from spook_tracker.tracker.document.run_document import RunDocument, SeriesHisto
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
 from spook_tracker.tracker.judge.series_history import Told
-from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.tonight import Finding, to_be_timed_again
 from spook_tracker.tracker.store.history import History
 
 __all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish", "record", "run"]
@@ -32,12 +32,32 @@ def run(
     `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
     tracker.measure.run.Questions (catalogue, engine, limit, limits).
     """
-    from spook_tracker.tracker.measure.run import Questions, Request
     from spook_tracker.tracker.measure.run import run as measure
 
-    where = {name: asked.pop(name) for name in ("catalogue", "engine", "limit", "limits") if name in asked}
-    request = Request(tests=tuple(tests), **asked)
-    return measure(Questions(**where), request, watch or (lambda progress: None))
+    source, request = _asked(tests, asked)
+    return measure(source, request, watch or (lambda progress: None))
+
+
+def time_again(
+    document: RunDocument,
+    tests: Iterable[str],
+    watch: Callable[[Any], None] | None = None,
+    **asked: Any,
+) -> RunDocument:
+    """The document with the ladders of these tests timed once more; `asked` as for the run it comes from."""
+    from spook_tracker.tracker.measure.again import timed_again
+
+    source, request = _asked((), asked)
+    return timed_again(source, request, document, tests, watch or (lambda progress: None))
+
+
+def _asked(tests: Iterable[str], asked: dict[str, Any]) -> tuple[Any, Any]:
+    """What is asked of whom: fields of a Request, and those of Questions, told apart."""
+    from spook_tracker.tracker.measure.run import Questions, Request
+
+    where = {name: asked[name] for name in ("catalogue", "engine", "limit", "limits") if name in asked}
+    rest = {name: value for name, value in asked.items() if name not in where}
+    return Questions(**where), Request(**{"tests": tuple(tests), **rest})
 
 
 def record(document: RunDocument, database: str) -> bool:
@@ -165,6 +185,23 @@ def publish(
     return build(history, out, accepted, offered, title, home_page)
 
 
+def judged_again(
+    session: Any, document: RunDocument, accepted: Sequence[Accepted] = (), **asked: Any
+) -> tuple[RunDocument, list[Finding]]:
+    """What became of a run just recorded; what seems slower is timed once more at once, stored, and judged again.
+
+    `asked` as for the run it comes from.
+    """
+    from spook_tracker.tracker.store.record import add_again
+
+    findings = judge(History(session), document.id, accepted)
+    if seem_slower := to_be_timed_again(findings):
+        document = time_again(document, seem_slower, **asked)
+        add_again(session, document)
+        findings = judge(History(session), document.id, accepted)
+    return document, findings
+
+
 @dataclass(frozen=True, kw_only=True)
 class NightlyReport:
     """One night: what was measured, what became of it, and what was published."""
@@ -211,8 +248,8 @@ def nightly(
             raise
         store(session, document)
         tell(document)
+        document, findings = judged_again(session, document, accepted, **asked)
         history = History(session)
-        findings = judge(history, document.id, accepted)
         tell(findings)
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared

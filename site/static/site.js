@@ -26,6 +26,12 @@ const CONFIG = {
 };
 const CELLS = ["#0072b2", "#56b4e9", "#e69f00", "#d55e00", "#5b2333", "#8a939c"];
 
+// The earlier night that stands in short dashes beside tonight: the reader's choice, or the first that is offered.
+function earlierNight() {
+  const choice = document.getElementById("night"), offered = choice ? [...choice.options].map((o) => o.value) : ["before"];
+  return offered.includes(state.get("night")) ? state.get("night") : offered[0];
+}
+
 function dressTrace(trace) {
   const meta = trace.meta || {};
   const dressed = { ...trace };
@@ -37,6 +43,7 @@ function dressTrace(trace) {
   if (meta.role === "prediction") {
     return { ...dressed, line: { color: colour("--ink"), width: 2.5 }, fillcolor: "rgba(0,0,0,0)" };
   }
+  if (meta.night) { dressed.visible = meta.night === earlierNight(); }
   const paint = meta.style === "limit" || meta.style === "failed" || meta.style === "broken" ? colour("--fail-fill") : colour("--c" + meta.colour);
   dressed.line = { width: meta.style === "front" ? 1.5 : 2, ...trace.line, color: paint };
   if (meta.style === "front") { dressed.opacity = 0.65; }
@@ -130,6 +137,17 @@ function charts() {
   boxes.forEach((box) => watch.observe(box));
   document.addEventListener("theme", () => seen.forEach(drawChart));
   addEventListener("hashchange", () => seen.forEach(drawChart));
+  const tools = document.getElementById("earlier"), choice = document.getElementById("night");
+  if (tools) {
+    const restore = () => { choice.value = earlierNight(); };
+    choice.addEventListener("change", () => {
+      state.set("night", choice.selectedIndex ? choice.value : "");
+      seen.forEach(drawChart);
+    });
+    addEventListener("hashchange", restore);
+    tools.hidden = false;
+    restore();
+  }
 }
 
 // --- tables ---

@@ -75,6 +75,8 @@ def say(text: str = "", err: bool = False) -> None:
 
 def cells(text: str) -> int:
     """Columns a text takes: wide letters two, combining marks none."""
+    if text.isascii():
+        return len(text)
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
@@ -82,6 +84,8 @@ def cells(text: str) -> int:
 
 def clean(text: str) -> str:
     """Text from outside on one line, its control characters made visible."""
+    if text.isprintable():
+        return text
     return "".join(
         c if c.isprintable() else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text
     )

@@ -30,8 +30,13 @@ def clean(text: str) -> str:
 def inert(text: str) -> str:
     """Lines that a terminal only shows and no CI service runs; our own colours stay."""
     if not text.isprintable():
-        text = "".join(part if COLOUR.fullmatch(part) else clean(part) for part in COLOUR.split(text))
+        lines = text.split("\n")  # most of many lines hold nothing that a colour or a trap needs
+        text = "\n".join(line if line.isprintable() else _seen(line) for line in lines)
     return COMMAND.sub("\\1\N{REPLACEMENT CHARACTER}", text)
+
+
+def _seen(line: str) -> str:
+    return "".join(part if COLOUR.fullmatch(part) else clean(part) for part in COLOUR.split(line))
 
 
 def escaped(json: str) -> str:

@@ -86,6 +86,14 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     aliases: tuple[str, ...] = ()  # earlier keys of the same series
 
 
+class Again(Struct, frozen=True, kw_only=True):
+    """The same run timed once more in the same night, because it had seemed slower."""
+
+    seconds: tuple[float, ...]  # per run
+    cpu_seconds: tuple[float, ...] = ()
+    calibration: tuple[float, ...] = ()  # s of the calibration kernel beside each repeat
+
+
 class Timing(Struct, frozen=True, kw_only=True):
     """Run time of one simulation, nothing recorded: every repeat, and the exact work."""
 
@@ -95,6 +103,7 @@ class Timing(Struct, frozen=True, kw_only=True):
     stage_seconds: dict[str, float] = {}
     cpu_seconds: tuple[float, ...] = ()  # of each repeat, without what the machine spent elsewhere
     calibration: tuple[float, ...] = ()  # s of the calibration kernel beside each repeat
+    again: Again | None = None
 
 
 class Sample(Struct, frozen=True, kw_only=True):

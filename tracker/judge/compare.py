@@ -17,7 +17,15 @@ from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesD
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
-from spook_tracker.tracker.judge.lane import Records, asked_for, asked_in, asked_whole, histories, line_of
+from spook_tracker.tracker.judge.lane import (
+    Records,
+    asked_for,
+    asked_in,
+    asked_whole,
+    histories,
+    line_of,
+    run_time_histories,
+)
 from spook_tracker.tracker.judge.series_history import (
     Judged,
     Told,
@@ -153,8 +161,13 @@ def compare_in(
     runs = [run for run in records.runs() if run.engine.name == new.engine.name]
     newest = next((run for run in reversed(runs) if run.id in (old.id, new.id)), new)
     line = line_of(runs, newest)
-    timed = {key for key, (d, s) in later.samples.items() if d.kind == "time" or s.timing is not None}
-    told = judge_all(histories(records, line, timed)) if timed and len(line) > 1 else {}
+    rungs = {key for key, (d, s) in later.samples.items() if d.kind == "ladder" and s.timing is not None}
+    alone = {key for key, (d, _) in later.samples.items() if d.kind == "time" and not is_read_off(d)}
+    told: dict[str, Told] = {}
+    if rungs and len(line) > 1:
+        told |= judge_all(run_time_histories(records, line, rungs))
+    if alone and len(line) > 1:
+        told |= judge_all(histories(records, line, alone))
     later = replace(later, whole=asked_whole(new), asked=asked_for(new, later.samples))
     document = compare(earlier, later, accepted, known(told, old.id, new.id))
     reds = {change.series for change in document.changes if change.red} - told.keys()

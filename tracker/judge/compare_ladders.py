@@ -7,10 +7,12 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from statistics import median
 
+import msgspec
+
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.order import error_in_time, time_at_error
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
-from spook_tracker.tracker.judge.calibration import geometric_mean
+from spook_tracker.tracker.judge.calibration import geometric_mean, that_counts
 from spook_tracker.tracker.judge.comparison_document import Change, Frontier
 from spook_tracker.tracker.judge.timing_statistics import compare_times
 from spook_tracker.tracker.judge.vocabulary import Word
@@ -27,6 +29,7 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
         definition = rungs[0][0]
         timed = [(old.timing, new.timing) for _, old, new in rungs]
         both: list[tuple[Timing, Timing]] = [(old, new) for old, new in timed if old and new]
+        both = [(_counted(old), _counted(new)) for old, new in both]
         found = compare_times([old for old, _ in both], [new for _, new in both])
         if found is None:
             continue
@@ -58,6 +61,11 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
             )
         )
     return changes
+
+
+def _counted(timing: Timing) -> Timing:
+    """The timing with the repeats that count."""
+    return msgspec.structs.replace(timing, seconds=that_counts(timing).seconds)
 
 
 def _ladders(before: Samples, after: Samples) -> dict[tuple[str, str, str], list[Rung]]:

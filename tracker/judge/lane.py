@@ -22,7 +22,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.document.wording import instant
-from spook_tracker.tracker.judge.calibration import ladder_timing
+from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
@@ -35,7 +35,9 @@ class Records(Protocol):
     def runs(self, engine: str | None = None) -> Sequence[Any]: ...
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
     def samples(self, run_id: str) -> Samples: ...
-    def samples_of(self, run_ids: Sequence[str], tests: set[str] | None) -> Mapping[str, Samples]: ...
+    def samples_of(
+        self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
+    ) -> Mapping[str, Samples]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
 
 
@@ -149,6 +151,21 @@ def histories(
             found[key] = SeriesHistory(stored.definition, tuple(points))
     found = with_missing(found, [run for run in runs if run.id in recent or _says(run)], recent)
     return found | run_times(found) | work(looked_at, recent, tests)
+
+
+def run_time_histories(
+    records: Records, runs: Sequence[Run], keys: Iterable[str]
+) -> dict[str, SeriesHistory]:
+    """Only the run times of these ladders' rungs: what a comparison of two runs asks of all nights."""
+    looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
+    measured = records.samples_of([run.id for run in looked_at], keys=keys)
+    points: dict[str, list[Point]] = {}
+    newest: dict[str, SeriesDefinition] = {}
+    for run in looked_at:
+        for key, (definition, sample) in measured[run.id].items():
+            newest[key] = definition
+            points.setdefault(key, []).append(Point(run, sample, definition.test_version))
+    return run_times({key: SeriesHistory(newest[key], tuple(found)) for key, found in points.items()})
 
 
 def looked_at_again(count: int, recent: int) -> list[int]:
@@ -284,7 +301,7 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
             timing = ladder_timing(p.sample.timing for p in found if p.sample.timing)
             sample = Sample(
                 series=key,
-                value=Number(timing.seconds[0]),
+                value=Number(that_counts(timing).seconds[0]),
                 outcome="value",
                 passed=True,
                 set_point_held=True,

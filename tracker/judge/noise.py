@@ -3,7 +3,8 @@
 Usual is the median of the nights that hold, noise their median absolute deviation. What counts is a relative
 change above a floor that follows the noise, and above what the nights that hold have reached themselves: two
 clusters and spikes are learnt. One slow night is only suspected; if the next one holds, it joins
-what is usual. Smaller changes are found by several nights together (tracker/judge/shifts.py) and stay red until
+what is usual. Nights in a row that chance explains too well are suspected as well: every alarm is rarer than `RARE`,
+so that a night with a thousand series stays silent nineteen times in twenty if nothing happened. Smaller changes are found by several nights together (tracker/judge/shifts.py) and stay red until
 the last nights came halfway back. Two fast nights in a row are a new level, so that a slow-down after them is
 seen. A level that was left again twice is one of the machine's: a third visit that is no longer than those
 before is no news. Slow creep is found by the median of the last nights against those at the last release.
@@ -21,7 +22,9 @@ from typing import TYPE_CHECKING, Literal
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
+    RARE,
     SPANS,
+    exceeded,
     remembered,
     shift,
     standard_error,
@@ -43,6 +46,7 @@ UNSEEN = 25  # nights: of fewer, as much again may be reached by those to come
 REACHED = 200  # nights of which that is remembered, whatever their level
 FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
 SIGMAS = 4.0
+SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CREEP = 5  # nights in each median that is compared for drift
 BACK = 4  # nights whose mean must have come halfway back from a shift
@@ -160,7 +164,8 @@ class _Walk:
         """A night that stands clear of what is usual."""
         value, against = self.values[place], self.usual[-1]
         self.suspects.append(place)
-        confirmed = len(self.suspects) > 1 or self.shifted is not None or not math.isfinite(value)
+        known = self.red_since is not None or self.shifted is not None or not math.isfinite(value)
+        confirmed = known or (len(self.suspects) > 1 and self._chance(self.suspects) <= RARE)
         verdict = slower(change, level, value, "slower" if confirmed else "")
         if accepted:
             self._begin(place)
@@ -170,6 +175,23 @@ class _Walk:
         if self.red_since is None:
             self.red_since = self.suspects[0]
         return self._red(verdict)
+
+    def _chance(self, nights: Sequence[int]) -> float:
+        """How probable it is that these nights lie so far off by chance: the tail of Student's t.
+
+        The noise is what the nights that hold show about the level, or have reached, whichever is more.
+        """
+        level, noise = self._spread()
+        off = [worse_by(level, self.values[i], self.larger_is_better) for i in nights]
+        count = sum(math.isfinite(self.values[i]) for i in self.usual)
+        reached = nlargest(2, self.reached)
+        noise = max(noise, reached[1] / SECOND) if len(reached) > 1 else noise
+        if count < FEWEST:
+            noise = max(noise, FEW_NIGHTS_FLOOR / SIGMAS)
+        if noise <= 0.0 or count == 0:
+            return 0.0
+        t = sum(off) / len(off) / (noise * math.sqrt(1.0 / len(off) + 1.0 / count))
+        return exceeded(min(t, 1e9), max(FEWEST, count + len(off) - 2))
 
     def _red(self, verdict: Verdict) -> Noisy:
         good = self.usual[-1]

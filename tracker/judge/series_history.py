@@ -18,7 +18,7 @@ from datetime import UTC, date, datetime
 
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.calibration import engines_own, unquiet
+from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.slower import Usual, only_followed
@@ -378,6 +378,10 @@ def _judge_times(
             if noisy.state in ("detected", "suspected") and is_read_off(definition):
                 noisy = replace(
                     noisy, verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
+                )
+            if more := taken_again(lane[i]):
+                noisy = replace(
+                    noisy, verdict=replace(noisy.verdict, sentence=f"{noisy.verdict.sentence}{more}")
                 )
             own = standing(definition, lane[i].sample)
             stands: Class = "accepted" if noisy.state == "accepted" else own

@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histori
 SPANS = (4, 6)  # last nights looked at together
 BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
-RARE = 5e-5  # by permutation, of a shift in one series on one night
+RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
 RARER = 4.265  # standard deviations, by the t test: one in a hundred thousand
 LEAST = 0.01  # relative: no shift below is told
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
@@ -118,6 +118,12 @@ def student(freedom: float) -> float:
     """The quantile of Student's t that is exceeded with one probability in 100 000 (Wallace 1959)."""
     z = RARER * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0)
     return math.sqrt(freedom * math.expm1(min(z * z / freedom, 700.0)))
+
+
+def exceeded(t: float, freedom: float) -> float:
+    """The probability that Student's t exceeds a value above zero: the inverse of `student` (Wallace 1959)."""
+    z = math.sqrt(freedom * math.log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)
+    return 0.5 * math.erfc(z / math.sqrt(2.0))
 
 
 def permutation_probability(base: Values, last: Values) -> float:

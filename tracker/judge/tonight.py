@@ -92,6 +92,20 @@ def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
     return worst_first(findings)
 
 
+def to_be_timed_again(findings: Sequence[Finding]) -> list[str]:
+    """The tests whose run times seem slower than they were: timed once more before that is told."""
+    return sorted(
+        {
+            finding.test
+            for finding in findings
+            if finding.judged is not None
+            and finding.series.endswith(":run-time")
+            and (finding.news or finding.judged.state == "suspected")
+            and finding.judged.state in ("detected", "suspected")
+        }
+    )
+
+
 def worst_first(findings: Sequence[Finding]) -> list[Finding]:
     """Red before the rest, FAIL before WATCH, news before what was red already."""
 

@@ -137,7 +137,7 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
         for task, part in _perform_all(source, tasks, tests, request, watch):
             parts[task.position] = part
         if request.sweep:
-            timed = _timed(source, request, tests, _errors(tasks, parts), watch)
+            timed = timings(source, request, tests, _errors(tasks, parts), watch)
     except KeyboardInterrupt:
         unfinished = {task.test for task in tasks if task.position not in parts}
         finished = {name: test for name, test in tests.items() if name not in unfinished}
@@ -297,7 +297,7 @@ def _total(tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Requ
     return len(tasks) + (len(tests) if request.sweep else 0)
 
 
-def _timed(
+def timings(
     source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors, watch: Watch
 ) -> Timed:
     """Run times, taken by one process while no other works, test by test; without them where that one is lost."""

@@ -13,16 +13,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 from sqlalchemy import URL, Engine, create_engine, event, exc, make_url
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
 from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.reader import LOCK_TIMEOUT, SAFE, address
 
 DEFAULT = "sqlite:///tracker.db"
-LOCK_TIMEOUT = 30.0  # s to wait for another writer
 NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "9p", "ceph", "lustre", "fuse.sshfs"})
 
 
@@ -62,10 +61,10 @@ def _sqlite(url: URL, readonly: bool) -> Engine:
     if not is_file(url):
         engine = create_engine(url)
     else:
-        address = _address(url, readonly)
+        place = address(Path(str(url.database)), readonly)
 
         def connect() -> sqlite3.Connection:
-            return sqlite3.connect(address, uri=True, timeout=LOCK_TIMEOUT, check_same_thread=False)
+            return sqlite3.connect(place, uri=True, timeout=LOCK_TIMEOUT, check_same_thread=False)
 
         # NullPool: a connection closed is a file closed, so that the write-ahead log is folded in at the end
         engine = create_engine(url, poolclass=NullPool, creator=connect)
@@ -76,7 +75,7 @@ def _sqlite(url: URL, readonly: bool) -> Engine:
     @event.listens_for(engine, "connect")
     def prepare(connection: Any, _record: Any) -> None:
         connection.isolation_level = None  # the driver begins nothing itself: schema changes roll back, too
-        pragmas = ["foreign_keys = ON", "trusted_schema = OFF", "cell_size_check = ON"]
+        pragmas = ["foreign_keys = ON", *SAFE]
         pragmas += ["query_only = ON"] if readonly else ["synchronous = FULL"]
         for words in pragmas:
             connection.execute(f"PRAGMA {words}")
@@ -131,24 +130,11 @@ def is_file(url: URL) -> bool:
     return url.get_backend_name() == "sqlite" and url.database not in (None, "", ":memory:")
 
 
-def _address(url: URL, readonly: bool) -> str:
-    """The file as SQLite's own URI, which alone can say that nothing may be written."""
-    path = Path(str(url.database)).resolve()
-    mode = "rwc"
-    if readonly:
-        # where writing is possible, the last reader must be able to tidy the log away
-        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
-    log = path.with_name(path.name + "-wal")
-    if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
-        mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
-    return f"file:{quote(str(path))}?mode={mode}"
-
-
 def _said(context: Any) -> DatabaseError | None:
     """Whatever the driver raises, anywhere, as one sentence; what concurrent writers cause is for `record`."""
     if isinstance(context.sqlalchemy_exception, exc.IntegrityError):
         return None
-    return DatabaseError(_sentence(shown(context.engine.url), context.original_exception))
+    return DatabaseError(sentence(shown(context.engine.url), context.original_exception))
 
 
 @contextmanager
@@ -159,13 +145,14 @@ def in_words(where: Engine | Session) -> Iterator[None]:
     except (exc.SQLAlchemyError, sqlite3.Error, OSError) as error:
         engine = where if isinstance(where, Engine) else where.get_bind().engine
         name = shown(engine.url)
-        raise DatabaseError(_sentence(name, error)) from error
+        raise DatabaseError(sentence(name, error)) from error
 
 
-def _sentence(name: str, error: Exception) -> str:
+def sentence(name: str, error: Exception) -> str:
+    """What the driver raised, in words, of the database called `name`."""
     reason = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
     lower = reason.lower()
-    for sign, sentence in (
+    for sign, words in (
         ("locked", "is in use by another writer; try again"),
         ("readonly", "cannot be written; it, or its folder, is read-only"),
         ("read-only", "cannot be written; it, or its folder, is read-only"),
@@ -178,5 +165,5 @@ def _sentence(name: str, error: Exception) -> str:
         ("unable to open", "cannot be opened; check the path and its permissions"),
     ):
         if sign in lower:
-            return f"the database {name} {sentence}"
+            return f"the database {name} {words}"
     return f"the database {name} failed: {reason[:300]}"

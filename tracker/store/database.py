@@ -12,8 +12,8 @@ from sqlalchemy import URL, Connection, Engine, inspect, text
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError
-from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.store.connection import connected, database_url, in_words, is_file, shown
+from spook_tracker.tracker.store.head import head, known_revisions
 
 __all__ = [
     "database_url",
@@ -67,17 +67,6 @@ def session_on(url: str | URL | None = None, readonly: bool = False) -> Iterator
             yield session
     finally:
         engine.dispose()
-
-
-def head() -> str:
-    """The newest revision, from the file names: reading them takes no time, importing Alembic does."""
-    return _revisions()[-1]
-
-
-def _revisions() -> list[str]:
-    return sorted(
-        path.name.partition("_")[0] for path in (resource("migrations") / "versions").glob("[0-9]*.py")
-    )
 
 
 def upgrade(engine: Engine, target: str = "head", *, keep_copy: bool = True) -> None:
@@ -171,7 +160,7 @@ def _current(connection: Any) -> str | None:
 
 def _refuse_strange(connection: Connection, revision: str | None) -> None:
     name = shown(connection.engine.url)
-    if revision is not None and revision not in _revisions():
+    if revision is not None and revision not in known_revisions():
         raise DatabaseError(
             f"{name} has schema revision {revision[:40]}, this tracker knows up to {head()}; "
             "update the tracker"

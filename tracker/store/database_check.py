@@ -12,7 +12,7 @@ from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
 from spook_tracker.tracker.store.database import in_words
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.models import identity
+from spook_tracker.tracker.store.identity import identity
 
 SHOWN = 5  # of the faults of one kind
 

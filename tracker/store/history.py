@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
-
-from sqlalchemy import ColumnElement, and_, select
-from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
@@ -25,27 +22,47 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     SeriesHistory,
 )
-from spook_tracker.tracker.store import git, models, rows
+from spook_tracker.tracker.store import git, rows
 from spook_tracker.tracker.store.ancestry import commit_order
+from spook_tracker.tracker.store.identity import identity
+from spook_tracker.tracker.store.reader import CHUNK, Reader, SessionReader, file_reader, listed
 from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 
 if TYPE_CHECKING:
     import pandas
+    from sqlalchemy.orm import Session
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
 
-CHUNK = 500  # ids in one IN (...)
 LAST = "9999"  # sorts after every time: commits whose time is unknown
 Body = TypeVar("Body")
+RUN = (
+    "id",
+    "started",
+    "finished",
+    "trigger",
+    "tracker_version",
+    "ci_address",
+    "key",
+    "gates",
+    "gates_passed",
+)
+SAMPLE = "s.run_key, s.series_id, s.definition_id, s.value, s.special, s.outcome, s.passed, s.set_point_held"
+EVIDENCE = """, e.failure, e.state_hash, e.counters, t.seconds, t.runs_per_repeat, t.instructions, t.stage_seconds,
+    t.cpu_seconds, t.calibration, t.again"""
+BESIDE = """
+    LEFT JOIN evidence e ON e.started_at = s.started_at AND e.run_key = s.run_key AND e.series_id = s.series_id
+    LEFT JOIN timing t ON t.started_at = s.started_at AND t.run_key = s.run_key AND t.series_id = s.series_id"""
+OF_RUN = "s.started_at = (SELECT started_at FROM run WHERE key = :run) AND s.run_key = :run"  # one range of the key
 Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definition, sample
 
 
 class History:
     """What is stored, as of the moment the history is made. `repository`: where git may know tags."""
 
-    def __init__(self, session: Session, repository: Path | None = None) -> None:
-        self._session = session
+    def __init__(self, source: Session | Reader, repository: Path | None = None) -> None:
+        self._reader = source if hasattr(source, "rows") else SessionReader(source)
         self.repository = repository or Path.cwd()
         self._runs = self._read_runs()
         self._by_id = {run.id: run for run in self._runs}
@@ -56,6 +73,10 @@ class History:
     @contextmanager
     def open(cls, database: str) -> Iterator[History]:
         """The history in a database, for reading: sqlite:///FILE or postgresql://…"""
+        if (reader := file_reader(database)) is not None:
+            with closing(reader):
+                yield cls(reader)
+            return
         from spook_tracker.tracker.store.database import session_on
 
         with session_on(database, readonly=True) as session:
@@ -83,28 +104,29 @@ class History:
         """Every sample of a run with its definition in that run, by the key the series has today."""
         run = self.run(run_id)
         found = {}
-        for _, series_id, definition, sample in self._read_samples(_of_run(run)):
+        for _, series_id, definition, sample in self._read_samples(OF_RUN, {"run": run.key}):
             key = self._canonical.get(series_id, definition.key)
             if key not in found or definition.key == key:  # today's name wins over an earlier one
                 found[key] = definition, sample
         return found
 
     def samples_of(
-        self, run_ids: Sequence[str], tests: set[str] | None = None
+        self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
     ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
-        """The samples of several runs, of these tests (all if None): `samples` of each, read at once."""
-        if tests is None:
+        """The samples of several runs, of these tests or series (all if None): `samples` of each, read at once."""
+        if tests is None and keys is None:
             return {run_id: self.samples(run_id) for run_id in run_ids}
-        of_tests = [i for i, key in self._canonical.items() if key.partition("/")[0] in tests]
+        chosen = self._canonical.keys() if keys is None else self._ids_of(keys)
+        wanted = [i for i in chosen if tests is None or self._canonical[i].partition("/")[0] in tests]
+        series, asked = listed("series", wanted)
         found: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {run_id: {} for run_id in run_ids}
         for start in range(0, len(run_ids), CHUNK):
             runs = [self.run(run_id) for run_id in run_ids[start : start + CHUNK]]
-            conditions = [
-                models.Sample.series_id.in_(of_tests),
-                models.Sample.run_key.in_([run.key for run in runs]),
-                models.Sample.started_at.in_([run.started_at for run in runs]),
-            ]
-            for run, series_id, definition, sample in self._read_samples(conditions):
+            keyed, parameters = listed("run", [run.key for run in runs])
+            where = f"r.key IN {keyed} AND s.series_id IN {series}"
+            for run, series_id, definition, sample in self._read_samples(
+                where, asked | parameters, by_run=True
+            ):
                 key = self._canonical.get(series_id, definition.key)
                 if key not in found[run.id] or definition.key == key:
                     found[run.id][key] = definition, sample
@@ -116,17 +138,17 @@ class History:
         Unknown keys are left out. `evidence=False` leaves out failure, counters, state hash and timing, which
         makes reading long histories several times faster.
         """
-        conditions: list[ColumnElement[bool]] = []
+        where = ""
+        parameters: dict[str, Any] = {}
         if keys is not None:
-            conditions = [models.Sample.series_id.in_(self._ids_of(keys))]
+            series, parameters = listed("series", self._ids_of(keys))
+            where = f"s.series_id IN {series}"
         with _no_collection():
-            return self._gathered(conditions, evidence)
+            return self._gathered(where, parameters, evidence)
 
-    def _gathered(
-        self, conditions: Sequence[ColumnElement[bool]], evidence: bool
-    ) -> dict[str, SeriesHistory]:
+    def _gathered(self, where: str, parameters: dict[str, Any], evidence: bool) -> dict[str, SeriesHistory]:
         gathered: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {}
-        for run, series_id, definition, sample in self._read_samples(conditions, evidence):
+        for run, series_id, definition, sample in self._read_samples(where, parameters, evidence):
             key = self._canonical.get(series_id, definition.key)
             points = gathered.setdefault(key, {})
             if run.id not in points or definition.key == key:
@@ -142,44 +164,37 @@ class History:
 
     def figures(self, run_id: str) -> tuple[document.FigureData, ...]:
         """The figures of a run; empty once the retention rule has dropped them."""
-        return self._bodies(models.Figure, run_id, document.FigureData)
+        return self._bodies("figure", run_id, document.FigureData)
 
     def maps(self, run_id: str) -> tuple[document.MapData, ...]:
         """The stability maps of a run; empty once the retention rule has dropped them."""
-        return self._bodies(models.StabilityMap, run_id, document.MapData)
+        return self._bodies("stability_map", run_id, document.MapData)
 
     def trajectories(self, run_id: str) -> tuple[document.Trajectory, ...]:
         """The motions recorded in a run; empty once the retention rule has dropped them."""
-        return self._bodies(models.Trajectory, run_id, document.Trajectory)
+        return self._bodies("trajectory", run_id, document.Trajectory)
 
     def cards(self, run_id: str) -> tuple[document.TestCard, ...]:
         """What the run says about its tests."""
-        cards = select(models.TestCards.body).join(models.Run).where(models.Run.key == self.run(run_id).key)
-        return rows.cards_of(self._session.execute(cards).scalar_one())
+        of_run = "SELECT c.body FROM run r JOIN test_cards c ON c.id = r.test_cards_id WHERE r.key = :run"
+        ((body,),) = self._reader.rows(of_run, run=self.run(run_id).key)
+        return rows.cards_of(body)
 
     def document(self, run_id: str) -> RunDocument:
         """The run as one document, equal to the one that was recorded."""
         run = self.run(run_id)
-        stored = self._session.execute(
-            select(
-                models.Run.idempotency_key,
-                models.Run.schema_version,
-                models.Run.series_list_id,
-                models.Run.partial,
-            ).where(models.Run.key == run.key)
-        ).one()
-        listed = self._session.execute(
-            select(models.SeriesListItem.definition_id)
-            .where(models.SeriesListItem.list_id == stored.series_list_id)
-            .order_by(models.SeriesListItem.position)
-        ).scalars()
-        definition_ids = list(listed)
+        ((key, schema_version, list_id, partial),) = self._reader.rows(
+            "SELECT idempotency_key, schema_version, series_list_id, partial FROM run WHERE key = :run",
+            run=run.key,
+        )
+        items = "SELECT definition_id FROM series_list_item WHERE list_id = :list ORDER BY position"
+        definition_ids = [found for (found,) in self._reader.rows(items, list=list_id)]
         definitions = self._read_definitions(definition_ids)
-        samples = [sample for _, _, _, sample in self._read_samples(_of_run(run))]
+        samples = [sample for _, _, _, sample in self._read_samples(OF_RUN, {"run": run.key})]
         return RunDocument(
-            schema_version=stored.schema_version,
+            schema_version=schema_version,
             id=run.id,
-            idempotency_key=stored.idempotency_key,
+            idempotency_key=key,
             started=run.started,
             finished=run.finished,
             trigger=run.trigger,  # type: ignore[arg-type]
@@ -193,7 +208,7 @@ class History:
             figures=self.figures(run_id),
             maps=self.maps(run_id),
             trajectories=self.trajectories(run_id),
-            partial=stored.partial,
+            partial=bool(partial),
             asked=run.asked,
         )
 
@@ -206,29 +221,35 @@ class History:
         from spook_tracker.tracker.store.table import values_table
 
         runs = [self.resolve(name) for name in names] or self._runs
-        return values_table(self._session, [run.key for run in runs])
+        return values_table(self._reader, [run.key for run in runs])
 
     def _read_runs(self) -> tuple[RunInfo, ...]:
-        connection = self._session.connection()
-        found = connection.execute(select(models.EngineVersion.__table__)).mappings()
-        engines = {row["id"]: rows.engine_of(dict(row)) for row in found}
-        found = connection.execute(select(models.Machine.__table__)).mappings()
-        machines = {row["id"]: rows.machine_of(dict(row)) for row in found}
-        same = (
-            "id", "started", "finished", "trigger", "tracker_version", "ci_address", "key", "started_at",
-            "gates", "gates_passed",
-        )  # fmt: skip
-        columns = [getattr(models.Run, name) for name in (*same, "asked", "engine_version_id", "machine_id")]
+        engines = {
+            row["id"]: rows.engine_of(row) for row in self._table("engine_version", document.EngineVersion)
+        }
+        machines = {row["id"]: rows.machine_of(row) for row in self._table("machine", document.Machine)}
+        columns = ", ".join(
+            f'"{name}"' for name in (*RUN, "started_at", "asked", "engine_version_id", "machine_id")
+        )
         runs = [
             RunInfo(
                 engine=engines[row[-2]],
                 machine=machines[row[-1]],
                 asked=rows.asked_of(row[-3]),
-                **dict(zip(same, row[:-3], strict=True)),
+                started_at=rows.stored_moment(row[-4]),
+                **dict(zip(RUN, row[:-4], strict=True)),
             )
-            for row in connection.execute(select(*columns))
+            for row in self._reader.rows(f"SELECT {columns} FROM run")
         ]
         return self._in_commit_order(runs)
+
+    def _table(self, table: str, kind: type[Any]) -> list[dict[str, Any]]:
+        """The rows of a table that holds such things, by their columns."""
+        columns = ("id", *kind.__struct_fields__)
+        named = ", ".join(f'"{name}"' for name in columns)
+        return [
+            dict(zip(columns, row, strict=True)) for row in self._reader.rows(f"SELECT {named} FROM {table}")
+        ]
 
     def _in_commit_order(self, runs: list[RunInfo]) -> tuple[RunInfo, ...]:
         parents: dict[str, tuple[str, ...]] = {}
@@ -252,10 +273,10 @@ class History:
 
     def _read_names(self) -> dict[int, str]:
         """Series id to the key the series has today: renames followed to their end."""
-        keys = {row.id: row.key for row in self._session.execute(select(models.Series.id, models.Series.key))}
+        keys = {row[0]: row[1] for row in self._reader.rows('SELECT id, "key" FROM series')}
         renamed: dict[int, int] = {}
-        for row in self._session.execute(select(models.Alias.alias, models.Alias.series_id)):
-            renamed.setdefault(models.identity("series", row.alias), row.series_id)
+        for alias, series_id in self._reader.rows("SELECT alias, series_id FROM series_alias"):
+            renamed.setdefault(identity("series", alias), series_id)
         names = {}
         for series_id in keys:
             today, steps = series_id, 0
@@ -267,39 +288,31 @@ class History:
     def _ids_of(self, keys: Iterable[str]) -> list[int]:
         """Ids of all series that carry one of these names or have come to carry it."""
         wanted = set(keys)
-        asked = {models.identity("series", key) for key in wanted}
+        asked = {identity("series", key) for key in wanted}
         today = {self._canonical[series_id] for series_id in asked if series_id in self._canonical} | wanted
         return sorted(series_id for series_id, key in self._canonical.items() if key in today)
 
     def _read_definitions(self, ids: Iterable[int]) -> dict[int, SeriesDefinition]:
         lacking = sorted(set(ids) - self._definitions.keys())
-        table = models.Definition
         for start in range(0, len(lacking), CHUNK):
-            query = select(table.id, table.body).where(table.id.in_(lacking[start : start + CHUNK]))
-            for row in self._session.execute(query):
-                self._definitions[row.id] = rows.definition_of(row.body)
+            chosen, parameters = listed("id", lacking[start : start + CHUNK])
+            query = f"SELECT id, body FROM definition WHERE id IN {chosen}"
+            for definition_id, body in self._reader.rows(query, **parameters):
+                self._definitions[definition_id] = rows.definition_of(body)
         return self._definitions
 
-    def _read_samples(self, conditions: Sequence[ColumnElement[bool]], evidence: bool = True) -> list[Found]:
-        """Samples in the order of time, then of their document."""
-        sample, proof, timing = models.Sample, models.Evidence, models.Timing
-        columns: list[Any] = [
-            sample.run_key, sample.series_id, sample.definition_id, sample.value, sample.special,
-            sample.outcome, sample.passed, sample.set_point_held,
-        ]  # fmt: skip
-        query = select(*columns)
-        if evidence:
-            query = (
-                query.add_columns(
-                    proof.failure, proof.state_hash, proof.counters, timing.seconds,
-                    timing.runs_per_repeat, timing.instructions, timing.stage_seconds, timing.cpu_seconds,
-                    timing.calibration,
-                )
-                .outerjoin(proof, _same_place(sample, proof))
-                .outerjoin(timing, _same_place(sample, timing))
-            )  # fmt: skip
-        query = query.where(*conditions).order_by(sample.started_at, sample.run_key, sample.position)
-        stored = self._session.connection().execute(query).all()
+    def _read_samples(
+        self, where: str, parameters: dict[str, Any], evidence: bool = True, by_run: bool = False
+    ) -> list[Found]:
+        """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
+        query = f"SELECT {SAMPLE}{EVIDENCE if evidence else ''} FROM "
+        query += (
+            "run r JOIN sample s ON s.started_at = r.started_at AND s.run_key = r.key"
+            if by_run
+            else "sample s"
+        )
+        query += (BESIDE if evidence else "") + (f" WHERE {where}" if where else "")
+        stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
         definitions = self._read_definitions(row[2] for row in stored)
         runs = {run.key: run for run in self._runs}
         found = []
@@ -311,26 +324,23 @@ class History:
             if evidence and row[8] is not None:
                 more = {"failure": row[8], "state_hash": row[9], "counters": rows.counters_of(row[10])}
             if evidence and row[11] is not None:
-                more["timing"] = rows.timing_of(*row[11:17])
+                more["timing"] = rows.timing_of(*row[11:18])
             read = Sample(
                 series=definition.key,
                 value=rows.joined(row[3], row[4]),
                 outcome=row[5],
-                passed=row[6],
-                set_point_held=row[7],
+                passed=bool(row[6]),
+                set_point_held=bool(row[7]),
                 **more,
             )
             found.append((runs[row[0]], row[1], definition, read))
         return found
 
-    def _bodies(self, model: Any, run_id: str, kind: type[Body]) -> tuple[Body, ...]:
-        run = self.run(run_id)
-        query = (
-            select(model.body)
-            .where(model.started_at == run.started_at, model.run_key == run.key)
-            .order_by(model.position)
+    def _bodies(self, table: str, run_id: str, kind: type[Body]) -> tuple[Body, ...]:
+        query = f"SELECT s.body FROM {table} s WHERE {OF_RUN} ORDER BY s.position"
+        return tuple(
+            rows.unpacked(body, kind) for (body,) in self._reader.rows(query, run=self.run(run_id).key)
         )
-        return tuple(rows.unpacked(body, kind) for body in self._session.execute(query).scalars())
 
 
 @contextmanager
@@ -343,19 +353,6 @@ def _no_collection() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-def _of_run(run: RunInfo) -> list[ColumnElement[bool]]:
-    """The leading columns of the key: one range of the table, however large it is."""
-    return [models.Sample.started_at == run.started_at, models.Sample.run_key == run.key]
-
-
-def _same_place(sample: Any, other: Any) -> ColumnElement[bool]:
-    return and_(
-        other.started_at == sample.started_at,
-        other.run_key == sample.run_key,
-        other.series_id == sample.series_id,
-    )
 
 
 def _utc(time: str) -> str:

@@ -9,7 +9,6 @@ that hold the same thing hold it under the same id, and shards merge without ren
 
 from __future__ import annotations
 
-import hashlib
 from datetime import UTC, datetime
 from typing import Any
 
@@ -27,6 +26,8 @@ from sqlalchemy import (
     TypeDecorator,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+from spook_tracker.tracker.store.rows import SPECIALS
 
 NAMING = {
     "pk": "pk_%(table_name)s",
@@ -46,7 +47,6 @@ OUTCOMES = (
     "missing",
     "not_supported",
 )
-SPECIALS = ("nan", "inf", "-inf", "-0.0")  # float64 values that not every database keeps
 
 
 class UTCDateTime(TypeDecorator[datetime]):
@@ -66,12 +66,6 @@ class UTCDateTime(TypeDecorator[datetime]):
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
-
-
-def identity(kind: str, content: str) -> int:
-    """A number of 53 bits for `content`, the same everywhere: what a float64, and so JavaScript, holds exactly."""
-    digest = hashlib.sha256(f"{kind}\0{content}".encode()).digest()
-    return int.from_bytes(digest[:8], "big") >> 11
 
 
 def _one_of(column: str, values: tuple[str, ...]) -> str:
@@ -296,6 +290,7 @@ class Timing(Base):
     calibration: Mapped[str] = _text(
         "JSON list: seconds of the calibration kernel beside each repeat; empty if not taken"
     )
+    again: Mapped[str] = _text("JSON object: the same timed once more that night; empty if it was not")
 
 
 class Figure(Base):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sqlalchemy import Table, insert, or_, select
+from sqlalchemy import Table, insert, or_, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -14,7 +14,7 @@ from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
 from spook_tracker.tracker.store.database import in_words, one_writer
-from spook_tracker.tracker.store.models import identity
+from spook_tracker.tracker.store.identity import identity
 
 ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
 CHUNK = 500  # ids in one IN (...), well below every database's limit
@@ -135,6 +135,18 @@ def _ensure(session: Session, model: type[models.Base], wanted: list[rows.Row]) 
             if dict(there) != by_id.pop(there["id"]):
                 raise DatabaseError(f"two different rows of {table.name} have the id {there['id']}")
     _append(session, model, list(by_id.values()))
+
+
+def add_again(session: Session, run: RunDocument) -> None:
+    """Store what was timed once more after the run was recorded; it is written once and never changed."""
+    table, place = models.Timing, {"started_at": rows.moment(run.started), "run_key": identity("run", run.id)}
+    for sample in run.samples:
+        if sample.timing is not None and sample.timing.again is not None:
+            here = place | {"series_id": identity("series", sample.series)}
+            session.execute(
+                update(table).filter_by(**here, again="").values(again=rows.json_of(sample.timing.again))
+            )
+    session.commit()
 
 
 def _ensure_aliases(session: Session, run: RunDocument) -> None:

@@ -13,9 +13,10 @@ import msgspec
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
 from spook_tracker.tracker.document.json_form import Number, decode, encode
-from spook_tracker.tracker.store.models import identity
+from spook_tracker.tracker.store.identity import identity
 
 Row = dict[str, Any]
+SPECIALS = ("nan", "inf", "-inf", "-0.0")  # float64 values that not every database keeps
 Part = TypeVar("Part")
 
 
@@ -47,6 +48,12 @@ def moment(text: str) -> datetime:
         raise DocumentError(f"{text[:60]!r} is not a time; write it as 2026-11-21T03:17:00+00:00") from None
 
 
+def stored_moment(value: datetime | str) -> datetime:
+    """A moment as it was stored; SQLite keeps text, and all is UTC."""
+    found = datetime.fromisoformat(value) if isinstance(value, str) else value
+    return found.replace(tzinfo=UTC) if found.tzinfo is None else found.astimezone(UTC)
+
+
 def split(number: float) -> tuple[float | None, str | None]:
     """A float64 as (value, special): every bit survives in databases that lose NaN or the sign of zero."""
     if not math.isfinite(number):
@@ -71,6 +78,7 @@ def engine_row(engine: document.EngineVersion) -> Row:
 
 def engine_of(row: Mapping[str, Any]) -> document.EngineVersion:
     columns = {name: row[name] for name in document.EngineVersion.__struct_fields__}
+    columns |= {"dirty": bool(row["dirty"])}
     return document.EngineVersion(**columns | {"parents": decode(row["parents"], tuple[str, ...])})
 
 
@@ -158,6 +166,7 @@ def timing_row(timing: document.Timing) -> Row:
         "stage_seconds": json_of(timing.stage_seconds),
         "cpu_seconds": json_of(timing.cpu_seconds) if timing.cpu_seconds else "",
         "calibration": json_of(timing.calibration) if timing.calibration else "",
+        "again": json_of(timing.again) if timing.again else "",
     }
 
 
@@ -167,7 +176,13 @@ _COUNTERS = msgspec.json.Decoder(dict[str, int])
 
 
 def timing_of(
-    seconds: str, runs_per_repeat: int, instructions: int | None, stages: str, cpu: str, calibration: str
+    seconds: str,
+    runs_per_repeat: int,
+    instructions: int | None,
+    stages: str,
+    cpu: str,
+    calibration: str,
+    again: str,
 ) -> document.Timing:
     return document.Timing(
         seconds=_SECONDS.decode(seconds),
@@ -176,6 +191,7 @@ def timing_of(
         stage_seconds=_BY_STAGE.decode(stages),
         cpu_seconds=_SECONDS.decode(cpu) if cpu else (),
         calibration=_SECONDS.decode(calibration) if calibration else (),
+        again=decode(again, document.Again) if again else None,
     )
 
 

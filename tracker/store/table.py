@@ -8,65 +8,59 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable
 from importlib import import_module
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import select
-
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.reader import CHUNK, Reader, listed
+from spook_tracker.tracker.store.rows import SPECIALS, stored_moment
 
 if TYPE_CHECKING:
     import pandas
-    from sqlalchemy.orm import Session
 
-CHUNK = 500  # runs in one IN (...)
+COLUMNS = {
+    "night": "r.started_at", "run": "r.id", "engine": "v.name", "version": "v.version", "git_hash": "v.git_hash",
+    "machine": "m.fingerprint", "test": "d.test", "configuration": "d.configuration", "metric": "d.metric",
+    "role": "d.role", "kind": "d.kind", "time_step": "d.time_step", "unit": "d.unit", "series": "series.key",
+    "value": "s.value", "special": "s.special", "outcome": "s.outcome", "passed": "s.passed",
+    "set_point_held": "s.set_point_held", "limit_low": "d.limit_low", "limit_high": "d.limit_high",
+}  # fmt: skip
+QUERY = """SELECT {columns} FROM run r
+    JOIN engine_version v ON v.id = r.engine_version_id
+    JOIN machine m ON m.id = r.machine_id
+    JOIN sample s ON s.started_at = r.started_at AND s.run_key = r.key
+    JOIN definition d ON d.id = s.definition_id
+    JOIN series ON series.id = s.series_id
+    WHERE r.key IN {runs} ORDER BY r.started_at, r.key, s.position"""
 
 
 class TableError(TrackerError):
     """The table cannot be made; one sentence that names the way out."""
 
 
-def values_table(session: Session, run_keys: Iterable[int]) -> pandas.DataFrame:
+def values_table(reader: Reader, run_keys: Iterable[int]) -> pandas.DataFrame:
     """Every value of these runs, in the order of time and of their documents.
 
     Numbers are the float64 that were recorded, NaN and infinities included; where there is no number, `outcome`
     says why. Times are UTC.
     """
     frames = _pandas()
-    run, engine, machine = models.Run, models.EngineVersion, models.Machine
-    sample, definition, series = models.Sample, models.Definition, models.Series
-    columns: dict[str, Any] = {
-        "night": run.started_at, "run": run.id, "engine": engine.name, "version": engine.version,
-        "git_hash": engine.git_hash, "machine": machine.fingerprint, "test": definition.test,
-        "configuration": definition.configuration, "metric": definition.metric, "role": definition.role,
-        "kind": definition.kind, "time_step": definition.time_step, "unit": definition.unit,
-        "series": series.key, "value": sample.value, "special": sample.special, "outcome": sample.outcome,
-        "passed": sample.passed, "set_point_held": sample.set_point_held,
-        "limit_low": definition.limit_low, "limit_high": definition.limit_high,
-    }  # fmt: skip
-    query = (
-        select(*(column.label(name) for name, column in columns.items()))
-        .join_from(run, engine, engine.id == run.engine_version_id)
-        .join(machine, machine.id == run.machine_id)
-        .join(sample, (sample.started_at == run.started_at) & (sample.run_key == run.key))
-        .join(definition, definition.id == sample.definition_id)
-        .join(series, series.id == sample.series_id)
-        .order_by(run.started_at, run.key, sample.position)
-    )
     keys = sorted(run_keys)
     rows: list[Any] = []
     for start in range(0, len(keys), CHUNK):
-        rows += session.execute(query.where(run.key.in_(keys[start : start + CHUNK]))).all()
-    rows.sort(
-        key=lambda row: row.night
-    )  # chunks of keys are not in the order of time; within a night they are
-    table: pandas.DataFrame = frames.DataFrame(rows, columns=list(columns))
-    numbers = {name: float(name) for name in models.SPECIALS}
+        chosen, parameters = listed("run", keys[start : start + CHUNK])
+        found = reader.rows(QUERY.format(columns=", ".join(COLUMNS.values()), runs=chosen), **parameters)
+        rows += [(stored_moment(night), *rest) for night, *rest in found]
+    rows.sort(key=itemgetter(0))  # chunks of keys are not in the order of time; within a night they are
+    table: pandas.DataFrame = frames.DataFrame(rows, columns=list(COLUMNS))
+    numbers = {name: float(name) for name in SPECIALS}
     special = table.pop("special").map(numbers)
     table["value"] = (
         table["value"].astype("float64").where(special.isna() & ~(table["value"].isna()), special)
     )
+    for name in ("passed", "set_point_held"):
+        table[name] = table[name].astype("bool")
     for name in ("time_step", "limit_low", "limit_high"):
         table[name] = table[name].astype("float64")
     return table

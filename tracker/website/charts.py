@@ -27,6 +27,8 @@ class Line:
     notes: tuple[str, ...] = ()  # what a reader sees at each point, if anything
     quiet: bool = False  # left out of the legend
     upto: tuple[float, ...] = ()  # how far each point reaches along x: the slowest repeat
+    night: str = ""  # the choice of an earlier night it belongs to
+    waits: bool = False  # not drawn until a reader chooses its night
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,6 +139,8 @@ def drawable(chart: Chart) -> Chart:
                     colour=line.colour,
                     notes=tuple(failed_notes),
                     quiet=True,
+                    night=line.night,
+                    waits=line.waits,
                 )
             )
     note = chart.note

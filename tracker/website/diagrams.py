@@ -22,6 +22,7 @@ from spook_tracker.tracker.document.wording import (
     version,
 )
 from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
+from spook_tracker.tracker.website.earlier_nights import Earlier
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.figures import figure, grid_figure
 from spook_tracker.tracker.website.nights import Night, TestHistory, Trend
@@ -320,8 +321,13 @@ def ladders(test: TestHistory) -> dict[str, dict[str, list[Trend]]]:
 Peers = Sequence[tuple[str, TestHistory]]  # other engines on the same machine: name, the same test
 
 
-def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> list[Chart]:
-    """Error against seconds and against work for every ladder of a test; peers against seconds only."""
+def ladder_charts(
+    test: TestHistory, prefix: str = "", peers: Peers = (), earlier: Sequence[Earlier] = ()
+) -> list[Chart]:
+    """Error against seconds and against work for every ladder of a test; peers against seconds only.
+
+    Of the earlier nights the first is drawn, the others wait until a reader asks for them.
+    """
     charts = []
     orders = {
         (t.definition.metric.removeprefix("ladder:").rpartition(":")[0], t.definition.configuration): t.value
@@ -330,7 +336,6 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
     for name, configurations in ladders(test).items():
         definition = next(iter(configurations.values()))[0].definition
         points = {c: rungs(trends, lambda t: t.latest) for c, trends in configurations.items()}
-        earlier = {c: rungs(trends, lambda t: t.before) for c, trends in configurations.items()}
         for axis, label, of in (
             ("seconds", "run time [s]", lambda r: r.seconds),
             ("work", "work [operations counted]", lambda r: r.work),
@@ -340,12 +345,9 @@ def ladder_charts(test: TestHistory, prefix: str = "", peers: Peers = ()) -> lis
                 order = orders.get((name, configuration))
                 told = f" ({order:.2f})" if order is not None and math.isfinite(order) else ""
                 lines.append(_ladder_line(f"{configuration}{told}", found, of, colour, definition.unit))
-                before = earlier.get(configuration, [])
-                if axis == "seconds" and any(math.isfinite(r.seconds) for r in before):
-                    line = _ladder_line(
-                        f"{configuration}, the night before", before, of, colour, definition.unit
-                    )
-                    lines.append(_ghost(line))
+                if axis == "seconds":
+                    trends = configurations[configuration]
+                    lines += _earlier_lines(trends, configuration, earlier, colour, definition.unit)
             everybody = [r for found in points.values() for r in found]
             if axis == "seconds":  # what one engine counts, another does not
                 beside = _peer_rungs(peers, name)
@@ -408,16 +410,19 @@ def _peer_lines(
     return lines
 
 
-def _ghost(line: Line) -> Line:
-    return Line(
-        name=line.name,
-        x=line.x,
-        y=line.y,
-        style="reference",
-        colour=line.colour,
-        notes=line.notes,
-        quiet=True,
-    )
+def _earlier_lines(
+    trends: Sequence[Trend], configuration: str, earlier: Sequence[Earlier], colour: int, unit: str
+) -> list[Line]:
+    """The same configuration on earlier nights, in short dashes."""
+    lines = []
+    for place, one in enumerate(earlier):
+        found = rungs(trends, lambda t, index=one.index: t.earlier.get(index))  # type: ignore[misc]
+        if any(math.isfinite(r.seconds) for r in found):
+            line = _ladder_line(f"{configuration}, {one.words}", found, lambda r: r.seconds, colour, unit)
+            lines.append(
+                replace(line, style="reference", quiet=True, upto=(), night=one.key, waits=place > 0)
+            )
+    return lines
 
 
 def _ladder_line(

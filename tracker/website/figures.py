@@ -191,6 +191,8 @@ def _trace(line: Line) -> dict[str, Any]:
         "meta": {"colour": line.colour % 8, "style": line.style},
         "showlegend": not line.quiet,
     }
+    if line.night:
+        trace["meta"]["night"] = line.night
     if line.style in DASHES:
         trace["line"] = {"dash": DASHES[line.style]}
     if line.style == "steps":

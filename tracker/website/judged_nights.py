@@ -121,7 +121,7 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
     """What the history knows of every run, by its id, as tracker/judge/compare.py:known tells it of two."""
     found: dict[str, Marks] = {}
     for key, series in told.items():
-        timed = series.definition.kind == "time"
+        timed = series.definition.kind == "time" and not is_read_off(series.definition)
         for judged in series.nights:
             usual = None
             if timed and judged.usual is not None:

@@ -28,6 +28,7 @@ from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.standing import worst
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.earlier_nights import Earlier, earlier_nights
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
 MapKey = tuple[str, str, str]  # test, configuration, name
@@ -59,7 +60,7 @@ class Trend:
     outcomes: list[str] = field(default_factory=list)
     held: list[bool] = field(default_factory=list)  # set point
     latest: Sample | None = None  # of the newest night that has one, with its evidence
-    before: Sample | None = None  # of the night before that, where it was timed
+    earlier: dict[int, Sample] = field(default_factory=dict)  # of a ladder: by index of `Chapter.earlier`
     order: int = 0  # place in its run's document
 
     @property
@@ -125,6 +126,7 @@ class Chapter:
 
     nights: list[Night]
     tests: list[TestHistory]
+    earlier: list[Earlier]  # nights to lay beside tonight's ladders
 
     @property
     def tonight(self) -> Night:
@@ -167,7 +169,7 @@ class Records(Protocol):
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
     def samples(self, run_id: str) -> Mapping[str, tuple[SeriesDefinition, Sample]]: ...
     def samples_of(
-        self, run_ids: Sequence[str], tests: set[str] | None
+        self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
     ) -> Mapping[str, Mapping[str, tuple[SeriesDefinition, Sample]]]: ...
     def cards(self, run_id: str) -> Sequence[TestCard]: ...
     def figures(self, run_id: str) -> Sequence[FigureData]: ...
@@ -179,7 +181,7 @@ def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
     """The book of a history. The engine of the newest run that was not imported is the one it is about."""
     runs = list(history.runs())
     if not runs:
-        return Book([], [])
+        return Book([], [], [])
     first, *others = lines(runs)
     chapters = [_chapter(history, line, accepted) for line in others]
     return Book(*_chapter(history, first, accepted), [Chapter(*chapter) for chapter in chapters])
@@ -187,8 +189,8 @@ def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
 
 def _chapter(
     history: Records, runs: Sequence[Any], accepted: Sequence[Accepted]
-) -> tuple[list[Night], list[TestHistory]]:
-    """One engine's nights and tests."""
+) -> tuple[list[Night], list[TestHistory], list[Earlier]]:
+    """One engine's nights and tests, and the nights to lay beside tonight's ladders."""
     nights = [
         Night(
             index, run.id, run.started, run.finished, run.trigger, run.ci_address, run.tracker_version,
@@ -210,7 +212,7 @@ def _chapter(
             latest=points[-1].sample,
         )
     _add_evidence(history, nights, trends)
-    _add_earlier_ladders(history, nights, trends)
+    earlier = _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
     figures: dict[str, list[FigureData]] = {}
     motions: dict[str, list[tuple[Night, Trajectory]]] = {}
@@ -253,7 +255,7 @@ def _chapter(
         )
         for test, card in cards.items()
     ]
-    return nights, sorted(tests, key=lambda t: not t.card.seven)
+    return nights, sorted(tests, key=lambda t: not t.card.seven), earlier
 
 
 def _bare_card(name: str, title: str) -> TestCard:
@@ -278,13 +280,18 @@ def _add_evidence(history: Records, nights: Sequence[Night], trends: Mapping[str
                 trends[key].latest = samples[key][1]
 
 
-def _add_earlier_ladders(history: Records, nights: Sequence[Night], trends: Mapping[str, Trend]) -> None:
-    """The ladder of the night before beside tonight's."""
-    timed = [(key, trend) for key, trend in trends.items() if trend.definition.kind == "ladder"]
-    before = max((trend.nights[-2] for _, trend in timed if len(trend.nights) > 1), default=None)
+def _add_earlier_ladders(
+    history: Records, nights: Sequence[Night], trends: Mapping[str, Trend]
+) -> list[Earlier]:
+    """The ladders of earlier nights beside tonight's."""
+    timed = {key: trend for key, trend in trends.items() if trend.definition.kind == "ladder"}
+    before = max((trend.nights[-2] for trend in timed.values() if len(trend.nights) > 1), default=None)
     if before is None:
-        return
-    samples = history.samples(nights[before].id)
-    for key, trend in timed:
-        if key in samples and len(trend.nights) > 1 and trend.nights[-2] == before:
-            trend.before = samples[key][1]
+        return []
+    earlier = earlier_nights(nights, before)
+    for one in earlier:
+        samples = history.samples(nights[one.index].id)
+        for key, trend in timed.items():
+            if key in samples and one.index in trend.nights[:-1]:
+                trend.earlier[one.index] = samples[key][1]
+    return [one for one in earlier if any(one.index in trend.earlier for trend in timed.values())]

@@ -272,7 +272,9 @@ def engine_page(book: Book, chapter: Chapter) -> Page:
         "ladders": [
             view(chart, table=False)
             for test in chapter.tests
-            for chart in ladder_charts(retitled(ours, test), f"{slug(test.name)}-")
+            for chart in ladder_charts(
+                retitled(ours, test), f"{slug(test.name)}-", earlier=chapter.earlier[:1]
+            )
             if chart.name.endswith("-seconds")
         ],
         "versions": _folded(list(reversed(_versions(chapter, steps))))[:MOST_RELEASES],

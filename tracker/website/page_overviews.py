@@ -39,7 +39,7 @@ def error_time(book: Book) -> Page:
     """What accuracy costs, for all tests."""
     charts = []
     for test in book.tests:
-        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name)):
+        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name), book.earlier[:1]):
             shown = view(chart, table=False)
             axis = "work" if chart.name.endswith("-work") else "seconds"
             charts.append((axis, shown, address(test)))
@@ -179,7 +179,9 @@ def document(book: Book, events: Sequence[Event]) -> Page:
         scalars = test.gates() + test.companions() + test.reported() + test.of_kind("order")
         pictures = [picture(figure_chart(f, f"{name}-")) for f in test.figures]
         pictures += [
-            picture(chart) for chart in ladder_charts(test, f"{name}-") if chart.name.endswith("-seconds")
+            picture(chart)
+            for chart in ladder_charts(test, f"{name}-", earlier=book.earlier[:1])
+            if chart.name.endswith("-seconds")
         ]
         pictures += [grid_picture(map_grid(m, f"{name}-")) for m in test.maps]
         tests.append(

@@ -32,7 +32,8 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     break_points = test.of_kind("break_point")
     scalars = shown + test.reported()
     newest = max((t.nights[-1] for t in test.trends), default=book.tonight.index)
-    charts = ladder_charts(test, peers=book.peers(test.name))
+    charts = ladder_charts(test, peers=book.peers(test.name), earlier=book.earlier)
+    drawn = {line.night for chart in charts for line in chart.lines if line.night}
     contents = [("scene", "The question"), ("versions", "Over versions")]
     contents += [("figures", "Figures")] if test.figures else []
     contents += [("error-time", "Error against run time")] if charts else []
@@ -56,6 +57,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         ],
         "figures": [view(figure_chart(f)) for f in test.figures],
         "ladders": [view(c) for c in charts],
+        "earlier": [(one.key, one.told(book.nights[one.index])) for one in book.earlier if one.key in drawn],
         "orders": [every[id(t)] for t in [*test.of_kind("order"), *test.of_kind("time")]],
         "maps": [grid_view(map_grid(m)) for m in test.maps],
         "break_points": [every[id(t)] for t in break_points],

@@ -111,7 +111,7 @@ def picture(chart: Chart) -> Picture:
         high = max(y_of(band.high), box[1])
         out.bands.append((_n(high), _n(max(low - high, 1.5)), clean(band.name)))
     out.names = [(_n(y_of(y) - 5.0), clean(name)) for y, name in names_on_lines(chart)]
-    out.marks = [_mark(line, x_of, y_of) for line in chart.lines]
+    out.marks = [_mark(line, x_of, y_of) for line in chart.lines if not line.waits]
     return out
 
 

@@ -1,0 +1,56 @@
+"""Which earlier nights a reader may lay beside tonight's ladders."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from types import SimpleNamespace
+from typing import Any
+
+from spook_tracker.tracker.website.earlier_nights import earlier_nights
+from spook_tracker.tracker.website.nights import book
+from tests.synthetic_history import START, history
+
+
+def night(index: int, day: float, version: str = "1.0.0+g12", started: str = "", dirty: bool = False) -> Any:
+    engine = SimpleNamespace(version=version, dirty=dirty)
+    return SimpleNamespace(
+        index=index, engine=engine, started=started or (START + timedelta(days=day)).isoformat()
+    )
+
+
+def chosen(nights: list[Any], before: int) -> list[tuple[str, int]]:
+    return [(one.key, one.index) for one in earlier_nights(nights, before)]
+
+
+def test_a_week_and_a_month_are_the_newest_nights_at_least_that_old() -> None:
+    days = [0, 9, 10, 11, 30, 33, 34, 38, 40]
+    nights = [night(i, day) for i, day in enumerate(days)]
+    assert chosen(nights, 7) == [("before", 7), ("week", 5), ("month", 2)]
+
+
+def test_releases_are_offered_newest_first_and_at_most_four_of_them() -> None:
+    names = ["1.0.0", "1.0.0+g1", "1.1.0", "1.2.0", "1.3.0", "1.3.0", "1.4.0", "1.4.0+g7", "1.4.0+g8"]
+    nights = [night(i, i / 24.0, name) for i, name in enumerate(names)]
+    assert chosen(nights, 7) == [
+        ("before", 7), ("release-1.4.0", 6), ("release-1.3.0", 5), ("release-1.2.0", 3), ("release-1.1.0", 2),
+    ]  # fmt: skip
+
+
+def test_a_night_is_offered_once_and_a_changed_tree_is_no_release() -> None:
+    nights = [night(0, 0, "1.0.0"), night(1, 1, "1.1.0", dirty=True), night(2, 9, "1.2.0")]
+    assert chosen(nights, 0) == [("before", 0)]
+    assert chosen(nights, 1) == [("before", 1), ("release-1.0.0", 0)]
+
+
+def test_a_start_that_is_no_moment_offers_no_week() -> None:
+    assert chosen([night(0, 0), night(1, 20, started="yesterday")], 0) == [("before", 0)]
+    assert (
+        chosen([night(0, 0, started="?"), night(1, 1), night(2, 20)], 1) == [("before", 1), ("week", 1)][:1]
+    )
+
+
+def test_a_ladder_keeps_the_values_of_the_nights_that_are_offered() -> None:
+    told = book(history(12))
+    assert [(one.key, one.index) for one in told.earlier] == [("before", 10), ("week", 4)]
+    ladder = next(t for test in told.tests for t in test.of_kind("ladder"))
+    assert {i: sample.value for i, sample in ladder.earlier.items()} == {i: ladder.values[i] for i in (10, 4)}

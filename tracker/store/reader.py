@@ -1,0 +1,106 @@
+"""Rows for plain statements, from whatever holds the history: a session, or a SQLite file read without SQLAlchemy.
+
+To import SQLAlchemy takes longer than to compare two versions. A file that is as it should be is therefore read by
+the driver alone; any other is left to tracker/store/database.py, which knows what is wrong with it.
+Statements are such as SQLite and PostgreSQL both understand, with parameters as `:name`.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import quote
+
+from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.store.head import head
+
+if TYPE_CHECKING:
+    from sqlalchemy.orm import Session
+
+LOCK_TIMEOUT = 30.0  # s to wait for another writer
+SAFE = ("trusted_schema = OFF", "cell_size_check = ON")  # for files from elsewhere
+CHUNK = 500  # values in one IN (...)
+
+
+class Reader(Protocol):
+    """Rows of a statement, all from one moment."""
+
+    def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]: ...
+
+
+class SessionReader:
+    """Reads inside a session, and so what the session has written."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+
+    def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]:
+        from sqlalchemy import text
+
+        return self.session.connection().execute(text(statement), parameters).all()
+
+
+class FileReader:
+    """Reads a SQLite file by itself."""
+
+    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+        self.connection, self.path = connection, path
+
+    def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]:
+        try:
+            return self.connection.execute(statement, parameters).fetchall()
+        except sqlite3.Error as error:
+            from spook_tracker.tracker.store.connection import sentence
+
+            raise DatabaseError(sentence(str(self.path), error)) from error
+
+    def close(self) -> None:
+        self.connection.close()
+
+
+def listed(name: str, values: Iterable[Any]) -> tuple[str, dict[str, Any]]:
+    """The list of an IN (...), with its parameters."""
+    parameters = {f"{name}{place}": value for place, value in enumerate(values)}
+    return f"({', '.join(f':{key}' for key in parameters)})", parameters
+
+
+def file_reader(database: str) -> FileReader | None:
+    """A reader of the SQLite file at a URL or path, or None if anything about it is out of the ordinary."""
+    name = database.removeprefix("sqlite:///")
+    if name in ("", ":memory:") or "://" in name or any(sign in name for sign in "?%#"):
+        return None
+    path = Path(name)
+    connection = None
+    try:
+        if not path.is_file() or not path.stat().st_size:
+            return None
+        connection = sqlite3.connect(
+            address(path, readonly=True), uri=True, timeout=LOCK_TIMEOUT, isolation_level=None
+        )
+        for words in (*SAFE, "query_only = ON"):
+            connection.execute(f"PRAGMA {words}")
+        connection.execute("BEGIN")
+        revisions = connection.execute("SELECT version_num FROM alembic_version").fetchall()
+        triggers = connection.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall()
+    except (sqlite3.Error, OSError, RuntimeError):
+        revisions, triggers = [], []
+    if connection is not None and (revisions != [(head(),)] or triggers):
+        connection.close()
+        return None
+    return FileReader(connection, path) if connection is not None else None
+
+
+def address(path: Path, readonly: bool) -> str:
+    """The file as SQLite's own URI, which alone can say that nothing may be written."""
+    path = path.resolve()
+    mode = "rwc"
+    if readonly:
+        # where writing is possible, the last reader must be able to tidy the log away
+        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
+    log = path.with_name(path.name + "-wal")
+    if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
+        mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
+    return f"file:{quote(str(path))}?mode={mode}"
