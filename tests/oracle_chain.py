@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solveh_banded
+from scipy.linalg.lapack import dptsv
 
 Array = npt.NDArray[np.float64]
 GRAVITY = np.array([0.0, -9.81])  # m/s²
@@ -32,20 +32,28 @@ class Swing:
 
 def links(places: Array) -> tuple[Array, Array]:
     """Directions (links, 2) and lengths (links,) m."""
-    apart = np.diff(places, axis=0, prepend=np.zeros((1, 2)))
-    length = np.sqrt(np.sum(apart**2, axis=1))
+    apart = from_before(places)
+    length = np.sqrt(apart[:, 0] ** 2 + apart[:, 1] ** 2)
     return apart / length[:, None], length
+
+
+def from_before(values: Array) -> Array:
+    """Of each sphere less that of the sphere before it; the origin is before the first and rests."""
+    apart = values.copy()
+    apart[1:] -= values[:-1]
+    return apart
 
 
 def along(direction: Array, velocity: Array) -> Array:
     """G v: how fast each link grows, m/s."""
-    return np.asarray(np.sum(direction * np.diff(velocity, axis=0, prepend=np.zeros((1, 2))), axis=1))
+    return np.asarray(np.einsum("ij,ij->i", direction, from_before(velocity)))
 
 
 def pulled(direction: Array, impulse: Array) -> Array:
     """Gᵀ lambda on the spheres."""
     push = direction * impulse[:, None]
-    return push - np.append(push[1:], np.zeros((1, 2)), axis=0)
+    push[:-1] -= push[1:]
+    return push
 
 
 def swing(
@@ -65,18 +73,18 @@ def swing(
     softness = 4.0 * compliance * upsilon / h**2
     x, v = np.array(places, dtype=float), np.zeros_like(places, dtype=float)
     violations, energies, path = [], [], []
+    diagonal = softness + np.where(np.arange(count) == 0, 1.0, 2.0)
 
     def curvature(move: Array, direction: Array, length: Array) -> Array:
         return np.minimum(links(x + move)[1] - length - along(direction, move), cap * LENGTH)
 
     def solved(direction: Array, length: Array, bend: Array | float) -> tuple[Array, Array]:
         """v₊ for a curvature on the right side."""
-        banded = np.zeros((2, count))
-        banded[1] = softness + np.where(np.arange(count) == 0, 1.0, 2.0)
-        banded[0, 1:] = -np.sum(direction[1:] * direction[:-1], axis=1)
+        beside = -np.einsum("ij,ij->i", direction[1:], direction[:-1])
         kicked = v + h * GRAVITY
         wanted = upsilon * (along(direction, v) - 4.0 / h * (length - LENGTH)) - 4.0 / h * upsilon * bend
-        impulse = solveh_banded(banded, wanted - along(direction, kicked))
+        *_, impulse, failed = dptsv(diagonal, beside, wanted - along(direction, kicked))
+        assert failed == 0, "the matrix of a chain is positive definite"
         return kicked + pulled(direction, impulse), impulse
 
     completed = True

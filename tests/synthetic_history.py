@@ -385,9 +385,20 @@ def with_rival(found: DocumentHistory) -> DocumentHistory:
     return DocumentHistory([*found.documents.values(), *releases])
 
 
-def decade(nights: int = 3650) -> DocumentHistory:
-    """Ten years of nights: the values of forty, again and again."""
-    few = [document(n) for n in range(40)]
+def of_test(run: RunDocument, test: str) -> RunDocument:
+    """What a run says of one test."""
+    keys = {s.key for s in run.series if s.test == test}
+    return msgspec.structs.replace(
+        run,
+        series=tuple(s for s in run.series if s.key in keys),
+        samples=tuple(s for s in run.samples if s.series in keys),
+        tests=tuple(t for t in run.tests if t.name == test),
+    )
+
+
+def decade(nights: int = 3650, test: str = "") -> DocumentHistory:
+    """Ten years of nights: the values of forty, again and again; of one test, or of all."""
+    few = [of_test(document(n), test) if test else document(n) for n in range(40)]
     return DocumentHistory(
         [
             msgspec.structs.replace(
@@ -401,4 +412,4 @@ def decade(nights: int = 3650) -> DocumentHistory:
     )
 
 
-__all__ = ["DocumentHistory", "decade", "document", "history", "rival", "with_rival"]
+__all__ = ["DocumentHistory", "decade", "document", "history", "of_test", "rival", "with_rival"]

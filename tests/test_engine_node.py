@@ -1,15 +1,20 @@
-"""Engines in JavaScript: one process a simulation; a hang, a death and bad numbers are outcomes. Needs Node only."""
+"""Engines in JavaScript: one process an engine; a hang, a death and bad numbers are outcomes. Needs Node only."""
 
 from __future__ import annotations
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
 import pytest
 
+from spook_tracker.engine import Hinge, RigidBody, Scene
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.engine.peers import node
 
@@ -28,26 +33,81 @@ def task(**changes: Any) -> dict[str, Any]:
 
 def script(folder: Path, text: str) -> Path:
     file = folder / "engine.mjs"
-    file.write_text(text)
+    loop = Path(node.__file__).with_name("loop.mjs").as_uri()
+    file.write_text(f'import {{ serve }} from "{loop}"; serve(async (task) => {{ {text} }});')
     return file
 
 
 @needs_node
 def test_states_come_back_with_the_same_bits(tmp_path: Path) -> None:
     answer = """
-        import { readFileSync, writeSync } from "node:fs";
-        const task = JSON.parse(readFileSync(0, "utf8"));
-        const states = Float64Array.from({ length: 26 }, (_, i) => (i + 1) / 3);
-        const head = { kept: 2, steps: task.steps, status: "completed", failure: "", seconds: 0.5, setup_seconds: 0.25 };
-        writeSync(1, JSON.stringify(head) + "\\n");
-        writeSync(1, Buffer.from(states.buffer));
+        let done = 0;
+        const state = () => Array.from({ length: 13 }, (_, i) => (13 * done + i + 1) / 3);
+        return { state, step: () => { done += 1; } };
     """
     made = node.run(script(tmp_path, answer), task(), 5.0)
 
     assert made.samples.tolist() == [0, 10]
-    assert made.positions[1, 0].tolist() == [14 / 3, 15 / 3, 16 / 3]
-    assert made.angular_velocities[1, 0].tolist() == [24 / 3, 25 / 3, 26 / 3]
-    assert (made.steps, made.seconds, made.setup_seconds) == (10, 0.5, 0.25)
+    assert made.positions[1, 0].tolist() == [131 / 3, 132 / 3, 133 / 3]
+    assert made.angular_velocities[1, 0].tolist() == [141 / 3, 142 / 3, 143 / 3]
+    assert (made.steps, made.status) == (10, "completed")
+    assert made.seconds > 0.0
+
+
+@needs_node
+def test_a_process_answers_one_task_after_the_other_and_a_new_one_follows_a_death(tmp_path: Path) -> None:
+    counting = """
+        globalThis.tasks = (globalThis.tasks ?? 0) + 1;
+        if (task.steps === 13) throw new RangeError("unlucky");
+        console.log("a word that is no answer");
+        return { state: () => [process.pid, globalThis.tasks, ...Array(11).fill(0)], step: () => {} };
+    """
+    engine = script(tmp_path, counting)
+    first, second = (node.run(engine, task(), 30.0).positions[0, 0] for _ in range(2))
+    assert (first[0], first[1], second[1]) == (second[0], 1.0, 2.0)
+
+    with pytest.raises(node.NodeError, match="RangeError: unlucky"):
+        node.run(engine, task(steps=13), 30.0)
+    third = node.run(engine, task(), 30.0).positions[0, 0]
+    assert third[0] != first[0]
+    assert third[1] == 1.0
+
+
+@needs_node
+def test_a_task_longer_than_a_pipe_holds_arrives_whole(tmp_path: Path) -> None:
+    text = "return { state: () => [task.names.length, ...Array(12).fill(0)], step: () => {} };"
+    names = "ä" * 1_000_000
+    for _ in range(2):
+        made = node.run(script(tmp_path, text), task(names=names), 30.0)
+        assert made.positions[0, 0, 0] == len(names)
+
+
+@needs_node
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
+def test_a_process_ends_with_the_one_that_asked(tmp_path: Path) -> None:
+    """Whether it waits for a task or never ends one, and though nobody could say good-bye."""
+    engine = script(
+        tmp_path, "if (task.steps === 1) for (;;); return { state: () => [process.pid], step: () => {} };"
+    )
+    for steps in (0, 1):
+        asking = f"""
+import json, os, signal, sys, threading
+from pathlib import Path
+from spook_tracker.engine.peers import node
+served = node.Served(Path({str(engine)!r}))
+print(served._process.pid, flush=True)
+if {steps}:
+    threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGKILL)).start()
+served.answer({{"steps": {steps}, "every_step": False}}, None)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+        done = subprocess.run([sys.executable, "-c", asking], stdout=subprocess.PIPE, text=True, timeout=60)
+        assert done.returncode == -signal.SIGKILL
+        pid = int(done.stdout)
+        until = monotonic() + 20.0
+        while Path(f"/proc/{pid}").exists() and monotonic() < until:
+            sleep(0.02)
+        assert not Path(f"/proc/{pid}").exists() or " Z " in Path(f"/proc/{pid}/stat").read_text()
 
 
 @needs_node
@@ -76,6 +136,41 @@ def test_a_process_that_dies_is_a_crash_that_says_why(
     monkeypatch.setattr(node, "HEAP", 64)
     with pytest.raises(node.NodeError, match=said):
         node.run(script(tmp_path, text), task(), 30.0)
+
+
+def swinging(count: int) -> Scene:
+    """Bodies side by side, each about a hinge of its own 1 m above it."""
+    bodies = [
+        RigidBody(name=f"b{k}", mass=2.0, inertia=(0.5, 0.5, 0.5), position=(k + 0.1, 0.0, -1.0))
+        for k in range(count)
+    ]
+    hinges = [
+        Hinge(name=f"h{k}", between=("world", f"b{k}"), at=(float(k), 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+        for k in range(count)
+    ]
+    return Scene(bodies=tuple(bodies), constraints=tuple(hinges), gravity=(0.0, 0.0, -9.81))
+
+
+@pytest.mark.parametrize("name", ["cannon", "jolt", "p2", "rapier"])
+def test_what_a_process_answered_before_changes_no_bit(name: str) -> None:
+    try:
+        engine = find(name)
+    except EngineMissing as reason:
+        pytest.skip(str(reason))
+
+    def answer(count: int, configuration: str) -> list[float]:
+        run = engine.simulate(
+            swinging(count), time_step=1 / 60, steps=30, observe={}, configuration=configuration
+        )
+        return [float(x) for state in run.final_state.values() for x in state]
+
+    names = [configuration.name for configuration in engine.configurations]
+    fresh = []
+    for configuration in names:
+        node._end_all()
+        fresh.append(answer(2, configuration))
+    answer(5, names[0])
+    assert [answer(2, configuration) for configuration in names] == fresh
 
 
 def test_a_missing_package_is_named_with_what_to_install(

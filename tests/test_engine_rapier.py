@@ -40,7 +40,7 @@ def fallen(time_step: float) -> float:
     ball = Particle(name="ball", mass=2.0, position=(0.0, 0.0, 0.0))
     scene = Scene(bodies=(ball,), gravity=GRAVITY)
     end = {"end": Final(quantity=Position("ball"))}
-    run = RAPIER.simulate(scene, time_step=time_step, duration=20.0, observe=end)
+    run = RAPIER.simulate(scene, time_step=time_step, duration=20.0, observe=end, configuration="defaults")
     return abs(float(run["end"][2]) + 0.5 * 9.81 * 400.0)
 
 

@@ -1,196 +1,197 @@
 // Jolt (WebAssembly, single precision) in its own loop: the scene as engine/peers/jolt.py describes it.
-import { read, run } from "./loop.mjs";
+import { serve } from "./loop.mjs";
 
-const task = read();
-const J = await (await import(task.module)).default();
+serve(async (task) => {
+  const J = await (await import(task.module)).default();
 
-const vec = (v) => new J.Vec3(...v);
-const place = (v) => new J.RVec3(...v);
-const quat = ([w, x, y, z]) => new J.Quat(x, y, z, w);
-const WITHOUT_BOUND = 1e9; // m/s, rad/s: Jolt bounds all speeds
-const CONTACTS = 10240; // pairs that touch, at most: more do not fit into the memory Jolt keeps for a step
-const PLANE = 1e5; // m, half the edge of what stands for a plane without end
+  const vec = (v) => new J.Vec3(...v);
+  const place = (v) => new J.RVec3(...v);
+  const quat = ([w, x, y, z]) => new J.Quat(x, y, z, w);
+  const WITHOUT_BOUND = 1e9; // m/s, rad/s: Jolt bounds all speeds
+  const CONTACTS = 10240; // pairs that touch, at most: more do not fit into the memory Jolt keeps for a step
+  const PLANE = 1e5; // m, half the edge of what stands for a plane without end
 
-const given = new J.JoltSettings();
-const layers = new J.ObjectLayerPairFilterTable(1);
-if (task.contacts) layers.EnableCollision(0, 0);
-const broad = new J.BroadPhaseLayerInterfaceTable(1, 1);
-broad.MapObjectToBroadPhaseLayer(0, new J.BroadPhaseLayer(0));
-given.mObjectLayerPairFilter = layers;
-given.mBroadPhaseLayerInterface = broad;
-given.mObjectVsBroadPhaseLayerFilter = new J.ObjectVsBroadPhaseLayerFilterTable(broad, 1, layers, 1);
-given.mMaxBodies = task.bodies.length + 1;
-given.mMaxBodyPairs = 1024 + 16 * task.bodies.length;
-given.mMaxContactConstraints = Math.min(1024 + 8 * task.bodies.length, CONTACTS);
-const jolt = new J.JoltInterface(given);
-const system = jolt.GetPhysicsSystem();
-const rules = system.GetPhysicsSettings();
-for (const [name, value] of Object.entries(task.options.settings)) rules[name] = value;
-rules.mAllowSleeping = false;
-system.SetPhysicsSettings(rules);
-system.SetGravity(vec(task.gravity));
+  const given = new J.JoltSettings();
+  const layers = new J.ObjectLayerPairFilterTable(1);
+  if (task.contacts) layers.EnableCollision(0, 0);
+  const broad = new J.BroadPhaseLayerInterfaceTable(1, 1);
+  broad.MapObjectToBroadPhaseLayer(0, new J.BroadPhaseLayer(0));
+  given.mObjectLayerPairFilter = layers;
+  given.mBroadPhaseLayerInterface = broad;
+  given.mObjectVsBroadPhaseLayerFilter = new J.ObjectVsBroadPhaseLayerFilterTable(broad, 1, layers, 1);
+  given.mMaxBodies = task.bodies.length + 1;
+  given.mMaxBodyPairs = 1024 + 16 * task.bodies.length;
+  given.mMaxContactConstraints = Math.min(1024 + 8 * task.bodies.length, CONTACTS);
+  const jolt = new J.JoltInterface(given);
+  const system = jolt.GetPhysicsSystem();
+  const rules = system.GetPhysicsSettings();
+  for (const [name, value] of Object.entries(task.options.settings)) rules[name] = value;
+  rules.mAllowSleeping = false;
+  system.SetPhysicsSettings(rules);
+  system.SetGravity(vec(task.gravity));
 
-function shapeOf(shape) {
-  if (!shape) return new J.EmptyShape();
-  if (shape.kind === "sphere") return new J.SphereShape(shape.radius);
-  if (shape.kind === "box") return new J.BoxShape(vec(shape.half), Math.min(0.05, 0.2 * Math.min(...shape.half)));
-  if (shape.kind === "plane") return new J.PlaneShape(new J.Plane(vec(shape.normal), 0), null, PLANE);
-  const upright = new J.CapsuleShapeSettings(shape.half, shape.radius); // along y; ours lies along z
-  const turn = J.Quat.prototype.sRotation(vec([1, 0, 0]), Math.PI / 2);
-  return new J.RotatedTranslatedShapeSettings(vec([0, 0, 0]), turn, upright).Create().Get();
-}
-
-const filter = new J.GroupFilterTable(task.bodies.length);
-task.apart.forEach(([a, b]) => filter.DisableCollision(a, b));
-const interface_ = system.GetBodyInterface();
-const motions = { static: J.EMotionType_Static, kinematic: J.EMotionType_Kinematic };
-
-function bodyOf(one, index) {
-  const kind = motions[one.motion] ?? J.EMotionType_Dynamic;
-  const made = new J.BodyCreationSettings(shapeOf(one.shape), place(one.position), quat(one.orientation), kind, 0);
-  made.mLinearVelocity = vec(one.velocity);
-  made.mAngularVelocity = vec(one.spin);
-  made.mLinearDamping = made.mAngularDamping = 0;
-  made.mMaxLinearVelocity = made.mMaxAngularVelocity = WITHOUT_BOUND;
-  made.mAllowSleeping = false;
-  made.mApplyGyroscopicForce = task.options.gyroscopic;
-  made.mFriction = one.friction; // two surfaces: the geometric mean, and the larger restitution, as the scene wants
-  made.mRestitution = one.restitution;
-  made.mCollisionGroup = new J.CollisionGroup(filter, 0, index);
-  if (one.mass > 0) {
-    made.mOverrideMassProperties = J.EOverrideMassProperties_MassAndInertiaProvided;
-    const properties = new J.MassProperties();
-    properties.mMass = one.mass;
-    properties.mInertia = J.Mat44.prototype.sScaleVec3(vec(one.motion === "particle" ? [1, 1, 1] : one.inertia));
-    made.mMassPropertiesOverride = properties;
+  function shapeOf(shape) {
+    if (!shape) return new J.EmptyShape();
+    if (shape.kind === "sphere") return new J.SphereShape(shape.radius);
+    if (shape.kind === "box") return new J.BoxShape(vec(shape.half), Math.min(0.05, 0.2 * Math.min(...shape.half)));
+    if (shape.kind === "plane") return new J.PlaneShape(new J.Plane(vec(shape.normal), 0), null, PLANE);
+    const upright = new J.CapsuleShapeSettings(shape.half, shape.radius); // along y; ours lies along z
+    const turn = J.Quat.prototype.sRotation(vec([1, 0, 0]), Math.PI / 2);
+    return new J.RotatedTranslatedShapeSettings(vec([0, 0, 0]), turn, upright).Create().Get();
   }
-  if (one.motion === "particle")
-    made.mAllowedDOFs = J.EAllowedDOFs_TranslationX | J.EAllowedDOFs_TranslationY | J.EAllowedDOFs_TranslationZ;
-  const body = interface_.CreateBody(made);
-  interface_.AddBody(body.GetID(), J.EActivation_Activate);
-  return body;
-}
 
-const bodies = task.bodies.map(bodyOf);
-system.OptimizeBroadPhase();
-const world = J.Body.prototype.sFixedToWorld ?? J.JoltInterface.prototype.sGetFixedToWorldBody();
+  const filter = new J.GroupFilterTable(task.bodies.length);
+  task.apart.forEach(([a, b]) => filter.DisableCollision(a, b));
+  const interface_ = system.GetBodyInterface();
+  const motions = { static: J.EMotionType_Static, kinematic: J.EMotionType_Kinematic };
 
-function settingsOf(one) {
-  if (one.kind === "distance") {
-    const rod = new J.DistanceConstraintSettings();
-    [rod.mPoint1, rod.mPoint2] = one.points.map(place);
-    rod.mMinDistance = rod.mMaxDistance = one.length;
-    return [rod, J.DistanceConstraint];
-  }
-  const [kind, type] = {
-    ball: [J.PointConstraintSettings, J.PointConstraint], hinge: [J.HingeConstraintSettings, J.HingeConstraint],
-    lock: [J.FixedConstraintSettings, J.TwoBodyConstraint], prismatic: [J.SliderConstraintSettings, J.SliderConstraint],
-  }[one.kind];
-  const joint = new kind();
-  joint.mPoint1 = joint.mPoint2 = place(one.at);
-  const normal = vec(one.axis).GetNormalizedPerpendicular();
-  const across = [normal.GetX(), normal.GetY(), normal.GetZ()];
-  if (one.kind === "hinge") {
-    joint.mHingeAxis1 = joint.mHingeAxis2 = vec(one.axis);
-    joint.mNormalAxis1 = joint.mNormalAxis2 = vec(across);
-  }
-  if (one.kind === "prismatic") {
-    joint.mSliderAxis1 = joint.mSliderAxis2 = vec(one.axis);
-    joint.mNormalAxis1 = joint.mNormalAxis2 = vec(across);
-  }
-  return [joint, type];
-}
-
-const made = new Map();
-for (const one of task.constraints) {
-  const [settings, type] = settingsOf(one);
-  const [a, b] = one.ends.map((end) => (end === null ? world : bodies[end]));
-  const constraint = settings.Create(a, b);
-  system.AddConstraint(constraint);
-  made.set(one.name, { kind: one.kind, second: b, first: a, constraint: J.castObject(constraint, type) });
-}
-
-// What Jolt shows of a constraint are the impulses of the last step, on its second body; of a lock this package does not.
-const three = (v) => [v.GetX(), v.GetY(), v.GetZ()];
-const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
-function turned(body, local) {
-  return three(body.GetRotation().MulVec3(local));
-}
-function impulse({ kind, first, second, constraint }) {
-  if (kind === "distance") return [-constraint.GetTotalLambdaPosition()];
-  const push = three(constraint.GetTotalLambdaPosition());
-  if (kind === "ball") return [...push, 0, 0, 0];
-  const rows = constraint.GetTotalLambdaRotation();
-  const lambdas = [rows.GetComponent(0), rows.GetComponent(1)];
-  const axis = turned(first, constraint.GetLocalSpaceHingeAxis1());
-  const b = three(vec(turned(second, constraint.GetLocalSpaceHingeAxis2())).GetNormalizedPerpendicular());
-  const c = cross(turned(second, constraint.GetLocalSpaceHingeAxis2()), b);
-  const [one, two] = [cross(b, axis), cross(c, axis)];
-  return [...push, ...one.map((_, i) => one[i] * lambdas[0] + two[i] * lambdas[1])];
-}
-
-let deepest = 0;
-if (task.depth) {
-  const listener = new J.ContactListenerJS();
-  const look = (_a, _b, manifold) => {
-    deepest = Math.max(deepest, J.wrapPointer(manifold, J.ContactManifold).mPenetrationDepth);
-  };
-  listener.OnContactValidate = () => J.ValidateResult_AcceptAllContactsForThisBodyPair;
-  listener.OnContactAdded = listener.OnContactPersisted = look;
-  listener.OnContactRemoved = () => {};
-  system.SetContactListener(listener);
-}
-
-const force = vec([0, 0, 0]);
-function act(body, x, y, z) {
-  force.Set(x, y, z);
-  body.AddForce(force);
-}
-
-const loads = task.loads.map((load) => [bodies[load.body], vec(load.force), vec(load.torque)]);
-const moving = task.bodies.flatMap((one, index) => (one.mass > 0 ? [[bodies[index], one.mass]] : []));
-function push() {
-  for (const [body, pull, torque] of loads) {
-    body.AddForce(pull);
-    body.AddTorque(torque);
-  }
-  for (const { centre, strength } of task.fields)
-    for (const [body, mass] of moving) {
-      const p = body.GetPosition();
-      const [x, y, z] = [p.GetX() - centre[0], p.GetY() - centre[1], p.GetZ() - centre[2]];
-      const size = (-mass * strength) / (x * x + y * y + z * z) ** 1.5;
-      act(body, size * x, size * y, size * z);
+  function bodyOf(one, index) {
+    const kind = motions[one.motion] ?? J.EMotionType_Dynamic;
+    const made = new J.BodyCreationSettings(shapeOf(one.shape), place(one.position), quat(one.orientation), kind, 0);
+    made.mLinearVelocity = vec(one.velocity);
+    made.mAngularVelocity = vec(one.spin);
+    made.mLinearDamping = made.mAngularDamping = 0;
+    made.mMaxLinearVelocity = made.mMaxAngularVelocity = WITHOUT_BOUND;
+    made.mAllowSleeping = false;
+    made.mApplyGyroscopicForce = task.options.gyroscopic;
+    made.mFriction = one.friction; // two surfaces: the geometric mean, and the larger restitution, as the scene wants
+    made.mRestitution = one.restitution;
+    made.mCollisionGroup = new J.CollisionGroup(filter, 0, index);
+    if (one.mass > 0) {
+      made.mOverrideMassProperties = J.EOverrideMassProperties_MassAndInertiaProvided;
+      const properties = new J.MassProperties();
+      properties.mMass = one.mass;
+      properties.mInertia = J.Mat44.prototype.sScaleVec3(vec(one.motion === "particle" ? [1, 1, 1] : one.inertia));
+      made.mMassPropertiesOverride = properties;
     }
-  for (const spring of task.springs) {
-    const [one, two] = spring.ends.map((end) => (Array.isArray(end) ? end : three(bodies[end].GetPosition())));
-    const away = two.map((x, i) => x - one[i]);
-    const length = Math.hypot(...away);
-    const speeds = spring.ends.map((end) => (Array.isArray(end) ? [0, 0, 0] : three(bodies[end].GetLinearVelocity())));
-    const opening = away.reduce((sum, x, i) => sum + x * (speeds[1][i] - speeds[0][i]), 0) / length;
-    const size = length > 0 ? (spring.stiffness * (length - spring.rest) + spring.viscosity * opening) / length : 0;
-    spring.ends.forEach((end, k) => {
-      if (!Array.isArray(end)) act(bodies[end], ...away.map((x) => (k === 0 ? size : -size) * x));
-    });
+    if (one.motion === "particle")
+      made.mAllowedDOFs = J.EAllowedDOFs_TranslationX | J.EAllowedDOFs_TranslationY | J.EAllowedDOFs_TranslationZ;
+    const body = interface_.CreateBody(made);
+    interface_.AddBody(body.GetID(), J.EActivation_Activate);
+    return body;
   }
-}
 
-const shown = Object.keys(task.forces_of).map((name) => made.get(name));
-function state() {
-  const all = bodies.flatMap((body) => {
-    const p = three(body.GetPosition());
-    const q = body.GetRotation();
-    const turn = [q.GetW(), q.GetX(), q.GetY(), q.GetZ()];
-    return [...p, ...turn, ...three(body.GetLinearVelocity()), ...three(body.GetAngularVelocity())];
-  });
-  const forces = shown.flatMap((one) => impulse(one).map((value) => value / task.time_step));
-  return all.concat(forces, task.depth ? [deepest] : []);
-}
+  const bodies = task.bodies.map(bodyOf);
+  system.OptimizeBroadPhase();
+  const world = J.Body.prototype.sFixedToWorld ?? J.JoltInterface.prototype.sGetFixedToWorldBody();
 
-const pushed = task.loads.length + task.fields.length + task.springs.length > 0;
-function step() {
-  if (pushed) push();
-  deepest = 0;
-  jolt.Step(task.time_step, 1);
-}
+  function settingsOf(one) {
+    if (one.kind === "distance") {
+      const rod = new J.DistanceConstraintSettings();
+      [rod.mPoint1, rod.mPoint2] = one.points.map(place);
+      rod.mMinDistance = rod.mMaxDistance = one.length;
+      return [rod, J.DistanceConstraint];
+    }
+    const [kind, type] = {
+      ball: [J.PointConstraintSettings, J.PointConstraint], hinge: [J.HingeConstraintSettings, J.HingeConstraint],
+      lock: [J.FixedConstraintSettings, J.TwoBodyConstraint], prismatic: [J.SliderConstraintSettings, J.SliderConstraint],
+    }[one.kind];
+    const joint = new kind();
+    joint.mPoint1 = joint.mPoint2 = place(one.at);
+    const normal = vec(one.axis).GetNormalizedPerpendicular();
+    const across = [normal.GetX(), normal.GetY(), normal.GetZ()];
+    if (one.kind === "hinge") {
+      joint.mHingeAxis1 = joint.mHingeAxis2 = vec(one.axis);
+      joint.mNormalAxis1 = joint.mNormalAxis2 = vec(across);
+    }
+    if (one.kind === "prismatic") {
+      joint.mSliderAxis1 = joint.mSliderAxis2 = vec(one.axis);
+      joint.mNormalAxis1 = joint.mNormalAxis2 = vec(across);
+    }
+    return [joint, type];
+  }
 
-run(task, step, state);
+  const made = new Map();
+  for (const one of task.constraints) {
+    const [settings, type] = settingsOf(one);
+    const [a, b] = one.ends.map((end) => (end === null ? world : bodies[end]));
+    const constraint = settings.Create(a, b);
+    system.AddConstraint(constraint);
+    made.set(one.name, { kind: one.kind, second: b, first: a, constraint: J.castObject(constraint, type) });
+  }
+
+  // What Jolt shows of a constraint are the impulses of the last step, on its second body; of a lock this package does not.
+  const three = (v) => [v.GetX(), v.GetY(), v.GetZ()];
+  const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+  function turned(body, local) {
+    return three(body.GetRotation().MulVec3(local));
+  }
+  function impulse({ kind, first, second, constraint }) {
+    if (kind === "distance") return [-constraint.GetTotalLambdaPosition()];
+    const push = three(constraint.GetTotalLambdaPosition());
+    if (kind === "ball") return [...push, 0, 0, 0];
+    const rows = constraint.GetTotalLambdaRotation();
+    const lambdas = [rows.GetComponent(0), rows.GetComponent(1)];
+    const axis = turned(first, constraint.GetLocalSpaceHingeAxis1());
+    const b = three(vec(turned(second, constraint.GetLocalSpaceHingeAxis2())).GetNormalizedPerpendicular());
+    const c = cross(turned(second, constraint.GetLocalSpaceHingeAxis2()), b);
+    const [one, two] = [cross(b, axis), cross(c, axis)];
+    return [...push, ...one.map((_, i) => one[i] * lambdas[0] + two[i] * lambdas[1])];
+  }
+
+  let deepest = 0;
+  if (task.depth) {
+    const listener = new J.ContactListenerJS();
+    const look = (_a, _b, manifold) => {
+      deepest = Math.max(deepest, J.wrapPointer(manifold, J.ContactManifold).mPenetrationDepth);
+    };
+    listener.OnContactValidate = () => J.ValidateResult_AcceptAllContactsForThisBodyPair;
+    listener.OnContactAdded = listener.OnContactPersisted = look;
+    listener.OnContactRemoved = () => {};
+    system.SetContactListener(listener);
+  }
+
+  const force = vec([0, 0, 0]);
+  function act(body, x, y, z) {
+    force.Set(x, y, z);
+    body.AddForce(force);
+  }
+
+  const loads = task.loads.map((load) => [bodies[load.body], vec(load.force), vec(load.torque)]);
+  const moving = task.bodies.flatMap((one, index) => (one.mass > 0 ? [[bodies[index], one.mass]] : []));
+  function push() {
+    for (const [body, pull, torque] of loads) {
+      body.AddForce(pull);
+      body.AddTorque(torque);
+    }
+    for (const { centre, strength } of task.fields)
+      for (const [body, mass] of moving) {
+        const p = body.GetPosition();
+        const [x, y, z] = [p.GetX() - centre[0], p.GetY() - centre[1], p.GetZ() - centre[2]];
+        const size = (-mass * strength) / (x * x + y * y + z * z) ** 1.5;
+        act(body, size * x, size * y, size * z);
+      }
+    for (const spring of task.springs) {
+      const [one, two] = spring.ends.map((end) => (Array.isArray(end) ? end : three(bodies[end].GetPosition())));
+      const away = two.map((x, i) => x - one[i]);
+      const length = Math.hypot(...away);
+      const speeds = spring.ends.map((end) => (Array.isArray(end) ? [0, 0, 0] : three(bodies[end].GetLinearVelocity())));
+      const opening = away.reduce((sum, x, i) => sum + x * (speeds[1][i] - speeds[0][i]), 0) / length;
+      const size = length > 0 ? (spring.stiffness * (length - spring.rest) + spring.viscosity * opening) / length : 0;
+      spring.ends.forEach((end, k) => {
+        if (!Array.isArray(end)) act(bodies[end], ...away.map((x) => (k === 0 ? size : -size) * x));
+      });
+    }
+  }
+
+  const shown = Object.keys(task.forces_of).map((name) => made.get(name));
+  function state() {
+    const all = bodies.flatMap((body) => {
+      const p = three(body.GetPosition());
+      const q = body.GetRotation();
+      const turn = [q.GetW(), q.GetX(), q.GetY(), q.GetZ()];
+      return [...p, ...turn, ...three(body.GetLinearVelocity()), ...three(body.GetAngularVelocity())];
+    });
+    const forces = shown.flatMap((one) => impulse(one).map((value) => value / task.time_step));
+    return all.concat(forces, task.depth ? [deepest] : []);
+  }
+
+  const pushed = task.loads.length + task.fields.length + task.springs.length > 0;
+  function step() {
+    if (pushed) push();
+    deepest = 0;
+    jolt.Step(task.time_step, 1);
+  }
+
+  return { step, state };
+});

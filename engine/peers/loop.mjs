@@ -1,16 +1,42 @@
-// What every engine in JavaScript shares: the task as JSON on standard input, and the loop with its clock; the answer
-// is a line of JSON and the float64 states. A state is 13 numbers a body: position, orientation (w, x, y, z),
-// velocity, angular velocity (SI, world axes); then the forces of constraints that are asked for, one number for a rod's
-// tension, six for a joint's force and torque; then the deepest penetration, if asked for.
-import { readFileSync, writeSync } from "node:fs";
+// What every engine in JavaScript shares: tasks as lines of JSON on standard input, the loop with its clock, and for each
+// task an answer, a line of JSON with the number of bytes that follow, the float64 states. A state is 13 numbers a body:
+// position, orientation (w, x, y, z), velocity, angular velocity (SI, world axes); then the forces of constraints that
+// are asked for, one number for a rod's tension, six for a joint's force and torque; then the deepest penetration, if
+// asked for. One process answers task after task, so an engine is compiled once; nothing of a scene is kept.
+import { readSync, writeSync } from "node:fs";
 
 const BLOCK = 1000; // steps between two looks at the clock where nothing is recorded between
-const began = performance.now();
+console.log = console.error; // standard output is for answers, whatever an engine has to say
 
-export const read = () => JSON.parse(readFileSync(0, "utf8"));
+/// Answer every task: `build(task)` gives `step()`, which takes one step, `state()`, what is to be kept of now, and
+/// perhaps `free()`.
+export async function serve(build) {
+  for (let task = next(); task !== null; task = next()) {
+    const began = performance.now();
+    const made = await build(task);
+    run(task, made, began);
+    made.free?.();
+  }
+}
 
-/// Take all steps of the task and answer. `step()` takes one, `state()` is what is to be kept of now.
-export function run(task, step, state) {
+const left = []; // of standard input, after the last line
+function next() {
+  for (;;) {
+    const end = left.length ? left.at(-1).indexOf(10) : -1;
+    if (end >= 0) {
+      const last = left.pop();
+      const line = Buffer.concat([...left.splice(0), last.subarray(0, end)]).toString("utf8");
+      if (end + 1 < last.length) left.push(last.subarray(end + 1));
+      return JSON.parse(line);
+    }
+    const piece = Buffer.alloc(1 << 16);
+    const got = readSync(0, piece, 0, piece.length, null);
+    if (got === 0) return null;
+    left.push(piece.subarray(0, got));
+  }
+}
+
+function run(task, { step, state }, began) {
   const width = state().length;
   const states = new Float64Array((task.every_step ? task.steps + 1 : 2) * width);
   let kept = 0;
@@ -37,8 +63,9 @@ export function run(task, step, state) {
     }
   }
   const seconds = { seconds: spent / 1000, setup_seconds: (started - began) / 1000 };
-  const head = JSON.stringify({ kept, steps: done, status, failure, ...seconds });
-  answer(Buffer.concat([Buffer.from(`${head}\n`), Buffer.from(states.buffer, 0, 8 * kept * width)]));
+  const bytes = 8 * kept * width;
+  const head = JSON.stringify({ kept, steps: done, status, failure, bytes, ...seconds });
+  answer(Buffer.concat([Buffer.from(`${head}\n`), Buffer.from(states.buffer, 0, bytes)]));
 }
 
 function answer(bytes) {

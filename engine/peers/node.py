@@ -1,19 +1,26 @@
-"""Engines written in JavaScript: found in a node_modules folder, run by Node, one process a simulation.
+"""Engines written in JavaScript: found in a node_modules folder, run by Node, one process an engine.
 
-The process gets a task as JSON and answers with a line of JSON and the states as float64, so nothing is rounded.
-Starting Node is set-up and not timed. What does not answer in time is ended; what dies is a crash.
+The process gets a task as a line of JSON and answers with a line of JSON and the states as float64, so nothing is
+rounded. It waits for the next task, because starting Node and compiling an engine takes longer than most simulations.
+What does not answer in time is ended; what dies is a crash; either way the next task has a new process.
 """
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import re
+import select
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
+import threading
 from itertools import chain
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -59,31 +66,107 @@ def entry(folder: Path) -> str:
 
 def run(script: Path, task: dict[str, Any], time_limit: float | None) -> Recording:
     """One simulation by `script`; a process that hangs is ended and timed out. Raises NodeError if it died."""
-    command = ["node", f"--max-old-space-size={HEAP}", str(script)]
-    try:
-        done = subprocess.run(
-            command,
-            input=json.dumps(task).encode(),
-            capture_output=True,
-            timeout=None if time_limit is None else time_limit + GRACE,
-            preexec_fn=_without_address_limit if sys.platform == "linux" else None,
+    place = (os.getpid(), script, HEAP)
+    with _ONE_AT_A_TIME:
+        if place not in _SERVED:
+            _SERVED[place] = Served(script)
+        try:
+            head, states = _SERVED[place].answer(task, None if time_limit is None else time_limit + GRACE)
+        except TimeoutError:
+            _SERVED.pop(place).end()
+            return _nothing(task, f"no answer within {time_limit:g} s, so its process was ended")
+        except EOFError:
+            raise NodeError(_SERVED.pop(place).last_words()) from None
+        except BaseException:  # an interrupted answer would be taken for the next one's
+            _SERVED.pop(place).end()
+            raise
+    return _recording(task, head, np.frombuffer(states, dtype="<f8"))
+
+
+class Served:
+    """A process that answers one task after the other."""
+
+    def __init__(self, script: Path) -> None:
+        self._name = script.stem
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (open as long as the process lives)
+        self._process = subprocess.Popen(
+            ["node", f"--max-old-space-size={HEAP}", str(script)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            bufsize=0,
+            preexec_fn=_prepared if sys.platform == "linux" else None,
         )
-    except subprocess.TimeoutExpired:
-        return _nothing(task, f"no answer within {time_limit:g} s, so its process was ended")
-    if done.returncode:
-        words = [line.strip() for line in done.stderr.decode(errors="replace").splitlines() if line.strip()]
+
+    def answer(self, task: dict[str, Any], timeout: float | None) -> tuple[dict[str, Any], bytes]:
+        """Head and states. Raises TimeoutError after `timeout` seconds, EOFError where the process died."""
+        until = None if timeout is None else monotonic() + timeout
+        assert self._process.stdin is not None
+        given = memoryview(json.dumps(task).encode() + b"\n")
+        try:
+            while given:
+                given = given[self._process.stdin.write(given) :]
+        except BrokenPipeError:
+            raise EOFError from None
+        got = bytearray()
+        while (end := got.find(b"\n")) < 0:
+            got += self._piece(until)
+        head = json.loads(got[:end])
+        while len(got) < end + 1 + head["bytes"]:
+            got += self._piece(until)
+        return head, bytes(got[end + 1 :])
+
+    def _piece(self, until: float | None) -> bytes:
+        assert self._process.stdout is not None
+        rest = None if until is None else max(0.0, until - monotonic())
+        if not select.select([self._process.stdout], [], [], rest)[0]:
+            raise TimeoutError
+        piece = os.read(self._process.stdout.fileno(), 1 << 20)
+        if not piece:
+            raise EOFError
+        return piece
+
+    def end(self) -> None:
+        """Nothing is left of it afterwards."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout, self._errors):
+            assert pipe is not None
+            pipe.close()
+
+    def last_words(self) -> str:
+        """Why it died, in a line; nothing is left of it afterwards."""
+        code = self._process.wait()
+        self._errors.seek(0)
+        text = self._errors.read().decode(errors="replace")
+        self.end()
+        words = [line.strip() for line in text.splitlines() if line.strip()]
         said = next((line for line in words if re.match(r"\w*Error: |FATAL", line)), "it said nothing")
-        raise NodeError(f"the process of {script.stem} ended with {done.returncode}: {said[:200]}")
-    head, _, states = done.stdout.partition(b"\n")
-    return _recording(task, json.loads(head), np.frombuffer(states, dtype="<f8"))
+        return f"the process of {self._name} ended with {code}: {said[:200]}"
 
 
-def _without_address_limit() -> None:
-    """Node reserves addresses it never uses; what it may really take is said with HEAP."""
+_SERVED: dict[tuple[int, Path, int], Served] = {}
+_ONE_AT_A_TIME = threading.Lock()
+
+
+@atexit.register
+def _end_all() -> None:
+    for place in [place for place in _SERVED if place[0] == os.getpid()]:
+        _SERVED.pop(place).end()
+
+
+def _prepared() -> None:
+    """In the new process: no limit of addresses, of which Node reserves many it never uses (HEAP says what it may
+    take), and an end with the process that asked, in whatever loop it is.
+    """
+    import ctypes
     import resource
 
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
+    if threading.current_thread() is threading.main_thread():  # the death of another thread would end it, too
+        die_with_parent = 1  # PR_SET_PDEATHSIG
+        ctypes.CDLL(None).prctl(die_with_parent, int(signal.SIGKILL))
 
 
 def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Recording:

@@ -1,62 +1,63 @@
 // Rapier (WebAssembly, single precision) in its own loop: the scene as engine/peers/rapier.py describes it.
-import { read, run } from "./loop.mjs";
+import { serve } from "./loop.mjs";
 
-const task = read();
-const { default: R } = await import(task.module);
-await R.init();
+serve(async (task) => {
+  const { default: R } = await import(task.module);
+  await R.init();
 
-const vec = ([x, y, z]) => ({ x, y, z });
-const quat = ([w, x, y, z]) => ({ w, x, y, z });
-const upright = quat([1, 0, 0, 0]);
-const pointInertia = vec([1e-6, 1e-6, 1e-6]); // kg m²: every moving body wants one; a particle that turns is not seen to
+  const vec = ([x, y, z]) => ({ x, y, z });
+  const quat = ([w, x, y, z]) => ({ w, x, y, z });
+  const upright = quat([1, 0, 0, 0]);
+  const pointInertia = vec([1e-6, 1e-6, 1e-6]); // kg m²: every moving body wants one; a particle that turns is not seen to
 
-const world = new R.World(vec(task.gravity));
-world.timestep = task.time_step;
-world.integrationParameters.numSolverIterations = task.options.sweeps;
+  const world = new R.World(vec(task.gravity));
+  world.timestep = task.time_step;
+  world.integrationParameters.numSolverIterations = task.options.sweeps;
 
-function shapeOf(shape) {
-  if (shape.kind === "sphere") return new R.Ball(shape.radius);
-  if (shape.kind === "box") return new R.Cuboid(...shape.half);
-  return new R.HalfSpace(vec(shape.normal));
-}
-
-function bodyOf(given) {
-  const kind = given.mass > 0 ? R.RigidBodyDesc.dynamic() : R.RigidBodyDesc.fixed();
-  const described = kind.setTranslation(...given.position).setRotation(quat(given.orientation)).setCanSleep(false);
-  const body = world.createRigidBody(
-    described.setLinvel(...given.velocity).setAngvel(vec(given.spin)).setLinearDamping(0).setAngularDamping(0),
-  );
-  const inertia = given.motion === "particle" ? pointInertia : vec(given.inertia);
-  if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), inertia, upright, true);
-  if (given.shape && task.contacts) {
-    const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(0);
-    world.createCollider(collider.setFriction(given.friction), body);
+  function shapeOf(shape) {
+    if (shape.kind === "sphere") return new R.Ball(shape.radius);
+    if (shape.kind === "box") return new R.Cuboid(...shape.half);
+    return new R.HalfSpace(vec(shape.normal));
   }
-  return body;
-}
 
-const bodies = task.bodies.map(bodyOf);
+  function bodyOf(given) {
+    const kind = given.mass > 0 ? R.RigidBodyDesc.dynamic() : R.RigidBodyDesc.fixed();
+    const described = kind.setTranslation(...given.position).setRotation(quat(given.orientation)).setCanSleep(false);
+    const body = world.createRigidBody(
+      described.setLinvel(...given.velocity).setAngvel(vec(given.spin)).setLinearDamping(0).setAngularDamping(0),
+    );
+    const inertia = given.motion === "particle" ? pointInertia : vec(given.inertia);
+    if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), inertia, upright, true);
+    if (given.shape && task.contacts) {
+      const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(0);
+      world.createCollider(collider.setFriction(given.friction), body);
+    }
+    return body;
+  }
 
-for (const given of task.constraints) {
-  const ends = given.ends.map((end) =>
-    typeof end === "number" ? bodies[end] : world.createRigidBody(R.RigidBodyDesc.fixed()),
-  );
-  const [a, b] = given.points.map(vec);
-  let joint = R.JointData.spherical(a, b);
-  if (given.kind === "lock") joint = R.JointData.fixed(a, quat(given.turns[0]), b, quat(given.turns[1]));
-  if (given.kind === "hinge") joint = R.JointData.revolute(a, b, vec(given.axis));
-  world.createImpulseJoint(joint, ends[0], ends[1], true).setContactsEnabled(false);
-}
-for (const load of task.loads) {
-  bodies[load.body].addForce(vec(load.force), true); // stays until it is taken away
-  bodies[load.body].addTorque(vec(load.torque), true);
-}
+  const bodies = task.bodies.map(bodyOf);
 
-function state() {
-  return bodies.flatMap((body) => {
-    const [p, q, v, w] = [body.translation(), body.rotation(), body.linvel(), body.angvel()];
-    return [p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z];
-  });
-}
+  for (const given of task.constraints) {
+    const ends = given.ends.map((end) =>
+      typeof end === "number" ? bodies[end] : world.createRigidBody(R.RigidBodyDesc.fixed()),
+    );
+    const [a, b] = given.points.map(vec);
+    let joint = R.JointData.spherical(a, b);
+    if (given.kind === "lock") joint = R.JointData.fixed(a, quat(given.turns[0]), b, quat(given.turns[1]));
+    if (given.kind === "hinge") joint = R.JointData.revolute(a, b, vec(given.axis));
+    world.createImpulseJoint(joint, ends[0], ends[1], true).setContactsEnabled(false);
+  }
+  for (const load of task.loads) {
+    bodies[load.body].addForce(vec(load.force), true); // stays until it is taken away
+    bodies[load.body].addTorque(vec(load.torque), true);
+  }
 
-run(task, () => world.step(), state);
+  function state() {
+    return bodies.flatMap((body) => {
+      const [p, q, v, w] = [body.translation(), body.rotation(), body.linvel(), body.angvel()];
+      return [p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z];
+    });
+  }
+
+  return { step: () => world.step(), state, free: () => world.free() };
+});
