@@ -45,7 +45,7 @@ from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
 from spook_tracker.engine.shapes import ConvexHull
 from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
-from spook_tracker.engine.surface_tables import check_cylinders, hull_tables, surfaces
+from spook_tracker.engine.surface_tables import hull_tables, surfaces
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, at_start
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
@@ -72,7 +72,6 @@ def compile_rigid(
 ) -> Program:
     """The Program of a scene with at least one rigid body; `held`: its loads may be set."""
     check_wide_rows(scene, method)
-    check_cylinders(scene)
     quantities, shapes = requests(scene, observe)
     native = _core.RigidProgram(
         **pack(scene, time_step, method, held),

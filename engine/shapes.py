@@ -1,4 +1,4 @@
-"""Surfaces: sphere, box, capsule, cylinder, convex hull, plane, and compounds of these. Each knows its inertia per mass.
+"""Surfaces: sphere, box, capsule, cylinder, cone, convex hull, plane, and compounds of these. Each knows its inertia per mass.
 
 A new shape says here what it is called, which columns the native side gets and how it is drawn.
 """
@@ -113,10 +113,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Cylinder(Shape):
-    """A cylinder along the body's z axis; a coin is a short one. It meets planes and spheres, and floats.
-
-    Other shapes it may touch are refused when the scene is compiled: its round edge against theirs is not there yet.
-    """
+    """A cylinder along the body's z axis; a coin is a short one."""
 
     kind: ClassVar[str] = "cylinder"
     drawn_as: ClassVar[str] = "facets"
@@ -135,13 +132,45 @@ class Cylinder(Shape):
         return (across, across, mass * self.radius**2 / 2.0)
 
     def measures(self) -> tuple[float, ...]:
-        sides, half = 24, 0.5 * self.length
-        turns = [2.0 * math.pi * k / sides for k in range(sides)]
-        rim = [(self.radius * math.cos(turn), self.radius * math.sin(turn)) for turn in turns]
+        half, rim = 0.5 * self.length, _circle(self.radius)
         faces = [[(x, y, half) for x, y in rim], [(x, y, -half) for x, y in reversed(rim)]]
         for (x, y), (u, v) in zip(rim, [*rim[1:], rim[0]], strict=True):
             faces.append([(x, y, -half), (u, v, -half), (u, v, half), (x, y, half)])
         return polytope.drawn(faces)
+
+
+@dataclass(frozen=True, slots=True)
+class Cone(Shape):
+    """A cone along the body's z axis, its apex up, its centre of mass in the origin: a quarter of the height over the base."""
+
+    kind: ClassVar[str] = "cone"
+    drawn_as: ClassVar[str] = "facets"
+    radius: float  # of the base, m
+    height: float  # m
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check.positive("cone", "radius", self.radius))
+        object.__setattr__(self, "height", check.positive("cone", "height", self.height))
+
+    def columns(self) -> dict[str, Any]:
+        return {"radius": self.radius, "length": self.height}
+
+    def inertia(self, mass: float) -> Vector:
+        across = 0.15 * mass * (self.radius**2 + self.height**2 / 4.0)
+        return (across, across, 0.3 * mass * self.radius**2)
+
+    def measures(self) -> tuple[float, ...]:
+        low, rim = -0.25 * self.height, _circle(self.radius)
+        faces = [[(x, y, low) for x, y in reversed(rim)]]
+        for (x, y), (u, v) in zip(rim, [*rim[1:], rim[0]], strict=True):
+            faces.append([(x, y, low), (u, v, low), (0.0, 0.0, 0.75 * self.height)])
+        return polytope.drawn(faces)
+
+
+def _circle(radius: float) -> list[tuple[float, float]]:
+    """Corners of a drawn circle [m]."""
+    turns = [2.0 * math.pi * k / 24 for k in range(24)]
+    return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
 
 
 class PlacedHull(NamedTuple):

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from spook_tracker.engine.bodies import RigidBody
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.joints import Distance, Joint
 from spook_tracker.engine.program import table
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Compound, ConvexHull
 
 ORIGIN = (0.0, 0.0, 0.0)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -47,33 +45,3 @@ def hull_tables(hulls: Mapping[ConvexHull, int]) -> dict[str, Any]:
         for corner in loop
     ]
     return {"hull_corners": table(corners), "hull_faces": table(loops)}
-
-
-def check_cylinders(scene: Scene) -> None:
-    """Raises SceneError where a cylinder may touch what it cannot meet yet."""
-    solid = [body for body in scene.bodies if isinstance(body, RigidBody) and body.shape is not None]
-    round_ones = [body for body in solid if any(isinstance(part, Cylinder) for part in _parts(body))]
-    if not round_ones or not scene.contacts:
-        return
-    apart = {frozenset(pair) for pair in scene.no_contact}
-    apart |= {
-        frozenset(str(end) for end in c.between) for c in scene.constraints if isinstance(c, Joint | Distance)
-    }
-    for one in round_ones:
-        for other in solid:
-            if one is other or frozenset((one.name, other.name)) in apart:
-                continue
-            if "dynamic" not in (one.motion, other.motion):
-                continue
-            for part in _parts(other):
-                if not isinstance(part, Plane | Sphere):
-                    raise SceneError(
-                        f"cylinder {one.name!r} may touch the {part.kind} {other.name!r}, and cylinders meet only planes "
-                        "and spheres; list both in no_contact or use another shape"
-                    )
-
-
-def _parts(body: RigidBody) -> list[Shape]:
-    if isinstance(body.shape, Compound):
-        return [part.shape for part in body.shape.parts]
-    return [] if body.shape is None else [body.shape]

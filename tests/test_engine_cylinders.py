@@ -1,4 +1,4 @@
-"""Cylinders: on planes, under balls, in water; and what they cannot meet is refused by name."""
+"""Cylinders: on planes, under balls, in water, and the sizes that are refused."""
 
 from __future__ import annotations
 
@@ -11,29 +11,21 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from spook_tracker.engine import (
-    Ball,
-    Box,
-    Capsule,
-    Compound,
     ContactForce,
-    ConvexHull,
     Cylinder,
     Energy,
     Final,
     Fluid,
     Material,
-    Part,
     Penetration,
     Plane,
     Position,
     RigidBody,
     Scene,
     SceneError,
-    Shape,
     Sphere,
     Trace,
     Velocity,
-    compile,
     simulate,
 )
 
@@ -167,30 +159,6 @@ def test_water_lifts_what_a_grid_of_points_finds_under_it(level: float, lean: fl
     cell = r.reshape(-1) * (0.3 / count) * (2 * math.pi / count) * (0.5 / count)
 
     assert lifted == pytest.approx(float(cell[height < level].sum()), abs=6e-4)
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        Box((1, 1, 1)),
-        Capsule(0.1, 0.2),
-        Cylinder(0.1, 0.2),
-        ConvexHull(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))),
-    ],
-)
-def test_what_it_cannot_meet_is_refused_by_name(other: Shape) -> None:
-    box = RigidBody(name="shelf", motion="static", shape=other, position=(9.0, 0, 0))
-    scene = Scene(bodies=(can(), box), gravity=DOWN)
-    with pytest.raises(SceneError, match=f"'can' may touch the {other.kind} 'shelf'") as caught:
-        compile(scene, time_step=H)
-    assert "no_contact" in str(caught.value) and "\n" not in str(caught.value)
-
-    compile(Scene(bodies=(can(), box), no_contact=(("shelf", "can"),)), time_step=H)
-    compile(Scene(bodies=(can(), box), contacts=False), time_step=H)
-    compile(Scene(bodies=(can(), box), constraints=(Ball(name="b", between=("shelf", "can")),)), time_step=H)
-    held = can(shape=Compound((Part(shape=Cylinder(0.1, 0.1)),)), inertia=(1, 1, 1))
-    with pytest.raises(SceneError, match="no_contact"):
-        compile(Scene(bodies=(held, box)), time_step=H)
 
 
 @pytest.mark.parametrize("field", ["radius", "length"])

@@ -9,8 +9,10 @@ from spook_tracker.engine import (
     Box,
     Capsule,
     Compound,
+    Cone,
     ContactForce,
     ConvexHull,
+    Cylinder,
     Energy,
     Material,
     Maximum,
@@ -37,6 +39,8 @@ SHAPES: dict[str, Shape] = {
     "hull": ConvexHull(
         ((0.35, 0, 0), (-0.3, 0.05, 0), (0, 0.35, 0), (0.02, -0.3, 0), (0, 0, 0.3), (0, 0.03, -0.28))
     ),
+    "cylinder": Cylinder(0.25, 0.4),
+    "cone": Cone(0.35, 0.5),
     "compound": Compound(
         (
             Part(shape=Box((1.0, 0.2, 0.1))),

@@ -156,6 +156,7 @@ std::vector<Collider> read_colliders(const nb::dict& colliders, const Hulls& hul
             case ShapeKind::capsule: collider.shape = Primitive::capsule(radius[i], length[i]); break;
             case ShapeKind::box: collider.shape = Primitive::box(size.vec(i)); break;
             case ShapeKind::cylinder: collider.shape = Primitive::cylinder(radius[i], length[i]); break;
+            case ShapeKind::cone: collider.shape = Primitive::cone(radius[i], length[i]); break;
             case ShapeKind::hull:
                 collider.shape = Primitive::convex(hulls.at(static_cast<std::size_t>(hull.index(i))));
                 break;

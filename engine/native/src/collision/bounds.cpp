@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "collision/cylinder.hpp"
+#include "collision/frustum.hpp"
 
 namespace spook {
 
@@ -17,6 +18,16 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
         }
         return {at.position + low - grown, at.position + high + grown};
     }
+    if (shape.kind == ShapeKind::cone) {
+        const Frustum frustum(shape, at);
+        Vec3 low, high;
+        for (int i = 0; i < 3; ++i) {
+            Vec3 axis;
+            axis[i] = 1.0;
+            high[i] = frustum.reach(axis), low[i] = -frustum.reach(-axis);
+        }
+        return {low - grown, high + grown};
+    }
     Vec3 half;
     for (int i = 0; i < 3; ++i) switch (shape.kind) {
             case ShapeKind::sphere: half[i] = shape.radius; break;
@@ -28,7 +39,8 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
                           shape.half.y * std::abs(at.rotation(i, 1)) +
                           shape.half.z * std::abs(at.rotation(i, 2));
                 break;
-            case ShapeKind::hull: break;
+            case ShapeKind::hull:
+            case ShapeKind::cone: break;
             case ShapeKind::cylinder: {
                 Vec3 axis;
                 axis[i] = 1.0;
@@ -49,6 +61,10 @@ double reach(const Primitive& shape) noexcept {
         case ShapeKind::hull: return shape.hull->reach;
         case ShapeKind::cylinder:
             return std::sqrt(shape.radius * shape.radius + shape.half_length * shape.half_length);
+        case ShapeKind::cone: {
+            const double rim = shape.radius * shape.radius + 0.25 * shape.half_length * shape.half_length;
+            return std::max(1.5 * shape.half_length, std::sqrt(rim));
+        }
         case ShapeKind::plane: break;
     }
     return std::numeric_limits<double>::infinity();

@@ -1,6 +1,7 @@
-// Cylinders against planes and spheres, in closed form.
+// Cylinders against planes and spheres, cones against planes, in closed form.
 #include "collision/cylinder.hpp"
 
+#include "collision/frustum.hpp"
 #include "collision/narrow_phase.hpp"
 #include "collision/segment.hpp"
 
@@ -20,6 +21,22 @@ Manifold cylinder_plane(const Primitive& cylinder, const Pose& at, const Primiti
     for (std::uint32_t k = 0; k < 8; ++k) {
         const Vec3 point = at.position + (k < 4 ? -cylinder.half_length : cylinder.half_length) * axis +
                            cylinder.radius * spokes[k % 4];
+        const double gap = dot(n, point - at_plane.position);
+        if (gap <= margin) manifold.add(point - 0.5 * gap * n, n, gap, k);
+    }
+    return manifold;
+}
+
+/// The apex, and four points of the rim as of a cylinder's.
+Manifold cone_plane(const Primitive& cone, const Pose& at, const Primitive& plane, const Pose& at_plane,
+                    double margin) noexcept {
+    const Vec3 n = at_plane.rotation * plane.normal;
+    const Frustum frustum(cone, at);
+    const Vec3 down = frustum.outward(-n), aside = cross(frustum.axis, down);
+    const Vec3 spokes[5] = {down, aside, -down, -aside, {}};
+    Manifold manifold;
+    for (std::uint32_t k = 0; k < 5; ++k) {
+        const Vec3 point = k < 4 ? frustum.centre[0] + cone.radius * spokes[k] : frustum.centre[1];
         const double gap = dot(n, point - at_plane.position);
         if (gap <= margin) manifold.add(point - 0.5 * gap * n, n, gap, k);
     }

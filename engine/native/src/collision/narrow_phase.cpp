@@ -9,13 +9,14 @@ using Pair = Manifold (*)(const Primitive&, const Pose&, const Primitive&, const
 Manifold never(const Primitive&, const Pose&, const Primitive&, const Pose&, double) noexcept { return {}; }
 
 // By kind of the first (row) and the second (column), in the order of ShapeKind.
-constexpr Pair pairs[6][6] = {
-    {sphere_sphere, sphere_capsule, sphere_box, sphere_hull, sphere_cylinder, sphere_plane},
-    {nullptr, capsule_capsule, capsule_box, capsule_hull, never, capsule_plane},
-    {nullptr, nullptr, box_box, solid_solid, never, box_plane},
-    {nullptr, nullptr, nullptr, solid_solid, never, hull_plane},
-    {nullptr, nullptr, nullptr, nullptr, never, cylinder_plane},
-    {nullptr, nullptr, nullptr, nullptr, nullptr, never},
+constexpr Pair pairs[7][7] = {
+    {sphere_sphere, sphere_capsule, sphere_box, sphere_hull, sphere_cylinder, facets_frustum, sphere_plane},
+    {nullptr, capsule_capsule, capsule_box, capsule_hull, facets_frustum, facets_frustum, capsule_plane},
+    {nullptr, nullptr, box_box, solid_solid, facets_frustum, facets_frustum, box_plane},
+    {nullptr, nullptr, nullptr, solid_solid, facets_frustum, facets_frustum, hull_plane},
+    {nullptr, nullptr, nullptr, nullptr, frustum_frustum, frustum_frustum, cylinder_plane},
+    {nullptr, nullptr, nullptr, nullptr, nullptr, frustum_frustum, cone_plane},
+    {nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, never},
 };
 
 }  // namespace

@@ -27,10 +27,15 @@ Manifold box_box(const Primitive&, const Pose&, const Primitive&, const Pose&, d
 Manifold solid_solid(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold sphere_hull(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold capsule_hull(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
-/// Cylinders meet planes and balls only; other pairs give no point, and are refused before anything runs.
+/// A ball, capsule, box or hull and a cylinder or cone.
+Manifold facets_frustum(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+/// Two cylinders or cones.
+Manifold frustum_frustum(const Primitive&, const Pose&, const Primitive&, const Pose&,
+                         double margin) noexcept;
 Manifold sphere_cylinder(const Primitive&, const Pose&, const Primitive&, const Pose&,
                          double margin) noexcept;
 Manifold cylinder_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+Manifold cone_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold hull_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold box_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 

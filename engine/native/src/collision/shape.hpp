@@ -12,7 +12,7 @@
 namespace spook {
 
 /// The order matters: the narrow phase knows each pair with the lower kind first.
-SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, hull, cylinder, plane)
+SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, hull, cylinder, cone, plane)
 
 struct Pose {
     Vec3 position;                     // m
@@ -22,9 +22,10 @@ struct Pose {
 /// One convex primitive; fields not named for a kind are ignored.
 struct Primitive {
     ShapeKind kind = ShapeKind::sphere;
-    double radius = 0.0;         // sphere, capsule, cylinder, m
-    double half_length = 0.0;    // half of a cylinder, also of a capsule's, along local z, m
-    Vec3 half;                   // box: half its edges, m
+    double radius = 0.0;  // sphere, capsule, cylinder, a cone's base, m
+    double half_length =
+        0.0;    // half of a cylinder, also of a capsule's, or of a cone's height, along local z, m
+    Vec3 half;  // box: half its edges, m
     Vec3 normal{0.0, 0.0, 1.0};  // plane: unit, out of the solid half-space, local axes
     std::shared_ptr<const Polytope> hull{};
 
@@ -36,12 +37,18 @@ struct Primitive {
     static Primitive cylinder(double radius, double length) noexcept {
         return {ShapeKind::cylinder, radius, 0.5 * length, {}, {}, {}};
     }
+    /// Its apex lies up local z, its centre of mass in the origin.
+    static Primitive cone(double radius, double height) noexcept {
+        return {ShapeKind::cone, radius, 0.5 * height, {}, {}, {}};
+    }
     static Primitive plane(Vec3 normal) noexcept { return {ShapeKind::plane, 0.0, 0.0, {}, normal, {}}; }
     static Primitive convex(std::shared_ptr<const Polytope> hull) noexcept {
         return {ShapeKind::hull, 0.0, 0.0, {}, {}, std::move(hull)};
     }
     /// Whether its surface is flat faces: it has corners, and sides that others can meet.
     bool faceted() const noexcept { return kind == ShapeKind::box || kind == ShapeKind::hull; }
+    /// Whether it is the hull of two discs on its axis, one of which may be a point.
+    bool has_rims() const noexcept { return kind == ShapeKind::cylinder || kind == ShapeKind::cone; }
 };
 
 constexpr Vec3 column(const Mat3& a, int i) noexcept { return {a.m[i], a.m[3 + i], a.m[6 + i]}; }

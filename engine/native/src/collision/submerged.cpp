@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "collision/frustum.hpp"
 #include "linear/elementary.hpp"
 
 namespace spook {
@@ -99,12 +100,16 @@ constexpr double WEIGHT[] = {0.18945061045506864,  0.18260341504492364, 0.169156
                              0.1495959888165767,   0.12462897125553407, 0.0951585116824926,
                              0.062253523938647456, 0.027152459411754176};
 
-/// A capsule, or without caps a cylinder, along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
+/// A capsule, a cylinder or a cone along a unit axis: slices at `s` from the centre, of radius ρ(s), under a surface that stands
 /// height + slope s above the slice's centre and rises across it with `tilt`.
-struct Capsule {
-    double radius, half_length, height, slope, tilt;
+struct Slices {
+    double radius, half_length, height, slope, tilt, apex;  // apex: of a cone, m up its axis, else zero
 
     double rho2(double s) const noexcept {  // of a cylinder no slice is beyond
+        if (apex > 0.0) {
+            const double rho = radius * (apex - s) / (2.0 * half_length);
+            return rho * rho;
+        }
         const double beyond = std::max(0.0, std::abs(s) - half_length);
         return std::max(0.0, radius * radius - beyond * beyond);
     }
@@ -118,24 +123,31 @@ struct Capsule {
     }
 };
 
-Submerged capsule_below(const Primitive& shape, const Pose& at, Vec3 up, double height) noexcept {
+Submerged slices_below(const Primitive& shape, const Pose& at, Vec3 up, double height) noexcept {
     const Vec3 axis = column(at.rotation, 2);
     const double slope = dot(axis, up), r = shape.radius, half = shape.half_length;
     const bool caps = shape.kind == ShapeKind::capsule;
     const Vec3 across = up - slope * axis;
     const double tilt = norm(across);
+    const bool cone = shape.kind == ShapeKind::cone;
     const double reach = (caps ? r : r * tilt) + half * std::abs(slope), end = caps ? half + r : half;
-    if (height >= reach) return {0.0, at.position};
-    if (height <= -reach) return {volume(shape), at.position};
-    const Capsule capsule{r, half, height, slope, tilt};
+    const double first = cone ? -0.5 * half : -end, last = cone ? 1.5 * half : end;
+    const double deep = cone ? std::max(r * tilt - slope * first, -slope * last) : reach,
+                 tall = cone ? std::max(r * tilt + slope * first, slope * last) : reach;
+    if (height >= deep) return {0.0, at.position};
+    if (height <= -tall) return {volume(shape), at.position};
+    const Slices slices{r, half, height, slope, tilt, cone ? last : 0.0};
     // Where pieces end: the caps, and where the surface meets the side |over| = tilt ρ of cylinder and caps.
-    double ends[20] = {-end, end};
+    double ends[20] = {first, last};
     int count = 2;
     if (caps) ends[count++] = -half, ends[count++] = half;
     const auto add = [&](double s) {
-        if (s > -end && s < end) ends[count++] = s;
+        if (s > first && s < last) ends[count++] = s;
     };
-    if (slope != 0.0)
+    if (cone)  // |over| = tilt ρ, both linear
+        for (const double side : {-0.5 * tilt * r / half, 0.5 * tilt * r / half})
+            if (slope + side != 0.0) add((side * last - height) / (slope + side));
+    if (slope != 0.0 && !cone)
         for (const double side : {-1.0, 1.0}) add((side * tilt * r - height) / slope);
     for (const double middle : {-half, half}) {
         if (!caps) break;  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
@@ -155,7 +167,7 @@ Submerged capsule_below(const Primitive& shape, const Pose& at, Vec3 up, double 
             const double s = middle - width * turn.cosine,
                          weight = WEIGHT[node % 8] * 0.5 * kPi * width * turn.sine;
             double area, moment;
-            capsule.slice(s, area, moment);
+            slices.slice(s, area, moment);
             volume += weight * area;
             along += weight * area * s;
             aside += weight * moment;
@@ -175,6 +187,7 @@ double volume(const Primitive& shape) noexcept {
         case ShapeKind::capsule: return kPi * r * r * (2.0 * shape.half_length + 4.0 / 3.0 * r);
         case ShapeKind::box: return 8.0 * shape.half.x * shape.half.y * shape.half.z;
         case ShapeKind::hull: return shape.hull->volume;
+        case ShapeKind::cone: return kPi * r * r * shape.half_length * 2.0 / 3.0;
         case ShapeKind::cylinder: return 2.0 * kPi * r * r * shape.half_length;
         case ShapeKind::plane: return 0.0;
     }
@@ -197,6 +210,14 @@ double shadow(const Primitive& shape, const Pose& at, Vec3 direction) noexcept {
             return kPi * r * r * std::abs(dot(axis, direction)) +
                    4.0 * r * shape.half_length * norm(cross(axis, direction));
         }
+        case ShapeKind::cone: {  // its base's ellipse, and the tangents to it from the apex
+            const Vec3 axis = column(at.rotation, 2);
+            const double along = std::abs(dot(axis, direction)),
+                         out = 2.0 * shape.half_length * norm(cross(axis, direction)), rim = r * along;
+            if (out <= rim) return kPi * r * rim;
+            const double tangent = std::sqrt(out * out - rim * rim);
+            return r * (rim * (kPi - arc_tangent(tangent, rim)) + tangent);
+        }
         case ShapeKind::hull: {
             const Vec3 d = local(at.rotation, direction);
             double area = 0.0;
@@ -214,7 +235,8 @@ Submerged submerged(const Primitive& shape, const Pose& at, Vec3 up, double leve
     switch (shape.kind) {
         case ShapeKind::sphere: return sphere_below(shape.radius, at.position, up, height);
         case ShapeKind::cylinder:
-        case ShapeKind::capsule: return capsule_below(shape, at, up, height);
+        case ShapeKind::cone:
+        case ShapeKind::capsule: return slices_below(shape, at, up, height);
         case ShapeKind::box: return box_below(shape.half, at, up, height);
         case ShapeKind::hull: return hull_below(*shape.hull, at, up, height);
         case ShapeKind::plane: break;

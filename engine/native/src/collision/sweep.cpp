@@ -5,6 +5,7 @@
 
 #include "collision/bounds.hpp"
 #include "collision/cylinder.hpp"
+#include "collision/frustum.hpp"
 #include "collision/segment.hpp"
 #include "collision/solid_pairs.hpp"
 #include "linear/elementary.hpp"
@@ -114,6 +115,7 @@ Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& p
         case ShapeKind::capsule:
             return {height - shape.radius - shape.half_length * std::abs(dot(n, column(at.rotation, 2))), n};
         case ShapeKind::cylinder: return {height - cylinder_reach(shape, column(at.rotation, 2), n), n};
+        case ShapeKind::cone: return {-Frustum(shape, at).reach(-n) - dot(n, at_plane.position), n};
         case ShapeKind::hull: return {height - farthest(*shape.hull, -local(at.rotation, n)), n};
         default: return {height - box_reach(shape, at, n), n};
     }
@@ -129,8 +131,14 @@ Separation separation(const Primitive& first, const Pose& at_first, const Primit
         return swapped;
     }
     if (second.kind == ShapeKind::plane) return from_plane(first, at_first, second, at_second);
+    if (second.has_rims() && !(first.kind == ShapeKind::sphere && second.kind == ShapeKind::cylinder)) {
+        const Frustum frustum(second, at_second);
+        const PartingAxis best = first.has_rims()
+                                     ? parting_axes(frustum, Frustum(first, at_first), 1e300).best()
+                                     : parting_axes(frustum, Facets(first, at_first), 1e300).best();
+        return {best.gap, best.normal};
+    }
     if (second.kind == ShapeKind::cylinder) {
-        if (first.kind != ShapeKind::sphere) return {1e300, {0.0, 0.0, 1.0}};  // refused before
         const Nearest near =
             nearest_on_cylinder(second, local(at_second.rotation, at_first.position - at_second.position));
         return {near.height - first.radius, at_second.rotation * near.normal};

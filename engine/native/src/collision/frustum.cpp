@@ -1,0 +1,328 @@
+#include "collision/frustum.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <utility>
+
+#include "collision/segment.hpp"
+#include "collision/solid_pairs.hpp"
+#include "linear/elementary.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr Polytope::Edge only_edge{0, 1, 0, 0};
+constexpr double parallel = 1e-9;  // sine of an angle that is none
+
+/// Parts of a turn, from −π to π.
+struct Circle {
+    static constexpr int count = 48;
+    SineCosine turns[count + 1];
+    Circle() noexcept {
+        for (int k = 0; k <= count; ++k) turns[k] = sine_cosine(std::numbers::pi * (2.0 * k / count - 1.0));
+    }
+};
+const Circle& circle() noexcept {
+    static const Circle parts;
+    return parts;
+}
+double circle_angle(int k, int parts) noexcept { return std::numbers::pi * (2.0 * k / parts - 1.0); }
+
+/// a cos φ + b sin φ − r √(p² cos² φ + (p m sin φ − w)²): the gap of a disc of radius r and a feature whose normals are
+/// a circle of directions. It peaks sharply, if at all, near φ = ±π/2, where the direction is nearest to the axis.
+struct Around {
+    double a, b, r, p, m, w;
+
+    double slope(SineCosine turn, double& bend) const noexcept {
+        const double s = turn.sine, c = turn.cosine, v = p * m * s - w;
+        const double q = p * p * c * c + v * v, root = std::sqrt(q);
+        double first = b * c - a * s, second = -a * c - b * s;
+        if (root > 0.0) {
+            const double half = p * c * (m * v - p * s);  // q′/2
+            first -= r * half / root;
+            const double turned = p * p * (s * s - c * c + m * m * c * c) - p * m * s * v;  // q″/2
+            second -= r * (turned - half * half / q) / root;
+        }
+        bend = second;
+        return first;
+    }
+
+    /// Calls visit(cos φ, sin φ) at every local maximum on the whole circle.
+    template <class Visit> void peaks(Visit visit) const noexcept {
+        constexpr int parts = 16;
+        double bend, before = slope(circle().turns[0], bend);
+        for (int k = 1; k <= parts; ++k) {
+            const double start = before;
+            before = slope(circle().turns[k * Circle::count / parts], bend);
+            if (start > 0.0 && before <= 0.0) peak(circle_angle(k - 1, parts), circle_angle(k, parts), visit);
+        }
+    }
+    /// The same from one angle to another.
+    template <class Visit> void peaks(double from, double to, Visit visit) const noexcept {
+        const int parts = 1 + static_cast<int>(8.0 * (to - from) / std::numbers::pi);
+        const double part = (to - from) / parts;
+        double bend, before = slope(sine_cosine(from), bend);
+        for (int k = 0; k < parts; ++k) {
+            const double start = before, low = from + k * part;
+            before = slope(sine_cosine(low + part), bend);
+            if (start > 0.0 && before <= 0.0) peak(low, low + part, visit);
+        }
+    }
+
+private:
+    template <class Visit> void peak(double low, double high, Visit visit) const noexcept {
+        double bend, angle = 0.5 * (low + high);
+        for (int round = 0; round < 80; ++round) {
+            const double here = slope(sine_cosine(angle), bend);
+            (here > 0.0 ? low : high) = angle;
+            double next = angle - here / bend;
+            if (!(next > low && next < high)) next = 0.5 * (low + high);
+            const double way = std::abs(next - angle);
+            angle = next;
+            if (way <= 4e-16) break;
+        }
+        const SineCosine turn = sine_cosine(angle);
+        visit(turn.cosine, turn.sine);
+    }
+};
+
+/// Collects axes; `gap` gives the gap along a direction.
+template <class Gap> struct Search {
+    Gap gap;
+    PartingAxes found{};
+
+    void flat(Vec3 n) noexcept { improve(found.flat, n, -1); }
+    void curved(Vec3 n, int edge = -1) noexcept { improve(found.curved, n, edge); }
+
+private:
+    void improve(PartingAxis& best, Vec3 n, int edge) noexcept {
+        const double along = gap(n);
+        if (along > best.gap) best = {along, n, edge};
+    }
+};
+
+/// The unit vector normal to `e` nearest to `v`, which is nearly so.
+Vec3 normal_to(Vec3 e, Vec3 v) noexcept {
+    const Vec3 unit = (1.0 / norm(v)) * v, across = unit - dot(unit, e) * e;
+    return (1.0 / norm(across)) * across;
+}
+
+/// The corner `p` and the frustum's side and rims.
+template <class Gap> void meet_corner(Search<Gap>& search, const Frustum& frustum, Vec3 p) noexcept {
+    const Vec3 away = frustum.radial(p - frustum.centre[0]);
+    const double distance = norm(away);
+    const Vec3 out = distance > 0.0 ? (1.0 / distance) * away : frustum.sideways;
+    search.curved(frustum.cosine * out + frustum.sine * frustum.axis);
+    for (int i = 0; i < 2; ++i) {
+        if (distance <= frustum.radius[i]) continue;
+        const Vec3 between = p - frustum.centre[i] - frustum.radius[i] * out;
+        const double length = norm(between);
+        if (length > 0.0) search.curved((1.0 / length) * between);
+    }
+}
+
+/// `left` and `right` are the normals of the faces the edge parts: directions between them alone have it nearest.
+template <class Gap>
+void meet_edge(Search<Gap>& search, const Frustum& frustum, Vec3 from, Vec3 to, const Vec3* left,
+               const Vec3* right, int edge) noexcept {
+    const Vec3 along = to - from;
+    const double length = norm(along);
+    if (!(length > 0.0)) return;
+    const Vec3 e = (1.0 / length) * along, across = cross(e, frustum.axis);
+    const double m = dot(e, frustum.axis), k = norm(across);
+    const Vec3 u = k > parallel ? normal_to(e, across) : any_normal_to(e), v = cross(u, e);
+    if (k > parallel) {  // the side along one of its lines
+        const double up = frustum.sine / k;
+        if (std::abs(up) <= 1.0) {
+            const double aside = std::sqrt(1.0 - up * up);
+            search.curved(up * v + aside * u, edge);
+            search.curved(up * v - aside * u, edge);
+        }
+    }
+    const bool whole = left == nullptr;
+    double low = 0.0, high = 0.0;
+    if (!whole) {
+        low = arc_tangent(-dot(*left, v), -dot(*left, u)),
+        high = arc_tangent(-dot(*right, v), -dot(*right, u));
+        if (low > high) std::swap(low, high);
+        if (high - low > std::numbers::pi) low += 2.0 * std::numbers::pi, std::swap(low, high);
+    }
+    for (int i = 0; i < 2; ++i) {
+        const Vec3 between = from - frustum.centre[i];
+        const Around around{dot(u, between), dot(v, between), frustum.radius[i], 1.0, m, 0.0};
+        const auto visit = [&](double c, double s) { search.curved(c * u + s * v, edge); };
+        if (whole) around.peaks(visit);
+        else around.peaks(low, high, visit);
+    }
+}
+
+/// The side of `one`, whose normals point to `other`, and the rims of `other`; `sign` turns them as the search wants.
+template <class Gap>
+void side_and_rims(Search<Gap>& search, const Frustum& one, const Frustum& other, double sign) noexcept {
+    const Vec3 across = one.radial(other.axis);
+    const double k = norm(across), m = dot(one.axis, other.axis);
+    const Vec3 v = k > parallel ? normal_to(one.axis, across) : one.sideways, u = cross(v, one.axis);
+    const double width = one.cosine;
+    for (int i = 0; i < 2; ++i) {
+        const Vec3 between = other.centre[i] - one.centre[0];
+        const Around around{
+            width * dot(u, between), width * dot(v, between), other.radius[i], width, m, one.sine * k};
+        around.peaks([&](double c, double s) {
+            search.curved(sign * (width * (c * u + s * v) + one.sine * one.axis));
+        });
+    }
+}
+
+/// Where the rims come nearest: each point of the second's, and the nearest of the first's.
+template <class Gap>
+void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& two, int j) noexcept {
+    const double r = one.radius[i], far = two.radius[j];
+    const Vec3 u = two.sideways, v = cross(two.axis, u);
+    Vec3 apart, first_along, second_along;
+    const auto slope = [&](SineCosine turn) noexcept {
+        const Vec3 p = two.centre[j] + far * (turn.cosine * u + turn.sine * v);
+        second_along = turn.cosine * v - turn.sine * u;
+        const Vec3 away = one.radial(p - one.centre[i]);
+        const double distance = norm(away);
+        const Vec3 out = distance > 0.0 ? (1.0 / distance) * away : one.sideways;
+        first_along = cross(one.axis, out);
+        apart = p - (one.centre[i] + r * out);
+        return dot(apart, second_along);
+    };
+    constexpr int parts = 24;
+    double before = slope(circle().turns[0]);
+    for (int k = 1; k <= parts; ++k) {
+        double low = circle_angle(k - 1, parts), high = circle_angle(k, parts);
+        double at_low = before, at_high = before = slope(circle().turns[k * Circle::count / parts]);
+        if ((at_low > 0.0) == (at_high > 0.0)) continue;
+        for (int round = 0; round < 100 && high - low > 4e-16;
+             ++round) {  // false position, halving now and then
+            double angle =
+                round % 3 == 2 ? 0.5 * (low + high) : low + at_low / (at_low - at_high) * (high - low);
+            if (!(angle > low && angle < high)) angle = 0.5 * (low + high);
+            const double here = slope(sine_cosine(angle));
+            if (here == 0.0) break;
+            if ((here > 0.0) == (at_low > 0.0)) low = angle, at_low = here;
+            else high = angle, at_high = here;
+        }
+        const double distance = norm(apart);
+        const Vec3 crossed = cross(first_along, second_along);
+        const double sine = norm(crossed);
+        // Crossing rims: the difference of two nearly equal points has no direction, their tangents have one.
+        if (distance > 1e-3 * std::min(r, far)) search.curved((1.0 / distance) * apart);
+        if (sine > parallel) {
+            search.curved((1.0 / sine) * crossed);
+            search.curved((-1.0 / sine) * crossed);
+        }
+    }
+}
+
+}  // namespace
+
+Frustum::Frustum(const Primitive& primitive, const Pose& at) noexcept
+    : axis(column(at.rotation, 2)), sideways(column(at.rotation, 0)) {
+    const bool cone = primitive.kind == ShapeKind::cone;
+    // A cone's centre of mass is a quarter of its height above its base.
+    const double low = cone ? -0.5 * primitive.half_length : -primitive.half_length;
+    const double high = cone ? 1.5 * primitive.half_length : primitive.half_length;
+    centre[0] = at.position + low * axis, centre[1] = at.position + high * axis;
+    radius[0] = primitive.radius, radius[1] = cone ? 0.0 : primitive.radius;
+    const double fall = radius[0] - radius[1], rise = high - low, side = length(fall, rise);
+    sine = fall / side, cosine = rise / side;
+    thickness = std::min(rise, 2.0 * primitive.radius);
+}
+
+Vec3 Frustum::outward(Vec3 n) const noexcept {
+    const Vec3 across = radial(n);
+    const double long_enough = norm(across);
+    return long_enough > 1e-12 ? (1.0 / long_enough) * across : sideways;
+}
+
+Facets::Facets(const Primitive& primitive, const Pose& at) noexcept {
+    if (primitive.faceted()) {
+        const bool box = primitive.kind == ShapeKind::box;
+        shape = box ? &cube() : primitive.hull.get();
+        const Vec3 half = primitive.half;
+        for (const Vec3 c : shape->corners)
+            corners[corner_count++] = apply(at, box ? Vec3{half.x * c.x, half.y * c.y, half.z * c.z} : c);
+        for (const Polytope::Face& face : shape->faces) normals[face_count++] = at.rotation * face.normal;
+        edges = shape->edges.data(), edge_count = static_cast<int>(shape->edges.size());
+        thickness = box ? 2.0 * std::min({half.x, half.y, half.z}) : shape->thickness;
+        return;
+    }
+    radius = primitive.radius, thickness = 2.0 * primitive.radius;
+    if (primitive.kind == ShapeKind::sphere) {
+        corners[corner_count++] = at.position;
+        return;
+    }
+    const Vec3 axis = primitive.half_length * column(at.rotation, 2);
+    corners[corner_count++] = at.position - axis, corners[corner_count++] = at.position + axis;
+    edges = &only_edge, edge_count = 1;
+}
+
+double Facets::lowest(Vec3 n) const noexcept {
+    double least = 1e300;
+    for (int k = 0; k < corner_count; ++k) least = std::min(least, dot(n, corners[k]));
+    return least;
+}
+
+PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin) noexcept {
+    Search search{[&](Vec3 n) noexcept { return other.lowest(n) - frustum.reach(n) - other.radius; }};
+    search.flat(frustum.axis);
+    search.flat(-frustum.axis);
+    for (int k = 0; k < other.face_count; ++k) search.flat(-other.normals[k]);
+    if (search.found.flat.gap > margin) return search.found;
+    for (int k = 0; k < other.corner_count; ++k) meet_corner(search, frustum, other.corners[k]);
+    for (int k = 0; k < other.edge_count; ++k) {
+        const Polytope::Edge& edge = other.edges[k];
+        const bool faces = other.face_count > 0;
+        meet_edge(search, frustum, other.corners[edge.from], other.corners[edge.to],
+                  faces ? &other.normals[edge.left] : nullptr, faces ? &other.normals[edge.right] : nullptr,
+                  k);
+    }
+    return search.found;
+}
+
+PartingAxes parting_axes(const Frustum& one, const Frustum& two, double margin) noexcept {
+    Search search{[&](Vec3 n) noexcept { return -two.reach(-n) - one.reach(n); }};
+    for (const double side : {1.0, -1.0}) {
+        search.flat(side * one.axis);
+        search.flat(side * two.axis);
+    }
+    if (search.found.flat.gap > margin) return search.found;
+    const double c = dot(one.axis, two.axis);
+    const Vec3 crossed = cross(one.axis, two.axis);
+    const double square = dot(crossed, crossed);
+    if (square > 1e-14) {  // side on side: n · one = sine, n · two = −sine of the other
+        const double a = (one.sine + c * two.sine) / square, b = -(two.sine + c * one.sine) / square;
+        const double left = 1.0 - (a * one.sine - b * two.sine);
+        if (left >= 0.0) {
+            const Vec3 flat = a * one.axis + b * two.axis, aside = std::sqrt(left / square) * crossed;
+            for (const Vec3 n : {flat + aside, flat - aside}) search.curved((1.0 / norm(n)) * n);
+        }
+    }
+    for (int i = 0; i < 2; ++i) {  // ends as corners: apexes, and the sides of parallel axes
+        meet_corner(search, one, two.centre[i]);
+        const Vec3 out = two.radial(one.centre[i] - two.centre[0]);
+        const double distance = norm(out);
+        const Vec3 n =
+            two.cosine * (distance > 0.0 ? (1.0 / distance) * out : two.sideways) + two.sine * two.axis;
+        search.curved(-n);
+        if (one.radius[i] == 0.0)
+            for (int j = 0; j < 2; ++j) {
+                if (distance <= two.radius[j]) continue;
+                const Vec3 between = two.centre[j] + (two.radius[j] / distance) * out - one.centre[i];
+                const double apart = norm(between);
+                if (apart > 0.0) search.curved((1.0 / apart) * between);
+            }
+    }
+    side_and_rims(search, one, two, 1.0);
+    side_and_rims(search, two, one, -1.0);
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j)
+            if (one.radius[i] > 0.0 && two.radius[j] > 0.0) rim_and_rim(search, one, i, two, j);
+    return search.found;
+}
+
+}  // namespace spook

@@ -1,0 +1,409 @@
+"""Cylinders and cones against all that is bounded: depths against a search over directions, rest, tipping, and cones."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import tplquad
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from spook_tracker.engine import (
+    Box,
+    Capsule,
+    Cone,
+    ContactForce,
+    ConvexHull,
+    Cylinder,
+    Energy,
+    Final,
+    Fluid,
+    Material,
+    Maximum,
+    Penetration,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    SceneError,
+    Shape,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+
+H = 1.0 / 60.0
+DOWN = (0.0, 0.0, -10.0)
+ROUGH = Material(friction=0.5)
+OCTAHEDRON = ConvexHull(
+    ((0.5, 0, 0), (-0.5, 0, 0), (0, 0.7, 0), (0, -0.7, 0), (0.1, 0, 0.4), (0, -0.1, -0.6))
+)
+SHAPES: dict[str, Shape] = {
+    "ball": Sphere(0.4),
+    "capsule": Capsule(0.2, 0.9),
+    "box": Box((0.7, 1.1, 0.5)),
+    "hull": OCTAHEDRON,
+    "can": Cylinder(0.3, 0.8),
+    "coin": Cylinder(0.6, 0.05),
+    "cone": Cone(0.4, 0.9),
+    "hat": Cone(0.8, 0.2),
+}
+RIMMED = ("can", "coin", "cone", "hat")
+PAIRS = [(a, b) for a, b in itertools.product(SHAPES, RIMMED) if a not in RIMMED or a <= b]
+
+
+def fixed(shape: Shape, **fields: Any) -> RigidBody:
+    given = {"motion": "static", "shape": shape, "position": (0.0, 0.0, 0.0), "material": ROUGH}
+    return RigidBody(name="fixed", **(given | fields))
+
+
+def body(shape: Shape, **fields: Any) -> RigidBody:
+    given = {"mass": 2.0, "shape": shape, "inertia": (0.1, 0.1, 0.1), "material": ROUGH}
+    return RigidBody(name="body", **(given | fields))
+
+
+def quaternion(turn: Rotation) -> tuple[float, float, float, float]:
+    w, x, y, z = turn.as_quat(scalar_first=True)
+    return (float(w), float(x), float(y), float(z))
+
+
+def run(*bodies: RigidBody, steps: int, gravity: Any = DOWN, time_step: float = H, **observe: Any) -> Any:
+    scene = Scene(bodies=bodies, gravity=gravity)
+    return simulate(scene, time_step=time_step, steps=steps, observe=observe)
+
+
+# --- depths ---------------------------------------------------------------------------------------------
+
+
+def farthest(shape: Shape, n: Any) -> Any:
+    """Largest n · p over a shape in its own axes: its support function, written down anew."""
+    flat = np.hypot(n[..., 0], n[..., 1])
+    match shape:
+        case Sphere():
+            return shape.radius * np.linalg.norm(n, axis=-1)
+        case Capsule():
+            return shape.radius * np.linalg.norm(n, axis=-1) + 0.5 * shape.length * np.abs(n[..., 2])
+        case Box():
+            return np.abs(n) @ np.array(shape.size) / 2.0
+        case ConvexHull():
+            return np.max(n @ np.array(shape.corners).T, axis=-1)
+        case Cylinder():
+            return shape.radius * flat + 0.5 * shape.length * np.abs(n[..., 2])
+        case Cone():
+            base = shape.radius * flat - 0.25 * shape.height * n[..., 2]
+            return np.maximum(base, 0.75 * shape.height * n[..., 2])
+    raise AssertionError(shape)
+
+
+def sphere_of_directions(count: int) -> Any:
+    k = np.arange(count) + 0.5
+    polar, azimuth = np.arccos(1.0 - 2.0 * k / count), math.pi * (1.0 + math.sqrt(5.0)) * k
+    return np.stack(
+        (np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)), axis=-1
+    )
+
+
+DIRECTIONS = sphere_of_directions(2000)
+
+
+def gap(first: Shape, turn: Any, place: Any, second: Shape, other: Any) -> tuple[float, Any]:
+    """Distance of two shapes, or minus their least overlap, and its direction: the largest gap of all, by search."""
+
+    def along(n: Any) -> Any:
+        return n @ place - farthest(first, -n @ turn) - farthest(second, n @ other)
+
+    values = along(DIRECTIONS)
+    starts: list[Any] = []
+    for k in np.argsort(-values):
+        if all(DIRECTIONS[k] @ start < 0.97 for start in starts):
+            starts.append(DIRECTIONS[k])
+        if len(starts) == 3:
+            break
+    best, normal = -math.inf, None
+    for start in starts:
+        aside = np.linalg.svd(start[None])[2][1:]
+
+        def tilted(t: Any, start: Any = start, aside: Any = aside) -> float:
+            n = start + t @ aside
+            return -float(along(n / np.linalg.norm(n)))
+
+        t = np.zeros(2)
+        for width in (0.05, 1e-4):
+            simplex = t + width * np.array(((0, 0), (1, 0), (0, 1)))
+            t = minimize(
+                tilted,
+                t,
+                method="Nelder-Mead",
+                options={"xatol": 1e-12, "fatol": 1e-14, "initial_simplex": simplex},
+            ).x
+        if -tilted(t) > best:
+            best, normal = -tilted(t), start + t @ aside
+    return best, normal / np.linalg.norm(normal)
+
+
+@pytest.mark.parametrize(("first", "second"), PAIRS)
+def test_its_depth_is_that_of_a_search_over_all_directions(first: str, second: str) -> None:
+    """At two random poses: apart, moved together along the connection until they overlap by 1 mm; and deep in each other.
+
+    A face is preferred where it is within 1e-5 of the thickness, .8 m at most.
+    """
+    rng = np.random.default_rng(hash_of(first, second))
+    one, two = SHAPES[first], SHAPES[second]
+    for deep in (False, True):
+        turn, other = Rotation.random(rng=rng), Rotation.random(rng=rng)
+        away = rng.standard_normal(3)
+        away /= np.linalg.norm(away)
+        reach = farthest(one, -away @ turn.as_matrix()) + farthest(two, away @ other.as_matrix())
+        place = (0.5 if deep else 1.2) * reach * away
+        expected, normal = gap(one, turn.as_matrix(), place, two, other.as_matrix())
+        if not deep:
+            place = place - (expected + 1e-3) * normal
+            expected, _ = gap(one, turn.as_matrix(), place, two, other.as_matrix())
+            assert -1.000001e-3 < expected < -5e-4  # or less along another direction
+        moving = body(one, position=tuple(place), orientation=quaternion(turn))
+        found = run(
+            fixed(two, orientation=quaternion(other)),
+            moving,
+            steps=1,
+            gravity=(0, 0, 0),
+            depth=Maximum(quantity=Penetration()),
+        )
+
+        assert float(found["depth"]) == pytest.approx(max(0.0, -expected), abs=1e-5)
+
+
+def hash_of(first: str, second: str) -> int:
+    return 8 * list(SHAPES).index(first) + list(SHAPES).index(second)
+
+
+# --- rest -----------------------------------------------------------------------------------------------
+
+UPRIGHT, LYING = Rotation.identity(), Rotation.from_rotvec((0, math.pi / 2, 0))  # lying along x
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "turn", "height"),
+    [
+        (Box((1, 1, 1)), Cylinder(0.3, 0.5), UPRIGHT, 0.5 + 0.25),
+        (Box((1, 1, 1)), Cylinder(0.3, 0.5), LYING, 0.5 + 0.3),
+        (Box((0.3, 0.3, 1)), Cylinder(0.3, 0.5), UPRIGHT, 0.5 + 0.25),  # the foot is wider than the block
+        (Box((1, 1, 1)), Cone(0.3, 0.8), UPRIGHT, 0.5 + 0.2),
+        (Box((1, 1, 1)), Cone(0.3, 0.8), Rotation.from_rotvec((math.pi, 0, 0)), 0.5 + 0.6),
+        (Cylinder(0.5, 1.0), Box((0.4, 0.4, 0.5)), UPRIGHT, 0.5 + 0.25),
+        (Cylinder(0.5, 1.0), Cylinder(0.3, 0.5), UPRIGHT, 0.5 + 0.25),
+        (Cylinder(0.5, 1.0), Cone(0.3, 0.8), UPRIGHT, 0.5 + 0.2),
+        (Cylinder(0.5, 1.0), Capsule(0.2, 0.5), LYING, 0.5 + 0.2),
+        (Cylinder(0.5, 1.0), Sphere(0.2), UPRIGHT, 0.5 + 0.2),
+    ],
+)
+def test_what_stands_on_it_stays_and_weighs_what_it_weighs(
+    below: Shape, above: Shape, turn: Rotation, height: float
+) -> None:
+    moving = body(above, position=(0.02, -0.03, height), orientation=quaternion(turn))
+    found = run(
+        fixed(below),
+        moving,
+        steps=120,
+        x=Final(quantity=Position("body")),
+        force=Final(quantity=ContactForce("body")),
+    )
+
+    np.testing.assert_allclose(found["x"], (0.02, -0.03, height), atol=2e-8)
+    np.testing.assert_allclose(found["force"], (0, 0, 20.0), atol=1e-6)
+
+
+def test_logs_lie_in_a_pile() -> None:
+    """Two held apart by stops, a third between them: by statics each of the two carries half of it."""
+    lying = quaternion(Rotation.from_rotvec((math.pi / 2, 0, 0)))
+    log = {"shape": Cylinder(0.5, 2.0), "orientation": lying, "mass": 2.0, "material": ROUGH}
+    ground = RigidBody(
+        name="ground", motion="static", shape=Box((6, 6, 1)), position=(0, 0, -0.5), material=ROUGH
+    )
+    stops = [
+        RigidBody(
+            name=f"stop {x}", motion="static", shape=Box((0.2, 4, 1)), position=(x, 0, 0.5), material=ROUGH
+        )
+        for x in (-1.2, 1.2)
+    ]
+    pile = [
+        RigidBody(name="left", position=(-0.6, 0, 0.5), **log),
+        RigidBody(name="right", position=(0.6, 0, 0.5), **log),
+        RigidBody(name="top", position=(0, 0, 0.5 + 0.8), **log),
+    ]
+    found = run(
+        ground,
+        *stops,
+        *pile,
+        steps=180,
+        x=Final(quantity=Position("top")),
+        force=Final(quantity=ContactForce("top")),
+        ground=Final(quantity=ContactForce("ground")),
+    )
+
+    np.testing.assert_allclose(found["x"], (0, 0, 1.3), atol=1e-6)
+    np.testing.assert_allclose(found["force"], (0, 0, 20.0), atol=1e-5)
+
+
+@pytest.mark.parametrize(("inside", "falls"), [(0.01, False), (-0.01, True)])
+@pytest.mark.parametrize("shape", [Cylinder(0.3, 0.5), Cone(0.3, 0.8)])
+@pytest.mark.parametrize("away", [0.0, 0.7])
+def test_it_falls_over_an_edge_when_its_centre_is_beyond(
+    shape: Cylinder | Cone, away: float, inside: float, falls: bool
+) -> None:
+    """A shelf's edge holds no torque: the centre of mass decides, whichever way the body is turned about its axis."""
+    foot = 0.25 if isinstance(shape, Cylinder) else 0.2
+    turn = quaternion(Rotation.from_rotvec((0, 0, away)))
+    found = run(
+        fixed(Box((2, 2, 1)), position=(-1.0, 0, -0.5)),
+        body(shape, position=(-inside, 0.1, foot), orientation=turn),
+        steps=60,
+        x=Final(quantity=Position("body")),
+    )
+
+    if falls:
+        assert float(found["x"][2]) < foot - 1e-3
+    else:
+        np.testing.assert_allclose(found["x"], (-inside, 0.1, foot), atol=1e-8)
+
+
+@pytest.mark.parametrize("lean", [1e-6, 1e-3, 0.05])
+def test_a_can_set_down_leaning_comes_to_rest_without_trembling(lean: float) -> None:
+    turn = Rotation.from_rotvec((lean, 0.0, 0.0))
+    height = 0.25 * math.cos(lean) + 0.3 * math.sin(lean)
+    found = run(
+        fixed(Box((2, 2, 1)), position=(0, 0, -0.5)),
+        body(Cylinder(0.3, 0.5), position=(0, 0, height), orientation=quaternion(turn)),
+        steps=180,
+        v=Trace(quantity=Velocity("body")),
+        x=Final(quantity=Position("body")),
+        energy=Trace(quantity=Energy()),
+    )
+
+    assert float(found["x"][2]) == pytest.approx(0.25, abs=1e-7)
+    assert np.abs(found["v"][-30:]).max() < 1e-8
+    assert np.diff(found["energy"]).max() < 1e-3  # J of 5
+
+
+@pytest.mark.parametrize("speed", [20.0, 300.0])
+@pytest.mark.parametrize("second", RIMMED)
+@pytest.mark.parametrize("first", ["ball", "box", "coin"])
+def test_nothing_flies_through_it(first: str, second: str, speed: float) -> None:
+    """Towards its middle at up to 5 m a step, from any side."""
+    rng = np.random.default_rng(hash_of(first, second))
+    away = rng.standard_normal(3)
+    away /= np.linalg.norm(away)
+    moving = body(
+        SHAPES[first],
+        position=tuple(3.0 * away),
+        inertia=(1e3, 1e3, 1e3),
+        material=Material(),
+        orientation=quaternion(Rotation.random(rng=rng)),
+        velocity=tuple(-speed * away),
+    )
+    hit = fixed(SHAPES[second], orientation=quaternion(Rotation.random(rng=rng)))
+    found = run(
+        hit,
+        moving,
+        steps=30,
+        gravity=(0, 0, 0),
+        v=Final(quantity=Velocity("body")),
+        d=Maximum(quantity=Penetration()),
+    )
+
+    assert float(found["v"] @ away) > -0.9 * speed
+    assert float(found["d"]) < 0.02
+
+
+# --- cones ----------------------------------------------------------------------------------------------
+
+
+def test_a_cone_has_its_centre_of_mass_in_the_origin_and_its_moments() -> None:
+    cone = Cone(0.4, 0.9)
+
+    def integral(moment: Any) -> float:
+        value, _ = tplquad(
+            lambda rho, turn, z: rho * moment(rho * math.cos(turn), rho * math.sin(turn), z),
+            -0.25 * cone.height,
+            0.75 * cone.height,
+            0.0,
+            2.0 * math.pi,
+            0.0,
+            lambda z, _turn: cone.radius * (0.75 - z / cone.height),
+            epsrel=1e-7,
+        )
+        return float(value)
+
+    mass = integral(lambda x, y, z: 1.0)
+
+    assert integral(lambda x, y, z: z) == pytest.approx(0.0, abs=1e-9)
+    assert cone.inertia(mass) == pytest.approx(
+        (
+            integral(lambda x, y, z: y * y + z * z),
+            integral(lambda x, y, z: x * x + z * z),
+            integral(lambda x, y, z: x * x + y * y),
+        ),
+        rel=1e-6,
+    )
+
+
+@pytest.mark.parametrize("level", [-0.2, 0.1, 0.4, 0.7])
+@pytest.mark.parametrize("lean", [0.0, 0.4, 1.2, math.pi / 2, 2.5, math.pi])
+def test_water_lifts_what_a_grid_of_points_finds_under_it(level: float, lean: float) -> None:
+    level -= 0.25
+    turn = Rotation.from_rotvec((0, lean, 0))
+    cone = body(Cone(0.3, 0.8), position=(0, 0, 0), orientation=quaternion(turn))
+    water = Fluid(name="water", density=1000.0, level=level)
+    scene = Scene(bodies=(cone,), forces=(water,), gravity=DOWN)
+    found = simulate(scene, time_step=1e-6, steps=1, observe={"v": Final(quantity=Velocity("body"))})
+    lifted = (float(found["v"][2]) / 1e-6 + 10.0) * 2.0 / (1000.0 * 10.0)  # m³
+    parts = (40, 60, 400)
+    share, angle, along = np.meshgrid(*((np.arange(count) + 0.5) / count for count in parts), indexing="ij")
+    angle, along = 2 * math.pi * angle, 0.8 * along - 0.2
+    r = share * 0.3 * (0.75 - along / 0.8)
+    height = turn.apply(np.stack((r * np.cos(angle), r * np.sin(angle), along), axis=-1).reshape(-1, 3))[:, 2]
+    cell = (r * 0.3 * (0.75 - along / 0.8)).reshape(-1) * (2 * math.pi * 0.8 / math.prod(parts))
+
+    assert lifted == pytest.approx(float(cell[height < level].sum()), abs=4e-4)
+
+
+def test_a_cone_lies_on_its_side_and_rolls_about_its_apex() -> None:
+    """On a plane it touches along a line, from the apex to the rim; a push across it turns it about the apex."""
+    cone = Cone(0.3, 0.8)
+    opening = math.atan2(0.3, 0.8)
+    turn = Rotation.from_rotvec((0, math.pi / 2 + opening, 0))
+    apex = turn.apply((0, 0, 0.6))
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=ROUGH)
+    rolling = RigidBody(
+        name="body",
+        mass=2.0,
+        shape=cone,
+        position=(0.0, 0.0, -float(apex[2])),
+        orientation=quaternion(turn),
+        velocity=(0.0, 0.5, 0.0),
+        material=ROUGH,
+    )
+    found = run(
+        ground,
+        rolling,
+        steps=240,
+        time_step=1.0 / 240.0,
+        x=Trace(quantity=Position("body")),
+        force=Final(quantity=ContactForce("body")),
+    )
+    centre = found["x"] - (apex[0], 0.0, 0.0)
+    distance = np.hypot(centre[:, 0], centre[:, 1])
+
+    assert distance.std() < 5e-3 and np.ptp(found["x"][:, 2]) < 1e-5
+    assert found["force"][2] == pytest.approx(20.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("field", ["radius", "height"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, "tall"])
+def test_a_cone_that_cannot_be_is_refused_in_a_sentence(field: str, value: Any) -> None:
+    with pytest.raises(SceneError, match=f"cone.*{field}"):
+        Cone(**({"radius": 1.0, "height": 1.0} | {field: value}))
