@@ -39,6 +39,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             joint.gain[k] = {row.upsilon, row.violation_gain};
             block.softness[k] = row.softness;
         }
+        joint.block = static_cast<int>(blocks_.size());
         blocks_.push_back(block);
 
         joint.tracked = spec.has_limit || spec.has_spring;

@@ -65,6 +65,15 @@ public:
         double violation, relaxation, extent;
     };
     RowGain gain(int block, int row) const noexcept;
+    /// Coefficients of one of a joint's own rows: Ups, (4/h) Ups, Sig.
+    struct RowLaw {
+        double upsilon, violation, softness;
+        bool operator==(const RowLaw&) const = default;
+    };
+    RowLaw law(int joint, int row) const noexcept {
+        const Joint& of = joints_[joint];
+        return {of.gain[row].upsilon, of.gain[row].violation, blocks_[of.block].softness[row]};
+    }
 
     /// Second time derivatives of a block's rows when both ends go on with constant velocities.
     void bias(int block, std::span<const BodyState> bodies, double* out) const noexcept;
@@ -103,6 +112,7 @@ private:
     struct Joint {
         JointConstants constants;
         int first = -1, second = -1, axial = -1;  // axial: index into axials_
+        int block = 0;                            // of its own rows: index into blocks_
         int general = -1;                         // of a relation or a wire: index into generals_
         bool tracked = false, breakable = false;
         double strength = 0.0, torque_strength = 0.0;  // N s, N m s

@@ -123,7 +123,31 @@ void RigidSystem::fill_block_momenta() {
     }
 }
 
+/// Velocities of bodies that are locked to each other in trees, and their places while at hand.
+void RigidSystem::solve_locked() {
+    const bool at_once = !clock_;
+    mixed_values_ = false;
+    const bool finite = locked_.solve(live_.bodies, {h_, constants_, acceleration_, force_},
+                                      method_.refinements, [this, at_once](int body, const Twist& v) {
+                                          BodyState& s = live_.bodies[body];
+                                          s.velocity = v.linear;
+                                          s.angular_momentum = s.inertia * v.angular;
+                                          if (at_once) integrate_body(body);
+                                      });
+    if (!finite) live_.not_solved = tied_.front();
+    tied_are_moved_ = at_once && finite;
+    undelivered_ = finite;
+    if (clock_) clock_->mark(Stage::solve_block);
+}
+
+/// What the coming steps do not read, and a reader between them does.
+void RigidSystem::deliver_locked() {
+    if (undelivered_) locked_.deliver(joints_.states);
+    undelivered_ = false;
+}
+
 void RigidSystem::solve_block() {
+    if (!locked_.empty()) return solve_locked();
     if (stiff_) stiffen();
     assemble_blocks();
     fill_inertias();
@@ -363,6 +387,10 @@ void RigidSystem::solve_mixed(bool touching) {
 void RigidSystem::wrench(int joint, double* out) const noexcept {
     std::fill_n(out, 6, 0.0);
     const JointSet::State& state = joints_.states[joint];
+    if (!locked_.empty() && !mixed_values_) {  // along the world's axes, at the joint
+        for (int k = 0; k < 6; ++k) out[k] = state.multiplier[k] / h_;
+        return;
+    }
     const auto blocks = joints_.blocks();
     Vec3 force, torque;
     for (std::size_t k = 0; k < blocks.size(); ++k) {

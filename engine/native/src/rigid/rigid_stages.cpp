@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "rigid/rigid_system.hpp"
+
 namespace spook {
 
 namespace {
@@ -147,6 +149,13 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
         }
         return {};
     });
+}
+
+void RigidSystem::tell(StageChoices& choices) const {
+    if (locked_.empty()) return;
+    choices[static_cast<std::size_t>(Stage::solve_block)].reason =
+        std::string("locks make trees: solved link by link, leaves first, without a matrix") +
+        (contacts_ ? " (while nothing touches)" : "");
 }
 
 }  // namespace spook

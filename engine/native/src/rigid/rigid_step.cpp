@@ -34,7 +34,10 @@ void RigidSystem::step() {
     if (clock_) clock_->start();
     if (!live_.velocity_ready) velocity_stage();
     live_.velocity_ready = false;
-    if (replaying_ && early_joints_.empty()) early_joints_ = joints_.states;
+    if (replaying_ && early_joints_.empty()) {
+        deliver_locked();
+        early_joints_ = joints_.states;
+    }
     integrate_all();
     ++live_.moved;
     joints_.follow(live_.bodies);

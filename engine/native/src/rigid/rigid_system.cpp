@@ -90,7 +90,9 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
-    if (solver_ == RigidSolver::block) analyse_block();
+    if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0)
+        locked_.analyse(constants_, joints_, tied_);
+    if (solver_ == RigidSolver::block && locked_.empty()) analyse_block();
     if (composed_ && solver_ == RigidSolver::block) tree_.analyse(constants_, joints_, tied_, start_);
     reset(nullptr);
 }
@@ -148,6 +150,8 @@ void RigidSystem::reset(StageClock* clock) {
     contacts_ = fresh_contacts_;
     share_.clear();
     matrix_.clear_counters();
+    locked_.clear_counters();
+    undelivered_ = false;
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
     if (composed_) start_composition();
@@ -170,6 +174,7 @@ void RigidSystem::reset(StageClock* clock) {
 void RigidSystem::advance(std::int64_t steps) {
     if (composed_) return compose(steps * method_.substeps);
     for (std::int64_t n = steps * method_.substeps; n > 0; --n) step();
+    deliver_locked();
 }
 
 void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
@@ -289,6 +294,10 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         work.solves += more.solves;
     };
     add(pivot_.counters());
+    const LockedTree::Counters locked = locked_.counters();
+    work.factorisations += locked.factorisations;
+    work.block_operations += locked.block_operations;
+    work.solves += locked.solves;
     if (contacts_) add(contacts_->factor_counters());
     const auto put = [&report](const char* name, std::uint64_t value) {
         report.counters[name] = static_cast<std::int64_t>(value);

@@ -15,6 +15,7 @@
 #include "linear/redundant_rows.hpp"
 #include "rigid/joint_set.hpp"
 #include "rigid/joint_tree.hpp"
+#include "rigid/locked_tree.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
 #include "run/stages.hpp"
@@ -40,6 +41,8 @@ public:
     RigidSystem(const RigidScene& scene, StageList stages);
 
     const StageList& stages() const noexcept { return stages_; }
+    /// How stages run that have several ways, for those who ask.
+    void tell(StageChoices& choices) const;
 
     // For run_loop:
     void advance(std::int64_t steps);
@@ -200,6 +203,8 @@ private:
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual);
     void solve_block();
+    void solve_locked();
+    void deliver_locked();
     struct
         Worst {  // row residual, its block, and the largest speed that rows and forces ask for, m/s or rad/s
         double residual = 0.0, speed = 0.0;
@@ -286,6 +291,8 @@ private:
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body
     std::vector<double> first_right_, violation_, bias_, multiplier_;
+    LockedTree locked_;         // of plain steps in which all joints are locks that make trees; else empty
+    bool undelivered_ = false;  // its multipliers are not in joints_.states yet
     JointTree tree_;
     bool in_tree_ = false;
     std::size_t unknowns_ = 0;  // of a stage: rows, or joint coordinates

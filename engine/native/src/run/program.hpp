@@ -20,6 +20,7 @@ namespace spook {
 ///   void count(RunReport&, int64 steps) const  the work of so many steps
 ///   std::vector<double> final_state()
 ///   Memory, void keep(Memory&) const, void go_back(const Memory&), void place(span)   for a run one holds
+///   void tell(StageChoices&) const             optional: how it runs a stage, where only building it shows
 /// and two functions beside it
 ///   StageChoices choose_stages(const Scene&, bool observing)   which stages the scene needs, and why
 ///   Sampler sampler_of(System&, const QuantityRequest&)        throws std::invalid_argument
@@ -31,7 +32,9 @@ public:
             std::vector<Observation> observations)
         : choices_(choose_stages(scene, reads_while_running(observations))),
           system_(scene, StageList(choices_)),
-          recorder_(samplers_of(system_, quantities), std::move(observations)) {}
+          recorder_(samplers_of(system_, quantities), std::move(observations)) {
+        if constexpr (requires { system_.tell(choices_); }) system_.tell(choices_);
+    }
 
     Program(const Program&) = delete;  // the samplers point into the system
     Program& operator=(const Program&) = delete;

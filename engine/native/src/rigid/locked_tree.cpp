@@ -1,0 +1,130 @@
+#include "rigid/locked_tree.hpp"
+
+#include <cmath>
+
+namespace spook {
+
+namespace {
+
+Vec3 carried(const BodyState& body, Vec3 v) noexcept { return v + body.turn_less_one * v; }
+
+}  // namespace
+
+Twist LockedTree::momentum_of(const Link& link, const BodyState& s, const LockedLoads& loads) const noexcept {
+    Vec3 kick = loads.time_step * loads.acceleration[link.body];
+    if (!loads.force.empty()) kick += (loads.time_step / link.mass) * loads.force[link.body];
+    return {link.mass * (s.velocity + kick),
+            s.angular_momentum + loads.time_step * loads.constants[link.body].torque};
+}
+
+/// Where the joint is and what its rows ask for.
+void LockedTree::locate(const Link& link, std::span<const BodyState> bodies, Work& work) const noexcept {
+    const Gain& gain = gains_[link.gain];
+    const BodyState& child = bodies[link.body];
+    const BodyState& other = link.other < 0 ? still_ : bodies[link.other];
+    const double sign = link.child_is_first ? -1.0 : 1.0;
+    const Vec3 bend = child.turn_less_one * link.arm, other_bend = other.turn_less_one * link.other_arm;
+    work.arm = link.arm + bend;
+    work.other_arm = link.other_arm + other_bend;
+    const Vec3 gap = child.displacement - other.displacement + bend - other_bend;
+    // The reaction acts where the second body holds the joint.
+    if (link.child_is_first) work.arm -= gap;
+    else work.other_arm += gap;
+    const Twist velocity{child.velocity, child.angular_velocity};
+    const Twist others{other.velocity, other.angular_velocity};
+    const Twist slip = to_joint(velocity, work.arm) - to_joint(others, work.other_arm);
+
+    const BodyState &first = link.child_is_first ? child : other,
+                    &second = link.child_is_first ? other : child;
+    Quat q = conjugate(first.turn) * second.turn;
+    if (q.w < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
+    work.tilt = carried(first, {q.x, q.y, q.z});
+    const double over = 1.0 / q.w;
+    work.tilt_softness = gain.softness[1] * (over * over);
+    work.right.linear = gain.upsilon[0] * slip.linear - gain.violation[0] * gap;
+    work.right.angular = gain.upsilon[1] * slip.angular - (sign * 2.0 * gain.violation[1] * over) * work.tilt;
+    if (link.parent < 0) work.right += to_joint(others, work.other_arm);
+}
+
+/// Leaves first. The first time K is found as well; then what the velocities so far leave of rows and momenta.
+template <bool FIRST>
+void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads& loads) noexcept {
+    Inertia6 mass{};
+    Twist momentum{};
+    std::size_t waiting = 0;
+    double sum = 0.0;
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+        const Link& link = links_[k];
+        Work& work = works_[k];
+        const BodyState& s = bodies[link.body];
+        if (link.leaf) mass = {}, momentum = {};
+        if (link.takes) {
+            const Carried& rest = waiting_[--waiting];
+            if (FIRST) add(mass, rest.mass);
+            momentum += rest.momentum;
+        }
+        momentum += momentum_of(link, s, loads);
+        if constexpr (FIRST) {
+            mass.linear[0] += link.mass, mass.linear[3] += link.mass, mass.linear[5] += link.mass;
+            const double* inertia = s.inertia.m;
+            const double own[6] = {inertia[0], inertia[1], inertia[2], inertia[4], inertia[5], inertia[8]};
+            for (int i = 0; i < 6; ++i) mass.angular[i] += own[i];
+        } else {
+            momentum -= Twist{link.mass * work.velocity.linear, s.inertia * work.velocity.angular};
+        }
+        if (link.joint < 0) {
+            if (FIRST) factor_whole(work.stiffness = mass);
+            work.base = momentum;
+            sum += dot(momentum.linear, momentum.linear) + dot(momentum.angular, momentum.angular);
+            continue;
+        }
+        const Gain& gain = gains_[link.gain];
+        if constexpr (FIRST) {
+            locate(link, bodies, work);
+            work.stiffness = shifted(mass, work.arm);
+            soften_all(work.stiffness, gain.softness, work.tilt, work.tilt_softness);
+        } else {
+            momentum += about_centre(work.impulse, work.arm);
+            Twist slip = to_joint(work.velocity, work.arm);
+            if (link.parent >= 0) slip -= to_joint(works_[link.parent].velocity, work.other_arm);
+            work.left = work.right - slip - give(work, gain, work.impulse);
+        }
+        const Twist q = about_joint(momentum, work.arm);
+        work.base = work.stiffness * ((FIRST ? work.right : work.left) + give(work, gain, q)) - q;
+        if (link.parent < 0) {
+            sum += dot(work.base.linear, work.base.linear) + dot(work.base.angular, work.base.angular);
+            continue;
+        }
+        if (FIRST) mass = shifted(work.stiffness, -work.other_arm);
+        momentum = Twist{} - about_centre(FIRST ? work.base : work.base + work.impulse, work.other_arm);
+        if (link.next == Link::hands_on) continue;
+        if (link.next == Link::waits) {
+            waiting_[waiting++] = {mass, momentum};
+            continue;
+        }
+        if (FIRST) add(waiting_[waiting - 1].mass, mass);
+        waiting_[waiting - 1].momentum += momentum;
+    }
+    finite_ = std::isfinite(sum);
+}
+
+void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first) noexcept {
+    if (first) eliminate<true>(bodies, loads);
+    else eliminate<false>(bodies, loads);
+}
+
+void LockedTree::deliver(std::span<JointSet::State> states) const noexcept {
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+        const Link& link = links_[k];
+        if (link.joint < 0) continue;
+        const Work& work = works_[k];
+        JointSet::State& state = states[link.joint];
+        const double sign = link.child_is_first ? -1.0 : 1.0;
+        const Vec3 force = sign * work.impulse.linear, torque = sign * work.impulse.angular;
+        state.multiplier = {force.x, force.y, force.z, torque.x, torque.y, torque.z};
+        state.first_reach = link.child_is_first ? work.arm : work.other_arm;
+        state.second_reach = link.child_is_first ? work.other_arm : work.arm;
+    }
+}
+
+}  // namespace spook
