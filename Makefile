@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -15,6 +15,7 @@ help:
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
+	@echo "make engines   every engine that is installed on every scene: docs/engines.md"
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make campaign  random heaps from clean starts: does their energy ever rise?"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
@@ -93,6 +94,11 @@ aa: develop
 
 bench: develop
 	$(BIN)/python bench/run.py
+
+# Every engine that is installed on every scene, and the page that says who is first where.
+engines: develop
+	.ci/engines
+	TRACKER_NODE_MODULES="$${TRACKER_NODE_MODULES:-build/engines/node_modules}" $(BIN)/python bench/engines.py
 
 bench-publish: develop
 	$(BIN)/python bench/bench_publish.py

@@ -1,0 +1,193 @@
+"""Every engine that is installed on every scene, and the page that says who is first where, and where we are behind.
+
+    python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md
+    python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md --only-page
+
+Why another engine is first stands in docs/engine-causes.toml, by hand: a cause is found, not measured. Where there is
+none, the page says so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import tomllib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import spook_tracker.engine.find as find
+import spook_tracker.tracker as tracker
+import spook_tracker.tracker.judge.rank as ranks
+from spook_tracker.tracker.document.wording import number, quantity, seconds, version
+from spook_tracker.tracker.store.database import session_on
+
+OURS = "spook"
+ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
+CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
+Causes = Mapping[tuple[str, str], tuple[str, str]]  # (test, engine): (cause, what would mend it)
+
+
+def installed() -> list[str]:
+    """Ours, and every other engine that is here."""
+    found = [OURS]
+    for name in (*find.EXTRAS, *find.NODE):
+        try:
+            find.find(name)
+        except find.EngineMissing as reason:
+            print(f"left out: {reason}", flush=True)
+            continue
+        found.append(name)
+    return found
+
+
+def measure(names: Sequence[str], database: str, limit: float) -> None:
+    """A run with ladders of each engine, recorded; says how long each took."""
+    for name in names:
+        begin = time.perf_counter()
+        document = tracker.run(sweep=True, engine=name, workers=2, limit=None if name == OURS else limit)
+        tracker.record(document, database)
+        outcomes = Counter(sample.outcome for sample in document.samples)
+        told = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in outcomes.most_common())
+        print(f"{name}: {time.perf_counter() - begin:.0f} s; {told}", flush=True)
+
+
+def page(database: str) -> str:
+    """The page in Markdown, from the newest run of each engine."""
+    with session_on(database, readonly=True) as session:
+        history = tracker.History(session)
+        newest = {run.engine.name: run for run in history.runs()}
+        runs = {name: newest[name] for name in sorted(newest, key=lambda name: (name != OURS, name))}
+        samples = {name: history.samples(run.id) for name, run in runs.items()}
+    if OURS not in runs:
+        raise SystemExit(f"{database} has no run of ours to set the others beside")
+    machines = {run.machine.processor for run in runs.values()}
+    lines = [
+        "# Every engine on every scene",
+        "",
+        "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
+        f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {' and '.join(sorted(machines))}.",
+        "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts.",
+        "",
+        *_gates(samples),
+        *_first(ranks.standings(samples)),
+        *_behind(ranks.standings(samples), causes()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def causes() -> Causes:
+    given = tomllib.loads(CAUSES.read_text(encoding="utf-8")) if CAUSES.exists() else {}
+    return {
+        (one["test"], engine): (one["cause"], one["cure"])
+        for one in given.get("behind", [])
+        for engine in one["engines"]
+    }
+
+
+def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
+    """What each engine says to the questions that decide green or red for ours."""
+    gates = [d for d, _ in samples[OURS].values() if d.role == "gate"]
+    told = ranks.answers(gates, samples)
+    rows = []
+    for name in samples:
+        mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
+        lacking = sum(a.sample is None or a.sample.outcome == "not_supported" for a in mine)
+        failed = sum(a.sample is not None and a.sample.outcome not in ANSWERED for a in mine)
+        kept = sum(a.stands == "pass" for a in mine)
+        rows.append((name, kept, len(mine) - lacking - failed - kept, failed, lacking))
+    return [
+        f"## {len(told)} gates",
+        "",
+        "The limits are physical ones or the method's own; an engine of another method may rightly miss the latter.",
+        "",
+        "| engine | keeps | misses | fails | not supported |",
+        "|---|---|---|---|---|",
+        *(f"| {' | '.join(map(str, row))} |" for row in rows),
+        "",
+    ]
+
+
+def _places(found: Sequence[ranks.Standing]) -> dict[tuple[str, str, str], list[ranks.Standing]]:
+    groups: dict[tuple[str, str, str], list[ranks.Standing]] = {}
+    for one in found:
+        groups.setdefault((one.test, one.ladder, one.unit), []).append(one)
+    return groups
+
+
+def _first(found: Sequence[ranks.Standing]) -> list[str]:
+    """Scene by scene: who comes within an error first, in what time, and what the next needs."""
+    lines = [
+        "## Who is first",
+        "",
+        "Run time to come within an error, in the best setting; in brackets how much longer the next engine takes.",
+        "",
+        "| scene | " + " | ".join(f"{error:g}" for error in ranks.ERRORS) + " |",
+        "|---|" + "---|" * len(ranks.ERRORS),
+    ]
+    won: Counter[str] = Counter()
+    for (test, ladder, unit), group in _places(found).items():
+        cells = []
+        for place in range(len(ranks.ERRORS)):
+            order = sorted((t, one.engine) for one in group if (t := one.seconds[place]) is not None)
+            if not order:
+                cells.append("nobody")
+                continue
+            (best, name), *rest = order
+            won[name] += 1
+            further = f"{number(rest[0][0] / best, 2)} × {rest[0][1]}" if rest and best > 0.0 else "alone"
+            cells.append(f"{name} {seconds(best)} ({further})")
+        lines.append(f"| {test}, {ladder.replace('_', ' ')} [{unit}] | {' | '.join(cells)} |")
+    score = ", ".join(f"{name} {count}" for name, count in won.most_common())
+    return [*lines, "", f"First in {sum(won.values())} places (a scene at an error): {score}.", ""]
+
+
+def _behind(found: Sequence[ranks.Standing], known: Causes) -> list[str]:
+    """Where another engine is first though ours was asked, by how much, and why."""
+    lines = ["## Where another engine is first, and why", ""]
+    for (test, ladder, unit), group in _places(found).items():
+        for place, error in enumerate(ranks.ERRORS):
+            times = {one.engine: t for one in group if (t := one.seconds[place]) is not None}
+            asked = any(one.engine == OURS for one in group)
+            first = min(times, key=times.__getitem__, default=OURS)
+            mine = times.get(OURS)
+            if not asked or first == OURS:
+                continue
+            far = f"{number(mine / times[first], 2)} times as long" if mine is not None else "never"
+            cause, cure = known.get((test, first), ("no cause found yet", ""))
+            what = f"{test}, {ladder.replace('_', ' ')} to {quantity(error, unit)}"
+            lines.append(
+                f"- **{what}**: {first} in {seconds(times[first])}, ours {far}. {_sentences(cause, cure)}"
+            )
+    return lines if len(lines) > 2 else [*lines, "Nowhere."]
+
+
+def _sentences(*parts: str) -> str:
+    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts if part)
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--db", default="sqlite:///build/engines.db")
+    parser.add_argument("--page", default="docs/engines.md")
+    parser.add_argument("--limit", type=float, default=5.0, help="s of one simulation of another engine")
+    parser.add_argument(
+        "--only-page", action="store_true", help="measure nothing, write the page of what is recorded"
+    )
+    parser.add_argument("engines", nargs="*", help="by default all that are installed")
+    asked: Any = parser.parse_args(arguments)
+    if not asked.only_page:
+        measure(asked.engines or installed(), asked.db, asked.limit)
+    Path(asked.page).write_text(page(asked.db), encoding="utf-8")
+    print(f"wrote {asked.page}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,55 @@
+"""The page of all engines: counted gates, who is first, where ours is behind and why, from recorded runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+import spook_tracker.tracker as tracker
+from tests.synthetic_history import document, rival
+
+THEIRS = msgspec.structs.replace(rival("3.1"), trigger="manual")
+FILE = Path(__file__).parents[1] / "bench" / "engines.py"
+
+
+@pytest.fixture(scope="module")
+def engines() -> Any:
+    spec = importlib.util.spec_from_file_location("engines_page", FILE)
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["engines_page"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_says_who_is_first_and_why_we_are_behind(
+    engines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    database = f"sqlite:///{tmp_path}/engines.db"
+    for run in (document(0), THEIRS):
+        tracker.record(run, database)
+    causes = tmp_path / "causes.toml"
+    monkeypatch.setattr(engines, "CAUSES", causes)
+
+    assert "No cause found yet." in engines.page(database)
+
+    causes.write_text(
+        '[[behind]]\ntest = "pendulum"\nengines = ["rival"]\ncause = "order four"\ncure = "a composition"\n'
+    )
+    told = engines.page(database)
+    assert "| spook | 7 | 0 | 0 | 0 |" in told
+    assert "| rival | 5 | 1 | 0 | 1 |" in told, "a door too heavy, and friction is not supported"
+    assert "Order four. A composition." in told
+    assert "to 1e-06 %" in told.partition("## Where another engine is first")[2]
+
+
+def test_a_page_without_a_run_of_ours_is_refused(engines: Any, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/engines.db"
+    tracker.record(THEIRS, database)
+    with pytest.raises(SystemExit, match="no run of ours"):
+        engines.page(database)
