@@ -56,6 +56,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "vehicle": "vehicle",
     "rolling_coin": "rolling_coin",
     "slider_crank": "slider_crank",
+    "seams": "seams",
     "grasp": "grasp",
     "hanging_cable": "hanging_cable",
     "rocking_block": "rocking_block",
