@@ -83,8 +83,15 @@ bool JointTree::hang(std::span<const int> tied) {
     for (int body : tied) {  // what nothing holds to the world floats with the first of its bodies
         if (hung[body] >= 0) continue;
         hung[body] = static_cast<int>(found.size());
+        const std::size_t root = found.size();
         found.push_back({body, -1, -1});
         follow();
+        for (const JointBlock& block : blocks)  // held after all, by a joint not known here
+            for (const bool second : {false, true}) {
+                const int end = second ? block.second : block.first,
+                          other = second ? block.first : block.second;
+                if (moving(end) && hung[end] >= static_cast<int>(root) && !moving(other)) return false;
+            }
     }
     if (found.size() != tied.size()) return false;
 
