@@ -80,7 +80,7 @@ campaign: develop
 	$(BIN)/python bench/campaign.py
 
 mutants: develop
-	$(BIN)/python bench/mutants.py
+	$(BIN)/python bench/mutants.py --record bench/mutants.json
 
 mutation: develop
 	$(BIN)/python bench/mutation.py

@@ -96,6 +96,30 @@ MUTANTS = (
             ),
         ),
     ),
+    Mutant(
+        "particles",
+        "fast-clock",
+        "places move on by 1.0001 steps",
+        "pendulum",
+        (
+            (
+                f"{SRC}/particles/particle_system.cpp",
+                "nodes_.x[node] += parts_.h * nodes_.v[node];",
+                "nodes_.x[node] += 1.0001 * parts_.h * nodes_.v[node];",
+            ),
+            (f"{SRC}/particles/particle_kernels.cpp", "x[at] += h * moved;", "x[at] += 1.0001 * h * moved;"),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "x[top] += h * moved;",
+                "x[top] += 1.0001 * h * moved;",
+            ),
+            (
+                f"{SRC}/particles/particle_kernels.cpp",
+                "x[node] += h * v[node];",
+                "x[node] += 1.0001 * h * v[node];",
+            ),
+        ),
+    ),
     wrong(
         "particles",
         "one-sided-spring",

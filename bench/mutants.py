@@ -6,13 +6,14 @@ series of the named test. At the end the change is taken back, and every answer 
 Mutants of the tracker itself are put to the named test of the test suite instead.
 
 `python bench/mutants.py NAME …` runs only those named, `--tonight 4` four of them, others every night, `--page FILE`
-writes the table as Markdown.
+writes the table as Markdown, `--record FILE` the page of the website: `tracker publish --mutants FILE` shows it.
 """
 
 from __future__ import annotations
 
 import argparse
 import datetime
+import json
 import os
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -107,6 +109,20 @@ def page(rows: Sequence[tuple[Mutant, bool, str]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def recorded(file: Path, rows: Sequence[tuple[Mutant, bool, str]], commit: str, day: datetime.date) -> None:
+    """Take these into the record that the website's page is made from; what else it holds of the list stays."""
+    known: dict[str, dict[str, Any]] = {}
+    if file.exists():
+        known = {entry["name"]: entry for entry in json.loads(file.read_text(encoding="utf-8"))}
+    for mutant, found, said in rows:
+        known[mutant.name] = {
+            "name": mutant.name, "room": mutant.room, "story": mutant.story, "caught_by": mutant.caught_by,
+            "caught": found, "said": said, "commit": commit, "day": day.isoformat(),
+        }  # fmt: skip
+    listed = [known[mutant.name] for mutant in MUTANTS if mutant.name in known]
+    file.write_text(json.dumps(listed, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="mutants to try; all if none is named")
@@ -116,8 +132,10 @@ def main() -> int:
         "--keep", type=Path, metavar="DIR", help="build there, and leave it for the next time"
     )
     parser.add_argument("--page", type=Path, help="write the table here")
+    parser.add_argument("--record", type=Path, metavar="FILE", help="take the answers into this record")
     given = parser.parse_args()
-    chosen = tonights(given.tonight, datetime.datetime.now(datetime.UTC).date()) if given.tonight else MUTANTS
+    today = datetime.datetime.now(datetime.UTC).date()
+    chosen = tonights(given.tonight, today) if given.tonight else MUTANTS
     chosen = tuple(m for m in chosen if not given.names or m.name in given.names)
     rows: list[tuple[Mutant, bool, str]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
@@ -138,6 +156,8 @@ def main() -> int:
                     place, mutant, only(sound[mutant.sweep], mutant.caught_by)
                 )
             rows.append((mutant, found, said))
+            if given.record:
+                recorded(given.record, rows[-1:], head, today)
             took = f"{time.monotonic() - started:.0f} s"
             print(
                 f"{'caught' if found else 'MISSED'}  {mutant.room}/{mutant.name} ({took}): {mutant.story}; {said}",

@@ -25,6 +25,17 @@ EXAMPLE = ROOT / "examples" / "pebble"
 BUILD = "cmake -S . -B build && cmake --build build"
 GRAVITY = "velocities[p] += time_step * gravity[p % 3];"
 CMAKE = shutil.which("cmake", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+GH = """#!/bin/sh
+# The comments of one pull request as a file; the calls that change it are remembered.
+case "$*" in
+  *PATCH*|*DELETE*|*body=*) echo "$@" >> {folder}/gh.log ;;
+  *) [ ! -s {folder}/comment ] || echo 41 ;;
+esac
+case "$*" in
+  *DELETE*) rm {folder}/comment ;;
+  *body=*) cp body.md {folder}/comment ;;
+esac
+"""
 AUDITOR = Path(sys.executable).with_name("zizmor")
 
 
@@ -54,6 +65,8 @@ class Team:
         for name, line in (("pip", "exit 0"), ("tracker", f'exec {sys.executable} -m spook_tracker "$@"')):
             (programs / name).write_text(f"#!/bin/sh\n{line}\n")
             (programs / name).chmod(0o755)
+        (programs / "gh").write_text(GH.format(folder=folder))
+        (programs / "gh").chmod(0o755)
         (programs / "cmake").symlink_to(str(CMAKE))
         self.service = Service(self.origin, folder / "ci", programs)
 
@@ -75,8 +88,8 @@ class Team:
     def night(self) -> dict:
         return self.service.run(TRACK, "schedule", "main", build=BUILD, options="--quick --workers 1")
 
-    def pull_request(self, branch: str) -> dict:
-        return self.service.run(TRACK, "pull_request", branch, build=BUILD)
+    def pull_request(self, branch: str, **inputs: str) -> dict:
+        return self.service.run(TRACK, "pull_request", branch, build=BUILD, **inputs)
 
     def months(self) -> dict[str, int]:
         """Runs in each file of the history's branch."""
@@ -97,6 +110,7 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     first = team.night()
     assert {name: job.result for name, job in first.items()} == {
         "night": "success", "keep": "success", "publish": "success", "verdict": "success", "change": "skipped",
+        "comment": "skipped",
     }, first["night"].log  # fmt: skip
     assert "measured for the first time" in first["night"].summary
     assert list(team.months().values()) == [1]
@@ -114,6 +128,16 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
 
     team.change("Pull harder still", "worse", "1.01 * time_step", "1.02 * time_step")
     worse = team.pull_request("worse")
+    assert worse["comment"].result == "success", worse["comment"].log
+    told = (tmp_path / "comment").read_text()
+    assert told.startswith("<!-- tracker: what became worse -->\n**✗ ")
+    assert f"worse than at pebble {bad[:7]}" in told.replace("\\", "") or bad[:7] in told
+    team.pull_request("worse")
+    calls = (tmp_path / "gh.log").read_text().splitlines()
+    assert [("PATCH" in call, "issues/7/comments" in call) for call in calls] == [
+        (False, True),
+        (True, False),
+    ]
     assert worse["change"].result == "failure"
     assert worse["night"].result == "skipped"
     assert "**regressed**" in worse["change"].summary
@@ -121,7 +145,8 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
 
     git(team.clone, "checkout", "-q", "main")
     team.change("Pull as it should", "mend", "1.01 * time_step", "time_step")
-    mended = team.pull_request("mend")
+    mended = team.pull_request("mend", base="last-green")
+    assert not (tmp_path / "comment").exists(), "nothing is worse: the comment is taken back"
     assert mended["change"].result == "success", mended["change"].log
     assert "**identical**" in mended["change"].summary
     assert list(team.months().values()) == [2], "a proposed change is not kept"

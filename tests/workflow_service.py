@@ -58,8 +58,8 @@ class Service:
             jobs[name] = self._job(name, job, context)
         return jobs
 
-    def _github(self, event: str) -> dict[str, str]:
-        return {"event_name": event, "token": "token", "run_id": str(self.runs)}
+    def _github(self, event: str) -> dict[str, Any]:
+        return {"event_name": event, "token": "token", "run_id": str(self.runs), "event": {"number": "7"}}
 
     def _job(self, name: str, job: dict[str, Any], context: dict[str, Any]) -> Ran:
         ran = Ran()
@@ -134,14 +134,17 @@ def _filled(text: str, context: dict[str, Any]) -> str:
 
 
 def _value(expression: str, context: dict[str, Any]) -> Any:
-    """inputs.X, github.X, steps.ID.outputs.X, needs.JOB.result, needs.JOB.outputs.X."""
+    """inputs.X, github.X, github.event.X, steps.ID.outputs.X, needs.JOB.result, needs.JOB.outputs.X."""
     first, *rest = expression.split(".")
     if first == "steps":
         return context["steps"].get(rest[0], {}).get(rest[2], "")
     if first == "needs":
         ran = context["needs"][rest[0]]
         return ran.result if rest[1] == "result" else ran.outputs.get(rest[2], "")
-    return context[first][rest[0]]
+    found = context[first]
+    for name in rest:
+        found = found[name]
+    return found
 
 
 def _holds(condition: str, context: dict[str, Any]) -> bool:

@@ -172,17 +172,20 @@ def publish(
     database: str = "",
     title: str = "",
     home_page: str = "",
+    mutants: Path | None = None,
 ) -> Any:
     """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
 
     `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
-    `title` and `home_page` say whose website it is.
+    `title` and `home_page` say whose website it is. `mutants` is the record that `make mutants` writes.
     """
     from spook_tracker.tracker.store.offered import database_file
+    from spook_tracker.tracker.website.page_mutants import read_mutants
     from spook_tracker.tracker.website.publish import publish as build
 
     offered = database_file(database) if database else None
-    return build(history, out, accepted, offered, title, home_page)
+    wrong = read_mutants(mutants) if mutants else ()
+    return build(history, out, accepted, offered, title, home_page, wrong)
 
 
 def judged_again(
@@ -227,6 +230,7 @@ def nightly(
     with_database: bool = False,
     title: str = "",
     home_page: str = "",
+    mutants: Path | None = None,
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
@@ -255,5 +259,5 @@ def nightly(
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
         offered = database if with_database else ""
-        published = publish(history, out, accepted, offered, title, home_page)
+        published = publish(history, out, accepted, offered, title, home_page, mutants)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

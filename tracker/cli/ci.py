@@ -20,6 +20,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     executor_option,
     limit_option,
+    mutants_option,
     source_options,
     website_options,
     workers_option,
@@ -51,6 +52,7 @@ def ci() -> None:
 @workers_option
 @limit_option
 @website_options
+@mutants_option
 @accepted_option
 @source_options
 @database_option
@@ -78,10 +80,21 @@ def night(
     context.exit(code)
 
 
-@ci.command(epilog=example("tracker ci change --base last-green"))
+@ci.command(epilog=example("tracker ci change --comment comment.md"))
 @HISTORY
 @click.option(
-    "--base", metavar="V", default="last-green", show_default=True, help="What it is compared with."
+    "--base",
+    metavar="V",
+    default="fork-point",
+    show_default=True,
+    help="What it is compared with; fork-point is the nearest measured commit it builds on.",
+)
+@click.option(
+    "--comment",
+    "comment_file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write a comment for the pull request; empty when nothing became worse.",
 )
 @executor_option
 @workers_option
@@ -91,16 +104,19 @@ def night(
 @database_option
 @click.pass_context
 def change(
-    context: click.Context, /, history: Path, base: str, accepted: Path | None, database: str, **asked: Any
-) -> None:
+    context: click.Context, /, history: Path, base: str, comment_file: Path | None, accepted: Path | None,
+    database: str, **asked: Any,
+) -> None:  # fmt: skip
     """Measure a proposed change and compare it with the history; nothing of it is kept."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.cli.main import run_command
-    from spook_tracker.tracker.cli.report_comment import workflow_commands
+    from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
     from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
     from spook_tracker.tracker.library import compare
 
+    if comment_file:
+        comment_file.write_text("", encoding="utf-8")
     known = _bring_in(history, database)
     same: dict[str, Any] = {"tests": (), "json_file": None, "junit_file": None}
     same |= dict.fromkeys(("sweep", "stability", "figures", "no_record", "everything"), False)
@@ -111,6 +127,8 @@ def change(
     with history_of(database) as kept:
         document = compare(kept, base, "latest", accepted_levels(accepted))
     say(compare_table(document))
+    if comment_file and (words := comment(document)):
+        comment_file.write_text(words + "\n", encoding="utf-8")
     _tell(compare_markdown(document), workflow_commands(document).splitlines())
     context.exit(document.exit_code)
 

@@ -20,6 +20,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     executor_option,
     limit_option,
+    mutants_option,
     recorded,
     refuse_unwritable,
     source_options,
@@ -149,6 +150,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 )
 @with_database_option
 @website_options
+@mutants_option
 @accepted_option
 @source_options
 @database_option
@@ -158,6 +160,7 @@ def nightly(
     with_database: bool,
     title: str,
     home_page: str,
+    mutants: Path | None,
     executor: str,
     workers: int,
     time_limit: float,
@@ -206,6 +209,7 @@ def nightly(
             with_database=with_database,
             title=title,
             home_page=home_page,
+            mutants=mutants,
             catalogue=catalogue,
             engine=first,
             limits=present().limits_of(first),
@@ -243,10 +247,17 @@ def engines() -> None:
 )
 @with_database_option
 @website_options
+@mutants_option
 @accepted_option
 @database_option
 def publish(
-    out: Path, with_database: bool, title: str, home_page: str, accepted: Path | None, database: str
+    out: Path,
+    with_database: bool,
+    title: str,
+    home_page: str,
+    mutants: Path | None,
+    accepted: Path | None,
+    database: str,
 ) -> None:
     """Build the website from what is recorded."""
     from spook_tracker.tracker.cli.history import accepted_levels
@@ -255,7 +266,7 @@ def publish(
 
     with History.open(database) as history:
         offered = database if with_database else ""
-        report = build(history, out, accepted_levels(accepted), offered, title, home_page)
+        report = build(history, out, accepted_levels(accepted), offered, title, home_page, mutants)
     _say_published(report, out)
 
 

@@ -82,6 +82,16 @@ def website_options(command: Command) -> Command:
     return command
 
 
+def mutants_option(command: Command) -> Command:
+    """--mutants FILE: a page of engines that were wrong on purpose."""
+    return click.option(
+        "--mutants",
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help="Record of engines wrong on purpose, for a page of the website.",
+    )(command)
+
+
 def limit_option(command: Command) -> Command:
     """--limit SECONDS, so that a slow engine does not hold up a night."""
     return click.option(

@@ -36,6 +36,7 @@ KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an op
     "out": (str,),
     "title": (str,),
     "home_page": (str,),
+    "mutants": (str,),
     "executor": (str,),
     "workers": (int,),
     "limit": (int, float),

@@ -14,6 +14,7 @@ from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.live_module import live_page
 from spook_tracker.tracker.website.nights import Book
 from spook_tracker.tracker.website.page_index import index
+from spook_tracker.tracker.website.page_mutants import PATH, Mutant, mutants_page
 from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.page_test import test_page
 
@@ -45,6 +46,7 @@ def pages(
     causes: Sequence[Cause],
     compared: Callable[[], Comparisons],
     module: str = "",
+    mutants: Sequence[Mutant] = (),
 ) -> Iterator[Planned]:
     """Every page of the website, from the first to the pages of the tests; `module` is the live engine's script."""
     if not book.nights:
@@ -63,6 +65,8 @@ def pages(
         yield Planned(path, clean(chapter.name), partial(page_engines.engine_page, book, chapter))
     yield Planned("compare.html", "Compare", lambda: page_overviews.compare(compared(), book))
     yield Planned("regressions.html", "Regressions", partial(page_overviews.regressions, book, causes))
+    if mutants:
+        yield Planned(PATH, "Wrong on purpose", partial(mutants_page, mutants, book))
     yield Planned("versions.html", "Versions", partial(page_overviews.versions, book))
     yield Planned("data.html", "Data", partial(page_overviews.data, book, events))
     yield Planned("document.html", "Report", partial(page_overviews.document, book, events))

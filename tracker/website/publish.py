@@ -37,6 +37,7 @@ from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import module_script
 from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
+from spook_tracker.tracker.website.page_mutants import Mutant
 from spook_tracker.tracker.website.page_rows import Page
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
 from spook_tracker.tracker.website.replays import replay_files
@@ -91,11 +92,13 @@ def publish(
     database: bytes | None = None,
     title: str = "",
     home_page: str = "",
+    mutants: Sequence[Mutant] = (),
 ) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
-    the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is. What cannot be made says so in its place,
+    the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is. `mutants` are
+    engines that were wrong on purpose, and who noticed. What cannot be made says so in its place,
     and everything else is published.
     """
     site = resource("site")
@@ -125,13 +128,17 @@ def publish(
 
         def render(page: Page) -> tuple[str, bytes]:
             """The page and what it is made from."""
-            context = _context(page, names, night) | {"database": database is not None} | whose
+            context = _context(page, names, night) | {
+                "database": database is not None,
+                "wrong_on_purpose": bool(mutants),
+            }
+            context |= whose
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
             if folder.unchanged(page.path, source):
                 return source, b""
             return source, made.get_template(page.template).render(context).encode("utf-8", "replace")
 
-        for planned in pages(told, events, causes, compared, module):
+        for planned in pages(told, events, causes, compared, module, mutants):
             try:
                 source, text = render(planned.make())
             except Exception as error:  # whatever it is, the other pages are worth publishing
