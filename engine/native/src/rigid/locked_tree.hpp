@@ -90,7 +90,7 @@ private:
         double upsilon[2], violation[2], softness[2];  // linear, angular
         bool operator==(const Gain&) const = default;
     };
-    struct alignas(64) Work {
+    struct Work {
         Vec3 arm, other_arm;  // from both centres to the joint
         Vec3 tilt;            // vector part of the relative turn, world axes: the rows' angles are 2 × it
         double tilt_softness = 0.0;
