@@ -70,6 +70,7 @@ from spook_tracker.engine.joints import (
     Prismatic,
     Universal,
 )
+from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import (
     AngularMomentum,
@@ -138,6 +139,7 @@ __all__ = [
     "EngineError",
     "Final",
     "Fluid",
+    "HeightField",
     "Hinge",
     "JointCoordinate",
     "JointSpring",
@@ -183,6 +185,7 @@ __all__ = [
     "Table",
     "TimeFunction",
     "Trace",
+    "TriangleMesh",
     "Universal",
     "Velocity",
     "Violation",

@@ -109,6 +109,8 @@ class RigidBody:
             raise SceneError(f"{owner}: only a kinematic body has a pace; forces move a dynamic one")
         if self.motion == "static" and (any(self.velocity) or any(self.angular_velocity)):
             raise SceneError(f"{owner}: a static body cannot have a velocity; make it kinematic")
+        if self.motion != "static" and self.shape is not None and self.shape.fixed_only:
+            raise SceneError(f"{owner}: a mesh stays where it is; make the body static")
         if self.motion != "dynamic":
             return
         if self.mass is None:

@@ -43,9 +43,8 @@ from spook_tracker.engine.particle_program import ends
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
-from spook_tracker.engine.shapes import ConvexHull
 from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
-from spook_tracker.engine.surface_tables import hull_tables, surfaces
+from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, at_start
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
@@ -118,7 +117,7 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
                     "viscosity": force.viscosity,
                 }
             )
-    hulls: dict[ConvexHull, int] = {}
+    hulls: dict[Outlined, int] = {}
     joints = [_joint(scene, constraint, bodies, step) for constraint in scene.constraints]
     apart = [{"first": bodies[first], "second": bodies[second]} for first, second in scene.no_contact]
     apart += [
@@ -291,7 +290,7 @@ def _couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
     return {"terms": table(terms), "wire_points": table(points)}
 
 
-def _fluids(scene: Scene, hulls: dict[ConvexHull, int]) -> dict[str, Any]:
+def _fluids(scene: Scene, hulls: dict[Outlined, int]) -> dict[str, Any]:
     """Fluids, and the surfaces of dynamic bodies that displace them."""
     down = math.hypot(*scene.gravity)
     fluids = [

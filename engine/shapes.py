@@ -22,6 +22,7 @@ class Shape(ABC):
     __slots__ = ()
     kind: ClassVar[str] = ""  # the native side's name
     drawn_as: ClassVar[str] = ""  # a kind of DrawnSolid; none: not drawn
+    fixed_only: ClassVar[bool] = False  # only static bodies may have it
 
     def columns(self) -> dict[str, Any]:
         """What the native side is told of it."""
@@ -269,7 +270,11 @@ class Part:
     orientation: Rotation = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Shape) or isinstance(self.shape, Plane | Compound):
+        if (
+            not isinstance(self.shape, Shape)
+            or isinstance(self.shape, Plane | Compound)
+            or self.shape.fixed_only
+        ):
             raise SceneError(f"compound: a part must be a bounded shape and no compound, not {self.shape!r}")
         object.__setattr__(self, "position", check.vector("compound part", "position", self.position))
         object.__setattr__(

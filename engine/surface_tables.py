@@ -6,16 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from spook_tracker.engine.bodies import RigidBody
+from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.program import table
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, ConvexHull
 
+Outlined = ConvexHull | TriangleMesh | HeightField  # has corners and faces
 ORIGIN = (0.0, 0.0, 0.0)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-def surfaces(scene: Scene, hulls: dict[ConvexHull, int]) -> list[dict[str, Any]]:
-    """A row for every primitive; hulls are numbered as they are met, equal ones once."""
+def surfaces(scene: Scene, hulls: dict[Outlined, int]) -> list[dict[str, Any]]:
+    """A row for every primitive or mesh; hulls and meshes are numbered as they are met, equal ones once."""
     colliders: list[dict[str, Any]] = []
     for index, body in enumerate(scene.bodies):
         if not isinstance(body, RigidBody) or body.shape is None:
@@ -28,13 +30,13 @@ def surfaces(scene: Scene, hulls: dict[ConvexHull, int]) -> list[dict[str, Any]]
         for position, orientation, shape in placed:
             row: dict[str, Any] = {"body": index, "position": position, "orientation": orientation}
             row |= {"kind": shape.kind, "radius": 0.0, "length": 0.0, "size": ORIGIN, "normal": ORIGIN}
-            row["hull"] = hulls.setdefault(shape, len(hulls)) if isinstance(shape, ConvexHull) else -1
+            row["hull"] = hulls.setdefault(shape, len(hulls)) if isinstance(shape, Outlined) else -1
             colliders.append(row | shape.columns())
     return colliders
 
 
-def hull_tables(hulls: Mapping[ConvexHull, int]) -> dict[str, Any]:
-    """Corners of hulls, and the loops of corners round their faces."""
+def hull_tables(hulls: Mapping[Outlined, int]) -> dict[str, Any]:
+    """Corners of hulls and meshes, and the loops of corners round their faces."""
     corners = [
         {"hull": index, "position": corner} for hull, index in hulls.items() for corner in hull.corners
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,11 @@ from spook_tracker.tracker.store.database import open_database
 from tests import postgresql
 from tests.browser import MISSING, browser, programs
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
+
+if (
+    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+):  # a shell starts what runs behind it deaf to the keyboard
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Minutes of work in few tests: they start first, so that all workers end at about the same time.
 LONG = ("tracker_publish", "scalar_tests_limits", "scalar_tests_answers", "tracker_durability", "tracker_history_machine",

@@ -1,4 +1,4 @@
-"""The tables in a database are those of the models, by one way: the revisions. They go up and down with rows."""
+"""The tables in a database are those of the models, made at once or by revisions. They go up and down with rows."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.run_document import OutcomeClass
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.connection import connected
 from spook_tracker.tracker.store.database import database_url, head, open_database, upgrade
 from spook_tracker.tracker.store.database_copy import digest
 from spook_tracker.tracker.store.history import History
@@ -48,9 +49,65 @@ def test_there_is_one_line_of_revisions_and_its_head_is_read_from_file_names():
     assert sorted(REVISIONS) == REVISIONS
 
 
-def test_the_newest_revision_is_the_models(session):
-    with session.get_bind().connect() as connection:
+@pytest.fixture
+def climbed(url):
+    """A session on a database that has gone up by every revision; a new one is made from the models at once."""
+    engine = connected(database_url(url), readonly=False)
+    upgrade(engine, REVISIONS[0])
+    upgrade(engine)
+    with Session(engine) as session:
+        yield session
+    engine.dispose()
+
+
+def tables(connection):
+    """All that the two databases know of the tables, but for the order of columns."""
+    found = inspect(connection)
+
+    def plain(value):
+        if isinstance(value, dict):
+            return sorted((name, plain(part)) for name, part in value.items())
+        if isinstance(value, list):
+            return sorted(map(plain, value), key=repr)
+        return " ".join(str(value).split())
+
+    return {
+        name: {
+            what: plain(getattr(found, f"get_{what}")(name))
+            for what in (
+                "columns",
+                "pk_constraint",
+                "foreign_keys",
+                "unique_constraints",
+                "check_constraints",
+                "indexes",
+            )
+        }
+        for name in [*found.get_table_names(), *found.get_view_names()]
+    }
+
+
+def test_the_newest_revision_is_the_models(climbed):
+    with climbed.get_bind().connect() as connection:
         assert differences(connection) == []
+
+
+def test_a_new_database_is_what_the_revisions_make(climbed, tmp_path):
+    with climbed.get_bind().connect() as connection:
+        by_revisions = tables(connection)
+    if climbed.get_bind().dialect.name == "postgresql":
+        with climbed.get_bind().begin() as connection:
+            revert(connection, "base")
+        upgrade(climbed.get_bind())
+        new = climbed.get_bind()
+    else:
+        new = open_database(str(tmp_path / "new.db"))
+    with new.connect() as connection:
+        at_once = tables(connection)
+    new.dispose()
+    assert at_once.keys() == by_revisions.keys()
+    for name, told in at_once.items():
+        assert told == by_revisions[name], name
 
 
 def test_a_difference_would_be_seen(session):
@@ -75,16 +132,16 @@ def test_revisions_carry_the_comments_of_the_models(postgresql_url):
     engine.dispose()
 
 
-def test_every_class_of_outcome_can_be_stored(session):
+def test_every_class_of_outcome_can_be_stored(climbed):
     """A constraint left behind by an older revision refused one of them."""
     classes = get_args(OutcomeClass)
     keys = [f"t/c/m{place}" for place in range(len(classes))]
     samples = tuple(
         sample(key, 1.0, outcome=outcome, passed=False) for key, outcome in zip(keys, classes, strict=True)
     )
-    record(session, run(series=tuple(definition(key) for key in keys), samples=samples))
+    record(climbed, run(series=tuple(definition(key) for key in keys), samples=samples))
 
-    assert {row.outcome for row in session.scalars(select(models.Sample))} == set(classes)
+    assert {row.outcome for row in climbed.scalars(select(models.Sample))} == set(classes)
 
 
 def test_all_the_way_down_and_up_again(session, url):

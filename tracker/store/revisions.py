@@ -27,7 +27,17 @@ def configuration(connection: Connection | None = None) -> Config:
 
 
 def migrate(connection: Connection, target: str) -> None:
-    """Upgrade to `target` inside the transaction of `connection`; at the newest revision the views are made."""
+    """Upgrade to `target` inside the transaction of `connection`; at the newest revision the views are made.
+
+    In an empty SQLite file the tables are made from the models at once, which is five times quicker; the tests hold
+    both ways to the same tables. (PostgreSQL's are not the same: older revisions named its constraints otherwise.)
+    """
+    empty = MigrationContext.configure(connection).get_current_revision() is None
+    if empty and target == "head" and connection.dialect.name == "sqlite":
+        Base.metadata.create_all(connection)
+        command.stamp(configuration(connection), "head")
+        create_views(connection)
+        return
     drop_views(connection)
     command.upgrade(configuration(connection), target)
     reached = MigrationContext.configure(connection).get_current_revision()

@@ -110,9 +110,29 @@ void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
     table.expect_all_read();
 }
 
-using Hulls = std::vector<std::shared_ptr<const Polytope>>;
+/// Corners and faces of a hull or a mesh, made once, when it is first named.
+struct Outline {
+    std::vector<Vec3> places;
+    std::vector<int> indices, counts;
+    std::shared_ptr<const Polytope> hull{};
+    std::shared_ptr<const Mesh> mesh{};
 
-/// Corners of hulls, and the loops round their faces; both in ascending order of hull and face.
+    const std::shared_ptr<const Polytope>& as_hull() {
+        if (!hull) hull = std::make_shared<const Polytope>(places, indices, counts);
+        return hull;
+    }
+    const std::shared_ptr<const Mesh>& as_mesh() {
+        if (mesh) return mesh;
+        std::vector<std::array<int, 3>> triangles;
+        for (std::size_t k = 0; k + 2 < indices.size(); k += 3)
+            triangles.push_back({indices[k], indices[k + 1], indices[k + 2]});
+        mesh = std::make_shared<const Mesh>(places, std::move(triangles));
+        return mesh;
+    }
+};
+using Hulls = std::vector<Outline>;
+
+/// Corners of hulls and meshes, and the loops round their faces; both in ascending order of hull and face.
 Hulls read_hulls(const nb::dict& corners, const nb::dict& loops) {
     Columns points(corners, "hull_corners"), rounds(loops, "hull_faces");
     const Numbers hull_of = points.numbers("hull"), place = points.numbers("position", 3),
@@ -132,14 +152,14 @@ Hulls read_hulls(const nb::dict& corners, const nb::dict& loops) {
             ++counts.back();
             indices.push_back(corner.index(row));
         }
-        hulls.push_back(std::make_shared<const Polytope>(std::move(places), std::move(indices), counts));
+        hulls.push_back({std::move(places), std::move(indices), std::move(counts)});
     }
     points.expect_all_read();
     rounds.expect_all_read();
     return hulls;
 }
 
-std::vector<Collider> read_colliders(const nb::dict& colliders, const Hulls& hulls, const char* name) {
+std::vector<Collider> read_colliders(const nb::dict& colliders, Hulls& hulls, const char* name) {
     std::vector<Collider> read;
     Columns table(colliders, name);
     const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
@@ -158,9 +178,18 @@ std::vector<Collider> read_colliders(const nb::dict& colliders, const Hulls& hul
             case ShapeKind::cylinder: collider.shape = Primitive::cylinder(radius[i], length[i]); break;
             case ShapeKind::cone: collider.shape = Primitive::cone(radius[i], length[i]); break;
             case ShapeKind::hull:
-                collider.shape = Primitive::convex(hulls.at(static_cast<std::size_t>(hull.index(i))));
+                collider.shape =
+                    Primitive::convex(hulls.at(static_cast<std::size_t>(hull.index(i))).as_hull());
                 break;
             case ShapeKind::plane: collider.shape = Primitive::plane(normal.vec(i)); break;
+            case ShapeKind::triangle: {  // a row for a mesh, a collider for each of its triangles
+                const auto& mesh = hulls.at(static_cast<std::size_t>(hull.index(i))).as_mesh();
+                const Collider whole = collider;
+                read.pop_back();
+                for (int k = 0; k < static_cast<int>(mesh->triangles.size()); ++k)
+                    read.push_back({whole.body, Primitive::sheet(mesh, k), whole.part});
+                break;
+            }
         }
     }
     table.expect_all_read();
@@ -276,7 +305,7 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_wire_points(wire_points, scene);
     read_fluids(fluids, scene);
     read_drives(drives, knots, scene);
-    const Hulls hulls = read_hulls(hull_corners, hull_faces);
+    Hulls hulls = read_hulls(hull_corners, hull_faces);
     scene.floaters = read_colliders(floaters, hulls, "floaters");
     scene.colliders = read_colliders(colliders, hulls, "colliders");
     read_no_contact(no_contact, scene);

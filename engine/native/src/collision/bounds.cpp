@@ -1,5 +1,6 @@
 #include "collision/bounds.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include "collision/cylinder.hpp"
@@ -28,6 +29,14 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
         }
         return {low - grown, high + grown};
     }
+    if (shape.kind == ShapeKind::triangle) {
+        Vec3 low = apply(at, shape.mesh->corner(shape.triangle, 0)), high = low;
+        for (int k = 1; k < 3; ++k) {
+            const Vec3 p = apply(at, shape.mesh->corner(shape.triangle, k));
+            for (int i = 0; i < 3; ++i) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+        }
+        return {low - grown, high + grown};
+    }
     Vec3 half;
     for (int i = 0; i < 3; ++i) switch (shape.kind) {
             case ShapeKind::sphere: half[i] = shape.radius; break;
@@ -40,7 +49,8 @@ Bounds bounds(const Primitive& shape, const Pose& at, double margin) noexcept {
                           shape.half.z * std::abs(at.rotation(i, 2));
                 break;
             case ShapeKind::hull:
-            case ShapeKind::cone: break;
+            case ShapeKind::cone:
+            case ShapeKind::triangle: break;
             case ShapeKind::cylinder: {
                 Vec3 axis;
                 axis[i] = 1.0;
@@ -64,6 +74,11 @@ double reach(const Primitive& shape) noexcept {
         case ShapeKind::cone: {
             const double rim = shape.radius * shape.radius + 0.25 * shape.half_length * shape.half_length;
             return std::max(1.5 * shape.half_length, std::sqrt(rim));
+        }
+        case ShapeKind::triangle: {
+            double most = 0.0;
+            for (int k = 0; k < 3; ++k) most = std::max(most, norm(shape.mesh->corner(shape.triangle, k)));
+            return most;
         }
         case ShapeKind::plane: break;
     }

@@ -28,6 +28,8 @@ Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
         const Collider& c = colliders_[k];
         if (c.shape.kind == ShapeKind::plane) {
             planes_.push_back(k);
+        } else if (c.shape.kind == ShapeKind::triangle) {
+            sheets_.push_back(k);
         } else {
             bounded_.push_back(k);
             radius_[c.body] = std::max(radius_[c.body], norm(c.part.position) + reach(c.shape));
@@ -100,6 +102,22 @@ const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
                     reach(colliders_[k].shape) + sum &&
                 may_touch(plane, k))
                 on_planes_.emplace_back(std::min(plane, k), std::max(plane, k));
+        }
+    }
+    if (!sheets_.empty()) {
+        if (!planted_) {
+            std::vector<Bounds> fixed;
+            for (const int k : sheets_) fixed.push_back(bounds(colliders_[k].shape, poses_[k], 0.0));
+            tree_.build(std::move(fixed));
+            planted_ = true;
+        }
+        for (std::size_t p = 0; p < bounded_.size(); ++p) {
+            const int k = bounded_[p];
+            hits_.clear();
+            if (dynamic_[colliders_[k].body]) tree_.overlapping(bounds_[p], hits_);
+            for (const int hit : hits_)
+                if (may_touch(sheets_[hit], k))
+                    on_planes_.emplace_back(std::min(sheets_[hit], k), std::max(sheets_[hit], k));
         }
     }
     std::sort(on_planes_.begin(), on_planes_.end());

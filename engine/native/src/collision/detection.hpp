@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "collision/bounds_tree.hpp"
 #include "collision/broad_phase.hpp"
 #include "collision/manifold.hpp"
 #include "collision/shape.hpp"
@@ -67,7 +68,11 @@ private:
     std::vector<char> dynamic_;
     std::vector<std::uint64_t> excluded_;  // sorted
     std::vector<double> radius_;
-    std::vector<int> bounded_, planes_;  // indices into colliders_
+    std::vector<int> bounded_, planes_,
+        sheets_;            // indices into colliders_; sheets: of fixed bodies, never moved
+    BoundsTree tree_;       // of sheets
+    bool planted_ = false;  // whether it is built
+    std::vector<int> hits_;
     bool possible_ = false;
     std::vector<Pose> poses_;  // of colliders
     std::vector<double> arms_;

@@ -6,6 +6,7 @@
 
 #include "collision/segment.hpp"
 #include "collision/solid_pairs.hpp"
+#include "collision/triangle.hpp"
 #include "linear/elementary.hpp"
 
 namespace spook {
@@ -13,6 +14,7 @@ namespace spook {
 namespace {
 
 constexpr Polytope::Edge only_edge{0, 1, 0, 0};
+constexpr Polytope::Edge round_triangle[3] = {{0, 1, 0, 1}, {1, 2, 0, 1}, {2, 0, 0, 1}};
 constexpr double parallel = 1e-9;  // sine of an angle that is none
 
 /// Parts of a turn, from −π to π.
@@ -90,6 +92,7 @@ private:
 /// Collects axes; `gap` gives the gap along a direction.
 template <class Gap> struct Search {
     Gap gap;
+    const Triangle* sheet = nullptr;
     PartingAxes found{};
 
     void flat(Vec3 n) noexcept { improve(found.flat, n, -1); }
@@ -98,7 +101,8 @@ template <class Gap> struct Search {
 private:
     void improve(PartingAxis& best, Vec3 n, int edge) noexcept {
         const double along = gap(n);
-        if (along > best.gap) best = {along, n, edge};
+        if (along > found.all.gap) found.all = {along, n, edge};
+        if (along > best.gap && (!sheet || sheet->genuine(-n))) best = {along, n, edge};
     }
 };
 
@@ -251,6 +255,15 @@ Facets::Facets(const Primitive& primitive, const Pose& at) noexcept {
         thickness = box ? 2.0 * std::min({half.x, half.y, half.z}) : shape->thickness;
         return;
     }
+    if (primitive.kind == ShapeKind::triangle) {
+        for (int k = 0; k < 3; ++k)
+            corners[corner_count++] = apply(at, primitive.mesh->corner(primitive.triangle, k));
+        normals[face_count++] =
+            at.rotation * primitive.mesh->normals[static_cast<std::size_t>(primitive.triangle)];
+        normals[face_count++] = -normals[0];
+        edges = round_triangle, edge_count = 3;
+        return;
+    }
     radius = primitive.radius, thickness = 2.0 * primitive.radius;
     if (primitive.kind == ShapeKind::sphere) {
         corners[corner_count++] = at.position;
@@ -267,16 +280,17 @@ double Facets::lowest(Vec3 n) const noexcept {
     return least;
 }
 
-PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin) noexcept {
-    Search search{[&](Vec3 n) noexcept { return other.lowest(n) - frustum.reach(n) - other.radius; }};
+PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin,
+                         const Triangle* sheet) noexcept {
+    Search search{[&](Vec3 n) noexcept { return other.lowest(n) - frustum.reach(n) - other.radius; }, sheet};
     search.flat(frustum.axis);
     search.flat(-frustum.axis);
     for (int k = 0; k < other.face_count; ++k) search.flat(-other.normals[k]);
-    if (search.found.flat.gap > margin) return search.found;
+    if (search.found.all.gap > margin) return search.found;
     for (int k = 0; k < other.corner_count; ++k) meet_corner(search, frustum, other.corners[k]);
     for (int k = 0; k < other.edge_count; ++k) {
         const Polytope::Edge& edge = other.edges[k];
-        const bool faces = other.face_count > 0;
+        const bool faces = other.shape != nullptr;
         meet_edge(search, frustum, other.corners[edge.from], other.corners[edge.to],
                   faces ? &other.normals[edge.left] : nullptr, faces ? &other.normals[edge.right] : nullptr,
                   k);

@@ -38,10 +38,12 @@ struct Facets {
     double radius = 0.0, thickness = 0.0;  // m
 
     Facets(const Primitive& primitive,
-           const Pose& at) noexcept;  // not of a plane, nor of what is round and has rims
+           const Pose& at) noexcept;  // not of a plane, nor of what has rims
 
     double lowest(Vec3 n) const noexcept;  // least n · corner
 };
+
+struct Triangle;
 
 /// A direction in which two shapes may part, from the frustum to the other; the gap along it is a lower bound of their
 /// distance, and the largest over all directions is that distance, or minus the least overlap.
@@ -55,10 +57,12 @@ struct PartingAxis {
 /// another side, and of rims with corners, edges, sides and rims. The maximum over all directions is among them, as it
 /// is a stationary point of the gap that some pair of features gives. Stops where one exceeds `margin` [m].
 struct PartingAxes {
-    PartingAxis flat, curved;
+    PartingAxis flat, curved, all;
     const PartingAxis& best() const noexcept { return curved.gap > flat.gap ? curved : flat; }
 };
-PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin) noexcept;
+/// Of a triangle only its genuine axes count for `flat` and `curved`; `all` holds the best of any kind.
+PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin,
+                         const Triangle* sheet = nullptr) noexcept;
 PartingAxes parting_axes(const Frustum& frustum, const Frustum& other, double margin) noexcept;
 
 }  // namespace spook

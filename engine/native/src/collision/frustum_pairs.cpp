@@ -1,261 +1,29 @@
 // Cylinders and cones against everything bounded: where something flat decides, what overlaps of the two sides that face
 // each other; else the point where the features meet, or two points where a line of a side lies along another line.
 #include <algorithm>
-#include <array>
 
-#include "collision/frustum.hpp"
 #include "collision/narrow_phase.hpp"
-#include "collision/segment.hpp"
+#include "collision/overlay.hpp"
 
 namespace spook {
 
 namespace {
-
-/// What faces the other shape: a disc, a polygon, or a line; its shape's radius lies between it and the surface.
-struct Patch {
-    enum Kind { line, polygon, disc } kind = line;
-    std::array<Vec3, Polytope::most_round_a_face> corners{};  // a disc's: four points of its rim
-    int count = 0;
-    Vec3 normal;  // unit, out of its shape; of a line none
-    Vec3 centre;  // of a disc
-    double radius = 0.0;
-};
-
-/// Of a frustum towards `n`; `other` is the opposite flat's normal, if it has one.
-Patch facing(const Frustum& frustum, Vec3 n, Vec3 other) noexcept {
-    const Vec3 out = frustum.outward(n);
-    const double along = dot(n, frustum.axis), side = frustum.cosine * dot(n, out) + frustum.sine * along;
-    const int end = along > 0.0 ? 1 : 0;
-    Patch patch;
-    if (frustum.radius[end] == 0.0 || std::abs(along) < side) {
-        patch.corners[0] = frustum.centre[0] + frustum.radius[0] * out;
-        patch.corners[1] = frustum.centre[1] + frustum.radius[1] * out;
-        patch.count = 2;
-        return patch;
-    }
-    patch.kind = Patch::disc;
-    patch.normal = end ? frustum.axis : -frustum.axis;
-    patch.centre = frustum.centre[end];
-    patch.radius = frustum.radius[end];
-    // The rim's nearest point, its opposite and the two between: leaning in any direction it is held at its very edge.
-    const Vec3 down = frustum.outward(is_zero(other) ? n : -other), aside = cross(frustum.axis, down);
-    for (const Vec3 spoke : {down, aside, -down, -aside})
-        patch.corners[static_cast<std::size_t>(patch.count++)] = patch.centre + patch.radius * spoke;
-    return patch;
-}
-
-Patch facing(const Facets& facets, Vec3 n) noexcept {
-    Patch patch;
-    if (facets.face_count == 0) {
-        for (int k = 0; k < facets.corner_count; ++k)
-            patch.corners[static_cast<std::size_t>(k)] = facets.corners[k];
-        patch.count = facets.corner_count;
-        return patch;
-    }
-    int best = 0;
-    for (int k = 1; k < facets.face_count; ++k)
-        if (dot(n, facets.normals[k]) > dot(n, facets.normals[best]) + 1e-9) best = k;
-    const Polytope::Face& face = facets.shape->faces[static_cast<std::size_t>(best)];
-    patch.kind = Patch::polygon;
-    patch.normal = facets.normals[best];
-    patch.count = face.count;
-    for (int k = 0; k < face.count; ++k) {
-        const int place = face.begin + k;
-        patch.corners[static_cast<std::size_t>(k)] =
-            facets.corners[facets.shape->loops[static_cast<std::size_t>(place)]];
-    }
-    return patch;
-}
-
-/// Points of both patches that lie before each other along `n` (from first to second), with the gaps there.
-class Overlay {
-public:
-    Overlay(const Patch& first, const Patch& second, const PartingAxis& axis, double radius, double margin,
-            double slop) noexcept
-        : first_(first),
-          second_(second),
-          n_(axis.normal),
-          deepest_(axis.gap - slop),
-          radius_(radius),
-          margin_(margin),
-          slop_(slop) {
-        own_corners(first_, second_, 1.0, 0);
-        own_corners(second_, first_, -1.0, 8);
-        if (first_.kind == Patch::disc && second_.kind == Patch::disc) rims();
-        else if (first_.kind == Patch::disc) crossings(second_, first_, -1.0, 16);
-        else if (second_.kind == Patch::disc) crossings(first_, second_, 1.0, 16);
-        else if (second_.kind == Patch::polygon) through(first_, second_, 1.0);
-        else if (first_.kind == Patch::polygon) through(second_, first_, -1.0);
-    }
-    Manifold manifold;
-    double least = 1e300;  // gap, m
-
-private:
-    const Patch &first_, &second_;
-    Vec3 n_;
-    double deepest_, radius_, margin_, slop_;
-
-    /// A point of one patch and its gap to the plane of the other; `sign` is 1 for a point of the first.
-    void add(Vec3 p, const Patch& other, double sign, std::uint32_t feature) noexcept {
-        const double turned = dot(other.normal, n_);
-        if (std::abs(turned) < 0.1) return;
-        const double way = dot(other.normal, other.corners[0] - p) / turned, gap = sign * way - radius_;
-        if (gap > margin_ || gap < deepest_) return;  // deeper than the shapes are: beside the other's patch
-        for (int k = 0; k < manifold.count; ++k) {
-            const Vec3 between = p + 0.5 * way * n_ - manifold.points[static_cast<std::size_t>(k)].position;
-            if (norm(between - dot(between, n_) * n_) <= slop_) return;
-        }
-        least = std::min(least, gap);
-        // Midway between the surfaces: a round second's stands out of its core by its radius.
-        manifold.add(p + (0.5 * way - 0.5 * radius_) * n_, n_, gap, feature);
-    }
-    bool before(Vec3 p, const Patch& other) const noexcept {
-        if (other.kind == Patch::disc) {
-            const double turned = dot(other.normal, n_);
-            const Vec3 on = p + (dot(other.normal, other.centre - p) / turned) * n_ - other.centre;
-            return norm(on) <= other.radius + slop_;
-        }
-        for (int k = 0; k < other.count; ++k) {
-            const Vec3 from = other.corners[static_cast<std::size_t>(k)],
-                       along = other.corners[static_cast<std::size_t>((k + 1) % other.count)] - from,
-                       out = cross(along, dot(other.normal, n_) > 0.0 ? n_ : -n_);
-            if (dot(out, p - from) > slop_ * norm(out)) return false;
-        }
-        return true;
-    }
-    void own_corners(const Patch& own, const Patch& other, double sign, std::uint32_t feature) noexcept {
-        if (other.kind == Patch::line || std::abs(dot(other.normal, n_)) < 0.1) return;
-        for (int k = 0; k < own.count; ++k) {
-            const Vec3 p = own.corners[static_cast<std::size_t>(k)];
-            if (before(p, other)) add(p, other, sign, feature + static_cast<std::uint32_t>(k));
-        }
-    }
-    /// Where the sides of a polygon, or a line, cross the rim of a disc.
-    void crossings(const Patch& straight, const Patch& disc, double sign, std::uint32_t feature) noexcept {
-        const double turned = dot(disc.normal, n_);
-        if (std::abs(turned) < 0.1) return;
-        const auto onto = [&](Vec3 p) {
-            return p + (dot(disc.normal, disc.centre - p) / turned) * n_ - disc.centre;
-        };
-        const int sides = straight.kind == Patch::line ? straight.count - 1 : straight.count;
-        for (int k = 0; k < sides; ++k, feature += 2) {
-            const Vec3 from = straight.corners[static_cast<std::size_t>(k)],
-                       to = straight.corners[static_cast<std::size_t>((k + 1) % straight.count)];
-            const Vec3 p = onto(from), along = onto(to) - p;
-            const double square = dot(along, along), half = dot(p, along);
-            const double root = half * half - square * (dot(p, p) - disc.radius * disc.radius);
-            if (!(root > 0.0) || !(square > 0.0)) continue;
-            for (const double side : {-1.0, 1.0}) {
-                const double t = (side * std::sqrt(root) - half) / square;
-                if (t > 0.0 && t < 1.0)
-                    add(from + t * (to - from), disc, sign, feature + (side > 0.0 ? 1u : 0u));
-            }
-        }
-    }
-    /// Where two rims cross, both seen along n as circles.
-    void rims() noexcept {
-        Vec3 between = second_.centre - first_.centre;
-        between -= dot(between, first_.normal) * first_.normal;
-        const double distance = norm(between), r = first_.radius, other = second_.radius;
-        if (!(distance > slop_) || distance >= r + other || distance <= std::abs(r - other)) return;
-        const double along = 0.5 * (distance + (r - other) * (r + other) / distance);
-        const double across = std::sqrt(std::max(0.0, r * r - along * along));
-        const Vec3 unit = (1.0 / distance) * between, aside = cross(first_.normal, unit);
-        for (const double side : {-1.0, 1.0})
-            add(first_.centre + along * unit + side * across * aside, second_, 1.0, side > 0.0 ? 17 : 16);
-    }
-    /// Where a line enters and leaves a polygon.
-    void through(const Patch& line, const Patch& polygon, double sign) noexcept {
-        if (line.count < 2) return;
-        double low = 0.0, high = 1.0;
-        const Vec3 from = line.corners[0], way = line.corners[1] - from;
-        for (int k = 0; k < polygon.count; ++k) {
-            const Vec3 on = polygon.corners[static_cast<std::size_t>(k)],
-                       along = polygon.corners[static_cast<std::size_t>((k + 1) % polygon.count)] - on,
-                       out = cross(along, dot(polygon.normal, n_) > 0.0 ? n_ : -n_);
-            const double start = dot(out, from - on), speed = dot(out, way);
-            if (std::abs(speed) <= 1e-14 * norm(out) * norm(way)) {
-                if (start > 0.0) return;
-            } else if (speed > 0.0) {
-                high = std::min(high, -start / speed);
-            } else {
-                low = std::max(low, -start / speed);
-            }
-        }
-        if (!(low < high)) return;
-        if (low > 0.0) add(from + low * way, polygon, sign, 16);
-        if (high < 1.0) add(from + high * way, polygon, sign, 17);
-    }
-};
-
-/// The line or the point of a frustum that is farthest along `n`.
-Segment farthest_line(const Frustum& frustum, Vec3 n, double slop) noexcept {
-    const Vec3 out = frustum.outward(n);
-    const double across = norm(cross(n, frustum.axis));
-    const double low = frustum.end(0, n, across), high = frustum.end(1, n, across);
-    const Vec3 a = frustum.centre[0] + frustum.radius[0] * out,
-               b = frustum.centre[1] + frustum.radius[1] * out;
-    const double half = 0.5 * norm(b - a);
-    if (std::abs(low - high) <= slop) return {0.5 * (a + b), (0.5 / half) * (b - a), half};
-    return {low > high ? a : b, (0.5 / half) * (b - a), 0.0};
-}
-
-/// The edge or the corner that is lowest along `n`.
-Segment lowest_line(const Facets& facets, Vec3 n, int edge, double slop) noexcept {
-    int lowest = 0;
-    for (int k = 1; k < facets.corner_count; ++k)
-        if (dot(n, facets.corners[k]) < dot(n, facets.corners[lowest])) lowest = k;
-    const double level = dot(n, facets.corners[lowest]);
-    for (int k = 0; k < facets.edge_count; ++k) {
-        if (edge >= 0 && k != edge) continue;
-        const Vec3 a = facets.corners[facets.edges[k].from], b = facets.corners[facets.edges[k].to];
-        if (std::max(dot(n, a), dot(n, b)) - level > slop) continue;
-        const double half = 0.5 * norm(b - a);
-        return {0.5 * (a + b), (0.5 / half) * (b - a), half};
-    }
-    return {facets.corners[lowest], any_normal_to(n), 0.0};
-}
-
-Manifold lines(const Segment& first, const Segment& second, Vec3 n, double gap, double radius,
-               double margin) noexcept {
-    Manifold manifold;
-    const auto add = [&](double t, double u, std::uint32_t feature) {
-        const Vec3 p = first.at(t), q = second.at(u);
-        const double here = feature == 24 ? gap : dot(n, q - p) - radius;
-        if (here <= margin) manifold.add(0.5 * (p + q - radius * n), n, here, feature);
-    };
-    const SegmentPair closest = closest_parameters(first, second);
-    if (closest.parallel && first.half > 0.0 && second.half > 0.0) {
-        const double middle = dot(second.centre - first.centre, first.direction);
-        const double low = clamped(middle - second.half, -first.half, first.half),
-                     high = clamped(middle + second.half, -first.half, first.half);
-        if (high - low > 1e-6 * (first.half + second.half)) {
-            add(low, closest_parameter(second, first.at(low)), 25);
-            add(high, closest_parameter(second, first.at(high)), 26);
-            return manifold;
-        }
-    }
-    add(closest.first, closest.second, 24);
-    return manifold;
-}
-
-/// Flats win near ties, so that what rests on one does not jump to its edge: within this part of the thickness.
-constexpr double prefer = 1e-5, slop_part = 1e-7;
 
 template <class Other, class Facing, class Line>
 Manifold meet(const Frustum& frustum, const Other& other, double radius, double thickness, double margin,
               Facing facing_of, Line line_of) noexcept {
     const PartingAxes axes = parting_axes(frustum, other, margin);
     if (axes.best().gap > margin) return {};
-    const double smallest = std::min(frustum.thickness, thickness), slop = slop_part * smallest;
+    const double smallest = std::min(frustum.thickness, thickness), slop = overlay_slop * smallest;
     PartingAxis axis = axes.curved;
-    if (axes.curved.gap <= axes.flat.gap + prefer * smallest) {
+    if (axes.curved.gap <= axes.flat.gap + prefer_flat * smallest) {
         axis = axes.flat;
         const Patch theirs = facing_of(axis.normal);
         const Patch ours = facing(frustum, axis.normal, theirs.normal);
-        const Overlay overlay(ours, theirs, axis, radius, margin, slop);
-        if (overlay.least <= axis.gap + slop) return overlay.manifold;
-        Manifold manifold = overlay.manifold;  // the deepest point lies beside the other's patch
+        double least;
+        Manifold manifold = overlay(ours, theirs, axis, radius, margin, slop, least);
+        if (least <= axis.gap + slop) return manifold;
+        // The deepest point lies beside the other's patch.
         if (axis.gap > 0.0 && manifold.count > 0) return manifold;
         const bool on_cap = std::abs(dot(axis.normal, frustum.axis)) > 1.0 - 1e-9;
         const Vec3 deepest =

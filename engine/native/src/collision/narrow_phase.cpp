@@ -9,14 +9,17 @@ using Pair = Manifold (*)(const Primitive&, const Pose&, const Primitive&, const
 Manifold never(const Primitive&, const Pose&, const Primitive&, const Pose&, double) noexcept { return {}; }
 
 // By kind of the first (row) and the second (column), in the order of ShapeKind.
-constexpr Pair pairs[7][7] = {
-    {sphere_sphere, sphere_capsule, sphere_box, sphere_hull, sphere_cylinder, facets_frustum, sphere_plane},
-    {nullptr, capsule_capsule, capsule_box, capsule_hull, facets_frustum, facets_frustum, capsule_plane},
-    {nullptr, nullptr, box_box, solid_solid, facets_frustum, facets_frustum, box_plane},
-    {nullptr, nullptr, nullptr, solid_solid, facets_frustum, facets_frustum, hull_plane},
-    {nullptr, nullptr, nullptr, nullptr, frustum_frustum, frustum_frustum, cylinder_plane},
-    {nullptr, nullptr, nullptr, nullptr, nullptr, frustum_frustum, cone_plane},
-    {nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, never},
+constexpr Pair pairs[8][8] = {
+    {sphere_sphere, sphere_capsule, sphere_box, sphere_hull, sphere_cylinder, facets_frustum, sphere_plane,
+     facets_triangle},
+    {nullptr, capsule_capsule, capsule_box, capsule_hull, facets_frustum, facets_frustum, capsule_plane,
+     facets_triangle},
+    {nullptr, nullptr, box_box, solid_solid, facets_frustum, facets_frustum, box_plane, facets_triangle},
+    {nullptr, nullptr, nullptr, solid_solid, facets_frustum, facets_frustum, hull_plane, facets_triangle},
+    {nullptr, nullptr, nullptr, nullptr, frustum_frustum, frustum_frustum, cylinder_plane, frustum_triangle},
+    {nullptr, nullptr, nullptr, nullptr, nullptr, frustum_frustum, cone_plane, frustum_triangle},
+    {nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, never, never},
+    {nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, never},
 };
 
 }  // namespace

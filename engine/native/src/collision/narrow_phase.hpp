@@ -35,6 +35,11 @@ Manifold frustum_frustum(const Primitive&, const Pose&, const Primitive&, const 
 Manifold sphere_cylinder(const Primitive&, const Pose&, const Primitive&, const Pose&,
                          double margin) noexcept;
 Manifold cylinder_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
+/// Anything bounded and a triangle of a mesh: no point where a neighbouring triangle is met first.
+Manifold facets_triangle(const Primitive&, const Pose&, const Primitive&, const Pose&,
+                         double margin) noexcept;
+Manifold frustum_triangle(const Primitive&, const Pose&, const Primitive&, const Pose&,
+                          double margin) noexcept;
 Manifold cone_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold hull_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;
 Manifold box_plane(const Primitive&, const Pose&, const Primitive&, const Pose&, double margin) noexcept;

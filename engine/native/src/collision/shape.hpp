@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "collision/mesh.hpp"
 #include "collision/polytope.hpp"
 #include "linear/vec.hpp"
 #include "run/named_enum.hpp"
@@ -12,7 +13,7 @@
 namespace spook {
 
 /// The order matters: the narrow phase knows each pair with the lower kind first.
-SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, hull, cylinder, cone, plane)
+SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, hull, cylinder, cone, plane, triangle)
 
 struct Pose {
     Vec3 position;                     // m
@@ -28,6 +29,8 @@ struct Primitive {
     Vec3 half;  // box: half its edges, m
     Vec3 normal{0.0, 0.0, 1.0};  // plane: unit, out of the solid half-space, local axes
     std::shared_ptr<const Polytope> hull{};
+    std::shared_ptr<const Mesh> mesh{};
+    int triangle = 0;  // of the mesh
 
     static Primitive sphere(double radius) noexcept { return {ShapeKind::sphere, radius, 0.0, {}, {}, {}}; }
     static Primitive capsule(double radius, double length) noexcept {
@@ -44,6 +47,11 @@ struct Primitive {
     static Primitive plane(Vec3 normal) noexcept { return {ShapeKind::plane, 0.0, 0.0, {}, normal, {}}; }
     static Primitive convex(std::shared_ptr<const Polytope> hull) noexcept {
         return {ShapeKind::hull, 0.0, 0.0, {}, {}, std::move(hull)};
+    }
+    static Primitive sheet(std::shared_ptr<const Mesh> mesh, int triangle) noexcept {
+        Primitive made{ShapeKind::triangle, 0.0, 0.0, {}, {}, {}};
+        made.mesh = std::move(mesh), made.triangle = triangle;
+        return made;
     }
     /// Whether its surface is flat faces: it has corners, and sides that others can meet.
     bool faceted() const noexcept { return kind == ShapeKind::box || kind == ShapeKind::hull; }

@@ -189,7 +189,8 @@ double volume(const Primitive& shape) noexcept {
         case ShapeKind::hull: return shape.hull->volume;
         case ShapeKind::cone: return kPi * r * r * shape.half_length * 2.0 / 3.0;
         case ShapeKind::cylinder: return 2.0 * kPi * r * r * shape.half_length;
-        case ShapeKind::plane: return 0.0;
+        case ShapeKind::plane:
+        case ShapeKind::triangle: return 0.0;
     }
     return 0.0;
 }
@@ -225,7 +226,8 @@ double shadow(const Primitive& shape, const Pose& at, Vec3 direction) noexcept {
                 area += 0.5 * std::abs(dot(face.normal, d)) * face.area;
             return area;
         }
-        case ShapeKind::plane: return 0.0;
+        case ShapeKind::plane:
+        case ShapeKind::triangle: return 0.0;
     }
     return 0.0;
 }
@@ -239,7 +241,8 @@ Submerged submerged(const Primitive& shape, const Pose& at, Vec3 up, double leve
         case ShapeKind::capsule: return slices_below(shape, at, up, height);
         case ShapeKind::box: return box_below(shape.half, at, up, height);
         case ShapeKind::hull: return hull_below(*shape.hull, at, up, height);
-        case ShapeKind::plane: break;
+        case ShapeKind::plane:
+        case ShapeKind::triangle: break;
     }
     return {0.0, at.position};
 }

@@ -8,6 +8,7 @@
 #include "collision/frustum.hpp"
 #include "collision/segment.hpp"
 #include "collision/solid_pairs.hpp"
+#include "collision/triangle.hpp"
 #include "linear/elementary.hpp"
 
 namespace spook {
@@ -129,6 +130,13 @@ Separation separation(const Primitive& first, const Pose& at_first, const Primit
         Separation swapped = separation(second, at_second, first, at_first);
         swapped.normal = -swapped.normal;
         return swapped;
+    }
+    if (second.kind == ShapeKind::triangle) {
+        if (first.kind == ShapeKind::plane) return {1e300, {0.0, 0.0, 1.0}};  // both are fixed
+        const Triangle triangle(second, at_second);
+        const PartingAxis best = first.has_rims() ? parting_axes(triangle, Frustum(first, at_first)).all
+                                                  : parting_axes(triangle, Facets(first, at_first)).all;
+        return {best.gap, best.normal};
     }
     if (second.kind == ShapeKind::plane) return from_plane(first, at_first, second, at_second);
     if (second.has_rims() && !(first.kind == ShapeKind::sphere && second.kind == ShapeKind::cylinder)) {

@@ -123,8 +123,11 @@ void ContactStage::find_open() {
         detection_.touch(pair, reach, scratch_);
         const bool touching =
             std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
-        // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner.
-        const bool solids = first.shape.faceted() && second.shape.faceted();
+        // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
+        // where a triangle's neighbour comes first.
+        const bool solids = (first.shape.faceted() && second.shape.faceted()) ||
+                            first.shape.kind == ShapeKind::triangle ||
+                            second.shape.kind == ShapeKind::triangle;
         if (!touching) {
             if (!scratch_.empty() || solids) open_.push_back(open);
             continue;

@@ -1,0 +1,360 @@
+"""Meshes and height fields: seams are not felt, ridges and tips are met, distances as a search finds them, refusals."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from spook_tracker.engine import (
+    Box,
+    Capsule,
+    Compound,
+    Cone,
+    ContactCount,
+    ContactForce,
+    ConvexHull,
+    Cylinder,
+    Final,
+    HeightField,
+    Material,
+    Maximum,
+    Part,
+    Penetration,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    SceneError,
+    Shape,
+    Sphere,
+    Trace,
+    TriangleMesh,
+    Velocity,
+    simulate,
+)
+
+H = 1.0 / 60.0
+SMOOTH, ROUGH = Material(), Material(friction=0.5)
+OCTAHEDRON = ConvexHull(((0.4, 0, 0), (-0.4, 0, 0), (0, 0.4, 0), (0, -0.4, 0), (0, 0, 0.3), (0, 0, -0.3)))
+SLIDERS: dict[str, tuple[Shape, float]] = {  # and how high their centre lies
+    "ball": (Sphere(0.3), 0.3),
+    "box": (Box((0.6, 0.4, 0.5)), 0.25),
+    "capsule": (Capsule(0.2, 0.6), 0.5),
+    "can": (Cylinder(0.25, 0.4), 0.2),
+    "cone": (Cone(0.3, 0.4), 0.1),
+    "hull": (OCTAHEDRON, 0.3),
+}
+
+
+def sheet(shape: Shape, material: Material = ROUGH, **fields: Any) -> RigidBody:
+    given = {"motion": "static", "shape": shape, "position": (0.0, 0.0, 0.0), "material": material}
+    return RigidBody(name="sheet", **(given | fields))
+
+
+def body(shape: Shape, material: Material = ROUGH, **fields: Any) -> RigidBody:
+    given = {"mass": 2.0, "shape": shape, "inertia": (0.1, 0.1, 0.1), "material": material}
+    return RigidBody(name="body", **(given | fields))
+
+
+def quaternion(turn: Rotation) -> tuple[float, float, float, float]:
+    w, x, y, z = turn.as_quat(scalar_first=True)
+    return (float(w), float(x), float(y), float(z))
+
+
+def run(*bodies: RigidBody, steps: int, gravity: Any = (0.0, 0.0, -10.0), **observe: Any) -> Any:
+    return simulate(Scene(bodies=bodies, gravity=gravity), time_step=H, steps=steps, observe=observe)
+
+
+def flat(cells: int = 9, size: float = 0.37) -> HeightField:
+    return HeightField((size, size), ((0.0,) * (cells + 1),) * (cells + 1))
+
+
+def scattered(seed: int) -> TriangleMesh:
+    """A flat floor of triangles of all sizes and directions, from −3 to 3."""
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(seed)
+    points = np.vstack((rng.uniform(-3.0, 3.0, (60, 2)), list(itertools.product((-3.0, 3.0), repeat=2))))
+    faces = []
+    for a, b, c in Delaunay(points).simplices:
+        turns = np.cross(np.append(points[b] - points[a], 0), np.append(points[c] - points[a], 0))[2]
+        if abs(turns) > 1e-6:
+            faces.append((int(a), int(b), int(c)) if turns > 0 else (int(a), int(c), int(b)))
+    return TriangleMesh(tuple((float(x), float(y), 0.0) for x, y in points), tuple(faces))
+
+
+# --- seams ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_sliding_over_seams_of_a_flat_mesh_it_keeps_its_velocity_to_rounding(slider: str) -> None:
+    shape, height = SLIDERS[slider]
+    moving = body(shape, SMOOTH, position=(-1.5, -0.4, height), velocity=(2.0, 0.7, 0.0))
+    found = run(
+        sheet(scattered(3), SMOOTH),
+        moving,
+        steps=90,
+        v=Trace(quantity=Velocity("body")),
+        x=Final(quantity=Position("body")),
+    )
+
+    np.testing.assert_allclose(found["v"], np.broadcast_to((2.0, 0.7, 0.0), found["v"].shape), atol=1e-12)
+    np.testing.assert_allclose(found["x"], (1.5, 0.65, height), atol=1e-9)
+
+
+@pytest.mark.parametrize("slider", ["ball", "box", "can"])
+def test_what_slides_or_rolls_with_friction_moves_as_on_a_plane(slider: str) -> None:
+    shape, height = SLIDERS[slider]
+    moving = body(shape, position=(-1.5, -0.4, height), velocity=(2.0, 0.7, 0.0))
+    plane = RigidBody(name="sheet", motion="static", shape=Plane(), position=(0, 0, 0), material=ROUGH)
+    one, other = (
+        run(
+            ground,
+            moving,
+            steps=90,
+            x=Trace(quantity=Position("body")),
+            f=Final(quantity=ContactForce("body")),
+        )
+        for ground in (sheet(scattered(4)), plane)
+    )
+
+    np.testing.assert_allclose(one["x"], other["x"], atol=1e-9)
+    np.testing.assert_allclose(one["f"], other["f"], atol=1e-6)
+
+
+def test_a_box_on_many_triangles_stands_on_its_four_corners() -> None:
+    moving = body(Box((1.1, 0.9, 0.5)), position=(1.63, 1.7, 0.25))
+    found = run(
+        sheet(flat()),
+        moving,
+        steps=60,
+        x=Final(quantity=Position("body")),
+        n=Final(quantity=ContactCount()),
+        force=Final(quantity=ContactForce("body")),
+    )
+
+    assert float(found["n"]) == 4
+    np.testing.assert_allclose(found["x"], (1.63, 1.7, 0.25), atol=1e-9)
+    np.testing.assert_allclose(found["force"], (0, 0, 20.0), atol=1e-7)
+
+
+# --- distances ------------------------------------------------------------------------------------------
+
+
+def hills(seed: int, height: float = 0.3) -> HeightField:
+    rng = np.random.default_rng(seed)
+    return HeightField(
+        (0.5, 0.4), tuple(tuple(float(z) for z in row) for row in rng.uniform(0, height, (8, 8)))
+    )
+
+
+def nearest(mesh: HeightField | TriangleMesh, p: Any) -> float:
+    """Distance to the nearest of all triangles, by projecting to the face, the three sides and the three corners."""
+    best = math.inf
+    for face in mesh.faces:
+        a, b, c = (np.array(mesh.corners[k]) for k in face)
+        normal = np.cross(b - a, c - a)
+        weights = np.linalg.solve(np.column_stack((b - a, c - a, normal)), p - a)
+        if weights[0] >= 0 and weights[1] >= 0 and weights[0] + weights[1] <= 1:
+            best = min(best, abs(weights[2]) * float(np.linalg.norm(normal)))
+        for u, v in ((a, b), (b, c), (c, a)):
+            t = min(1.0, max(0.0, float((p - u) @ (v - u) / ((v - u) @ (v - u)))))
+            best = min(best, float(np.linalg.norm(p - u - t * (v - u))))
+    return best
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_ball_over_hills_is_as_deep_as_the_nearest_point_is_near(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    field = hills(seed)
+    p = np.array((*rng.uniform(0.8, 2.2, 2), rng.uniform(0.4, 0.8)))
+    distance = nearest(field, p)
+    for deeper in (1e-3, -1e-3, 0.05):
+        ball = body(Sphere(distance + deeper), position=tuple(p))
+        found = run(sheet(field), ball, steps=1, gravity=(0, 0, 0), d=Maximum(quantity=Penetration()))
+
+        assert float(found["d"]) == pytest.approx(max(0.0, deeper), abs=1e-9)
+
+
+CUBE = TriangleMesh(
+    tuple((0.5 * x, 0.4 * y, 0.6 * z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)),
+    tuple(
+        face
+        for a, b, c, d in ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        for face in ((a, b, c), (a, c, d))
+    ),
+)
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mesh_round_a_box_is_met_as_the_box_is(slider: str, seed: int) -> None:
+    """Overlapping a little, from any side: faces, edges and corners."""
+    rng = np.random.default_rng(100 * seed + list(SLIDERS).index(slider))
+    shape, solid = SLIDERS[slider][0], Box((1.0, 0.8, 1.2))
+    away = rng.standard_normal(3)
+    away /= np.linalg.norm(away)
+    turn = quaternion(Rotation.random(rng=rng))
+
+    def depth(fixed: Shape, distance: float) -> float:
+        moving = body(shape, position=tuple(distance * away), orientation=turn)
+        found = run(sheet(fixed), moving, steps=1, gravity=(0, 0, 0), d=Maximum(quantity=Penetration()))
+        return float(found["d"])
+
+    low, high = 0.0, 3.0
+    for _ in range(40):  # where they touch
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if depth(solid, middle) > 0.0 else (low, middle)
+
+    assert depth(CUBE, high + 1e-6) == 0.0
+    for closer in (1e-4, 1e-3):
+        assert depth(CUBE, low - closer) == pytest.approx(depth(solid, low - closer), rel=1e-3, abs=1e-8)
+
+
+# --- valleys, ridges, flight ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("angle", [0.3, 0.8])
+def test_a_ball_in_a_valley_presses_on_both_sides(angle: float) -> None:
+    """Without friction each side carries m g/(2 cos θ); along the valley nothing holds it."""
+    slope = math.tan(angle)
+    valley = HeightField((1.0, 0.7), ((slope,) * 6, (0.0,) * 6, (slope,) * 6))
+    ball = body(Sphere(0.2), SMOOTH, position=(1.0, 1.0, 0.2 / math.cos(angle)), velocity=(0.0, 0.5, 0.0))
+    found = run(
+        sheet(valley, SMOOTH),
+        ball,
+        steps=90,
+        x=Final(quantity=Position("body")),
+        v=Trace(quantity=Velocity("body")),
+        n=Final(quantity=ContactCount()),
+    )
+
+    np.testing.assert_allclose(found["x"], (1.0, 1.75, 0.2 / math.cos(angle)), atol=1e-8)
+    np.testing.assert_allclose(found["v"], np.broadcast_to((0, 0.5, 0), found["v"].shape), atol=1e-11)
+    assert 2 <= float(found["n"]) <= 4
+
+
+def test_a_plank_lies_on_two_tips() -> None:
+    """Tips under a face, away from all its corners and edges: statics gives each its share."""
+    tip = TriangleMesh(
+        ((0.1, 0.1, 0), (-0.1, 0.1, 0), (-0.1, -0.1, 0), (0.1, -0.1, 0), (0, 0, 0.5)),
+        ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    )
+    tips = [
+        RigidBody(name=f"tip {k}", motion="static", shape=tip, position=(x, y, 0.0), material=ROUGH)
+        for k, (x, y) in enumerate(((-0.5, -0.3), (-0.5, 0.3), (0.8, 0.0)))
+    ]
+    plank = body(Box((3.0, 1.0, 0.1)), position=(0.0, 0.0, 0.55))
+    observe = {f"f{k}": Final(quantity=ContactForce(f"tip {k}")) for k in range(3)}
+    found = run(*tips, plank, steps=60, x=Final(quantity=Position("body")), **observe)
+
+    np.testing.assert_allclose(found["x"], (0, 0, 0.55), atol=1e-8)
+    shares = [-float(found[f"f{k}"][2]) for k in range(3)]
+    assert shares == pytest.approx([20 * 0.8 / 1.3 / 2] * 2 + [20 * 0.5 / 1.3], rel=1e-6)
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+@pytest.mark.parametrize("speed", [10.0, 200.0])
+def test_nothing_falls_through_at_any_speed(slider: str, speed: float) -> None:
+    rng = np.random.default_rng(list(SLIDERS).index(slider))
+    moving = body(
+        SLIDERS[slider][0],
+        SMOOTH,
+        inertia=(1e3, 1e3, 1e3),
+        position=(1.71, 1.43, 3.0),
+        orientation=quaternion(Rotation.random(rng=rng)),
+        velocity=(0.0, 0.0, -speed),
+    )
+    found = run(
+        sheet(hills(1), SMOOTH),
+        moving,
+        steps=30,
+        gravity=(0, 0, 0),
+        x=Final(quantity=Position("body")),
+        d=Maximum(quantity=Penetration()),
+    )
+
+    assert float(found["x"][2]) > 0.0
+    assert float(found["d"]) < 0.05
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_dropped_on_hills_it_comes_to_rest_carried(slider: str) -> None:
+    moving = body(SLIDERS[slider][0], Material(friction=0.9), position=(1.7, 1.4, 0.9))
+    found = run(
+        sheet(hills(2, 0.2), Material(friction=0.9)),
+        moving,
+        steps=120,
+        x=Final(quantity=Position("body")),
+        d=Maximum(quantity=Penetration()),
+    )
+
+    assert float(found["x"][2]) > 0.05 or slider in (
+        "ball",
+        "cone",
+        "capsule",
+        "can",
+    )  # round ones may roll off the rim
+    assert float(found["d"]) < 5e-3
+
+
+def test_from_below_it_is_not_there() -> None:
+    moving = body(Sphere(0.2), position=(1.5, 1.5, -1.0), velocity=(0, 0, 3.0))
+    found = run(sheet(flat()), moving, steps=30, gravity=(0, 0, 0), v=Final(quantity=Velocity("body")))
+
+    assert float(found["v"][2]) == 3.0
+
+
+# --- refusals -------------------------------------------------------------------------------------------
+
+SQUARE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("corners", "faces", "words"),
+    [
+        (SQUARE, (), "at least one triangle"),
+        (SQUARE, ((0, 1, 2), (0, 1, 3)), "from corner 0 to 1"),
+        (SQUARE, ((0, 1, 1),), "triangle 0 has no area"),
+        ((*SQUARE, (2.0, 0.0, 0.0)), ((0, 1, 4),), "triangle 0 has no area"),
+        (SQUARE, ((0, 1, 4),), "three indices of its 4 corners"),
+        (SQUARE, ((0, 1),), "three indices"),
+        (SQUARE, ((0, 1.5, 2),), "three indices"),
+        (((0, 0, math.nan), *SQUARE), ((0, 1, 2),), "corners"),
+        ("corners", ((0, 1, 2),), "must be a list"),
+    ],
+)
+def test_a_mesh_that_cannot_be_is_refused_in_a_sentence(corners: Any, faces: Any, words: str) -> None:
+    with pytest.raises(SceneError, match=words) as caught:
+        TriangleMesh(corners, faces)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "heights", "words"),
+    [
+        ((1, 1), ((0, 0),), "two rows"),
+        ((1, 1), ((0, 0), (0, 0, 0)), "two rows"),
+        ((0, 1), ((0, 0), (0, 0)), "spacing"),
+        (1.0, ((0, 0), (0, 0)), "two numbers"),
+        ((1, 1), ((0, math.inf), (0, 0)), "heights"),
+    ],
+)
+def test_a_height_field_that_cannot_be_is_refused_in_a_sentence(
+    spacing: Any, heights: Any, words: str
+) -> None:
+    with pytest.raises(SceneError, match=words):
+        HeightField(spacing, heights)
+
+
+def test_a_mesh_is_fixed_and_no_part_of_a_compound() -> None:
+    for motion in ("dynamic", "kinematic"):
+        with pytest.raises(SceneError, match=r"'sheet'.*make the body static"):
+            sheet(flat(), motion=motion, mass=1.0, inertia=(1, 1, 1))
+    with pytest.raises(SceneError, match="part must be a bounded shape"):
+        Compound((Part(shape=flat()),))
