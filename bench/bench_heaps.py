@@ -17,6 +17,7 @@ import numpy as np
 
 from spook_tracker.engine import (
     Box,
+    Capsule,
     ContactCount,
     ContactForce,
     Final,
@@ -30,6 +31,7 @@ from spook_tracker.engine import (
     Shape,
     Sphere,
     compile,
+    start,
 )
 
 TIME_STEP = 1.0 / 60.0  # s
@@ -40,6 +42,8 @@ GROWTH = 1.6  # × the cost per contact of the smallest heap: what sorting pairs
 REST = 0.5  # × one step of a stack that is hit: at rest no matrix is factored
 TALL = 1.6  # × the cost per box of a stack of 100, for one of 500 at rest
 BALL = Sphere(0.25)
+MIXED = 25.0  # × the median step by 50 sweeps: 64 mixed bodies, solved directly; the aim is 6
+WORST = 10.0  # × the median of the direct steps, in any step
 OVERLAP = 1e-3  # m, what heaps of spheres are compared at
 
 
@@ -141,6 +145,58 @@ def direct_at_rest() -> bool:
     return rest <= REST * hit and tall / 500 <= TALL * rest / 100
 
 
+def mixed(count: int) -> Scene:
+    """Balls, boxes and capsules in turn, in layers of a square grid."""
+    rng = np.random.default_rng(3)
+    shapes: tuple[Shape, ...] = (Sphere(0.25), Box((0.4, 0.4, 0.4)), Capsule(0.15, 0.4))
+    bodies = [GROUND]
+    for k in range(count):
+        dx, dy = rng.uniform(-0.05, 0.05, 2)
+        place = (0.7 * (k % 4) + dx, 0.7 * (k // 4 % 4) + dy, 0.5 + 0.7 * (k // 16))
+        bodies.append(RigidBody(name=f"b{k}", mass=1.0, shape=shapes[k % 3], position=place, material=ROUGH))
+    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def overhang(count: int, part: float) -> Scene:
+    """Plates of 1 × 1 × .1 m on a table, each out by `part` of the harmonic overhang."""
+    table = RigidBody(
+        name="table", motion="static", shape=Box((2.0, 2.0, 1.0)), position=(-1.0, 0.0, 0.5), material=ROUGH
+    )
+    bodies, edge = [GROUND, table], 0.0
+    for k in range(count):
+        edge += part * 0.5 / (count - k)
+        place = (edge - 0.5, 0.0, 1.05 + 0.1 * k)
+        bodies.append(
+            RigidBody(name=f"p{k}", mass=1.0, shape=Box((1.0, 1.0, 0.1)), position=place, material=ROUGH)
+        )
+    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def steps_of(scene: Scene, steps: int, method: Method) -> list[float]:
+    """CPU seconds of each step."""
+    costs = []
+    with start(scene, time_step=TIME_STEP, method=method) as held:
+        for _ in range(steps):
+            begin = time.process_time()
+            held.step()
+            costs.append(time.process_time() - begin)
+    return costs
+
+
+def unlike_bodies(steps: int) -> bool:
+    """64 mixed bodies and a fallen overhang, solved directly: step by step, against sweeps over the same bodies."""
+    print(f"direct, step by step: at most {MIXED} × the median by 50 sweeps, {WORST} × its own in any step")
+    swept = float(np.median(steps_of(mixed(64), steps, Method(solver="iterative"))))
+    direct = steps_of(mixed(64), steps, Method())
+    middle, worst = float(np.median(direct)), max(direct)
+    print(f"  64 mixed bodies: {1e3 * middle:.2f} ms, worst {1e3 * worst:.1f}; by sweeps {1e3 * swept:.2f}")
+    fallen = steps_of(overhang(10, 1.01), 2 * steps, Method())
+    print(
+        f"  ten plates: worst {1e3 * max(fallen):.1f} ms, at the end {1e3 * float(np.median(fallen[-60:])):.2f}"
+    )
+    return middle <= MIXED * swept and worst <= WORST * middle
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--largest", type=int, default=10_000, help="largest heap (default 10000)")
@@ -150,6 +206,7 @@ def main() -> int:
         "1000 spheres within the overlap": at_equal_overlap(given.steps),
         "cost per contact grows little": growth(given.largest, max(20, given.steps // 4)),
         "rest is cheap, and linear": direct_at_rest(),
+        "bodies of every shape are solved directly": unlike_bodies(given.steps),
     }
     for claim, kept in claims.items():
         print(f"{'kept' if kept else 'NOT KEPT'}: {claim}")

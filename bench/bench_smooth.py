@@ -4,18 +4,34 @@
 
 Each line is a method and a time step whose error is looked at first, against the scene's closed form. A limit is a
 time on the machine of the other engines' tables over the time of a plain step there: door 0.98 µs, top 0.59 µs, forty
-four-bars 74 µs.
+four-bars 74 µs. Where MuJoCo is installed, the same scene by its Runge-Kutta stands below: its error, its processor
+time, and that over ours.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Program, Scene, Trace, compile, simulate
+from spook_tracker.engine import (
+    PLAIN,
+    EngineError,
+    Method,
+    Position,
+    Program,
+    Result,
+    Scene,
+    Trace,
+    compile,
+    simulate,
+)
+from spook_tracker.engine.find import find
 from spook_tracker.scalar_tests import spinning_top, swinging_door
+from spook_tracker.scalar_tests.case import Simulate
 from spook_tracker.scalar_tests.multibody import four_bars
 
 ORDER6, ORDER8 = Method(composition="order6"), Method(composition="order8")
@@ -28,16 +44,18 @@ class Row:
 
     name: str
     scene: Callable[[float], Scene]
-    error: Callable[[float, Method], float]
+    error: Callable[..., float]  # of a time step, a method and who simulates
     target: float  # rad or m
     method: Method
     per_second: float
     seconds: float  # simulated
     limit: float  # plain steps
     plain_step: float  # s
+    peer: str = "rk4"  # how MuJoCo is asked, and with how many steps a second
+    peer_per_second: float = 60.0
 
 
-def bars_error(time_step: float, method: Method) -> float:
+def bars_error(time_step: float, method: Method, simulate: Simulate = simulate) -> float:
     """Largest error of the angle of forty four-bars in 10 s [rad]."""
     observe = {"side": Trace(quantity=Position("side 0"))}
     built = four_bars.scene(four_bars.MANY, time_step)
@@ -50,11 +68,11 @@ def bars_error(time_step: float, method: Method) -> float:
     return float(np.abs(np.arctan2(turned, np.sum(found * right, axis=1))).max())
 
 
-def door_error(time_step: float, method: Method) -> float:
+def door_error(time_step: float, method: Method, simulate: Simulate = simulate) -> float:
     return swinging_door.ladder_error(simulate, time_step, method)
 
 
-def top_error(time_step: float, method: Method) -> float:
+def top_error(time_step: float, method: Method, simulate: Simulate = simulate) -> float:
     return spinning_top.ladder_error(simulate, time_step, method)
 
 
@@ -65,14 +83,64 @@ def many(time_step: float) -> Scene:
 ROWS = (
     Row("door to 4e-7 rad", swinging_door.scene, door_error, 4e-7, ORDER8, 9, 10.0, 1500.0, 1 / 4000),
     Row("top to 1e-5 m", spinning_top.scene, top_error, 1e-5, ORDER6, 26, 20.0, 5100.0, 1 / 4000),
-    Row("top to 1e-10 m", spinning_top.scene, top_error, 1e-10, ORDER8, 48, 20.0, 34000.0, 1 / 4000),
-    Row("40 four-bars to 1.8e-5 rad", many, bars_error, 1.8e-5, ORDER8, 9.6, 10.0, 1340.0, 1 / 1000),
+    Row(
+        "top to 1e-10 m",
+        spinning_top.scene,
+        top_error,
+        1e-10,
+        ORDER8,
+        48,
+        20.0,
+        34000.0,
+        1 / 4000,
+        "rk4",
+        250.0,
+    ),
+    Row(
+        "40 four-bars to 1.8e-5 rad",
+        many,
+        bars_error,
+        1.8e-5,
+        ORDER8,
+        9.6,
+        10.0,
+        1340.0,
+        1 / 1000,
+        "rk4",
+        250.0,
+    ),
 )
 
 
 def least(program: Program, steps: int) -> float:
     """Processor time of a run [s]."""
     return program.run(steps).cpu_seconds
+
+
+def beside(row: Row, ours: float) -> str:
+    """The other engine's line, or why there is none. `ours` [s]."""
+    try:
+        engine = find("mujoco")
+        h, steps = 1.0 / row.peer_per_second, round(row.seconds * row.peer_per_second)
+
+        def asked(scene: Scene, **options: Any) -> Result:
+            result: Result = engine.simulate(scene, configuration=row.peer, **options)
+            return result
+
+        def cost(count: int) -> float:
+            begun = time.process_time()
+            asked(row.scene(h), time_step=h, steps=count)
+            return time.process_time() - begun
+
+        error = row.error(h, PLAIN, asked)
+        times = [(cost(steps), cost(1)) for _ in range(2)]
+    except EngineError as why:
+        return f"MuJoCo: {why}"
+    whole, setup = (min(column) for column in zip(*times, strict=True))
+    taken = whole - setup
+    return f"MuJoCo {row.peer}, 1/{row.peer_per_second:g} s".ljust(28) + (
+        f" {error:9.1e} {1e3 * taken:8.2f} {taken / ours:8.1f} × ours"
+    )
 
 
 def main() -> None:
@@ -98,6 +166,7 @@ def main() -> None:
             f"  {1e3 * each:8.4f} {1e3 * (whole - steps * each):7.3f}  {'' if within else 'MISSED'}",
             flush=True,
         )
+        print(f"    {beside(row, whole)}", flush=True)
     if missed:
         raise SystemExit(1)
 

@@ -55,6 +55,11 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "masonry_arch": "masonry_arch",
     "vehicle": "vehicle",
     "rolling_coin": "rolling_coin",
+    "slider_crank": "slider_crank",
+    "seams": "seams",
+    "grasp": "grasp",
+    "hanging_cable": "hanging_cable",
+    "rocking_block": "rocking_block",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

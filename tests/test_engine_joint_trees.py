@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spook_tracker import engine
 from spook_tracker.engine import (
     WORLD,
+    AngularMomentum,
     AngularVelocity,
     Cylindrical,
     Distance,
@@ -17,6 +19,7 @@ from spook_tracker.engine import (
     Hinge,
     MaximumAbsolute,
     Method,
+    Momentum,
     Orientation,
     Particle,
     Planar,
@@ -66,7 +69,14 @@ def hung(*kinds: str, twice: bool = False) -> Scene:
     return rigid(Scene(bodies=tuple(bodies), constraints=tuple(rows), gravity=rigid_scenes.GRAVITY))
 
 
+def floating(*kinds: str) -> Scene:
+    """The same tree with nothing that holds it to the world."""
+    scene = hung(*kinds)
+    return dataclasses.replace(scene, constraints=scene.constraints[1:])
+
+
 SCENES = {
+    "what floats": floating("ball", "hinge", "prismatic", "ball"),
     "hinges": hung("hinge", "hinge", "hinge", "hinge"),
     "every joint": hung("prismatic", "ball", "hinge", "lock", "ball"),
     "a hinge too many": hung("hinge", "ball", "prismatic", twice=True),
@@ -88,6 +98,37 @@ def test_joint_coordinates_take_the_dense_steps(name: str) -> None:
         for quantity, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
             assert np.abs(run[quantity][k] - exact).max() < 1e-9, quantity
         assert np.abs(same * run["q"][k] - oracle.q).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("name", "coordinates", "rows"),
+    [("hinges", 4, 0), ("what floats", 11, 0), ("a hinge too many", 5, 0), ("a loop", 5, 4)],
+)
+def test_explain_says_where_joint_coordinates_run(name: str, coordinates: int, rows: int) -> None:
+    program = engine.compile(SCENES[name], time_step=0.02, method=ORDER4)
+    reasons = {choice.stage: choice.reason for choice in program.explain()}
+
+    assert f"{coordinates} joint coordinates, {rows} rows to close loops" in reasons["solve_block"]
+    assert "joint coordinates" in reasons["correct_curvature"]
+    plain = engine.compile(SCENES[name], time_step=0.02)
+    assert not any("joint coordinates" in choice.reason for choice in plain.explain())
+
+
+def test_a_pair_that_floats_keeps_its_momenta_and_its_hinge() -> None:
+    pair = floating("ball", "hinge")
+    quiet = dataclasses.replace(pair, gravity=(0.0, 0.0, 0.0))
+    observe = {
+        "momentum": Trace(quantity=Momentum()),
+        "turning": Trace(quantity=AngularMomentum()),
+        "hinge": MaximumAbsolute(quantity=Violation(pair.constraints[0].name)),
+    }
+
+    run = simulate(quiet, time_step=0.05, steps=200, method=Method(composition="order8"), observe=observe)
+
+    for kept in ("momentum", "turning"):
+        assert np.abs(run[kept] - run[kept][0]).max() < 1e-11 * np.abs(run[kept]).max()
+    assert run["hinge"].max() < 1e-13
+    assert run.counters["halved_steps"] == 0
 
 
 @pytest.mark.parametrize("kind", [Cylindrical, Planar, PointOnLine])

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
 from spook_tracker.engine import RigidBody
-from spook_tracker.scalar_tests import masonry_arch, rolling_coin, turntable, vehicle
+from spook_tracker.scalar_tests import (
+    hanging_cable,
+    masonry_arch,
+    rocking_block,
+    rolling_coin,
+    turntable,
+    vehicle,
+)
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 
@@ -122,3 +131,51 @@ def test_an_arch_is_as_thin_as_limit_analysis_allows() -> None:
         assert masonry_arch.LEAST[count] == pytest.approx(least_thickness(count), abs=5e-7)
         thrust = arch_statics(count, 1.02 * masonry_arch.LEAST[count])
         assert thrust == pytest.approx(masonry_arch.THRUST[count], abs=2e-5)
+
+
+def test_the_rocking_block_by_angular_momentum_and_a_tight_integration() -> None:
+    """Angular momentum about the new corner, from positions and velocities; times by events of an integration."""
+    r = rocking_block
+    inertia = r.MASS * ((2 * r.HALF_WIDTH) ** 2 + (2 * r.HALF_HEIGHT) ** 2) / 12.0
+    # Turning at 1 rad/s about the left corner; the centre stands (b, h) from it, and (−b, h) from the right one.
+    moving = np.array((r.HALF_HEIGHT, -r.HALF_WIDTH))
+    kept = inertia + r.MASS * (r.HALF_HEIGHT * moving[0] - (-r.HALF_WIDTH) * moving[1])
+    assert kept / (inertia + r.MASS * r.RADIUS**2) == pytest.approx(r.KEPT, rel=1e-12)
+
+    def fall(_: float, y: np.ndarray) -> tuple[float, float]:
+        return y[1], -(r.RATE**2) * math.sin(r.SLENDER - y[0])
+
+    def upright(_: float, y: np.ndarray) -> float:
+        return float(y[0])
+
+    def turning(_: float, y: np.ndarray) -> float:
+        return float(y[1])
+
+    upright.terminal, turning.terminal, turning.direction = True, True, -1  # type: ignore[attr-defined]
+    tight = {"rtol": 1e-11, "atol": 1e-13}
+    down = solve_ivp(fall, (0.0, 5.0), (r.START, 0.0), events=upright, **tight)
+    assert down.t[-1] == pytest.approx(r.quarter(r.START), rel=1e-8)
+    assert -down.y[1, -1] == pytest.approx(r.speed(r.START), rel=1e-8)
+    up = solve_ivp(fall, (0.0, 5.0), (0.0, -r.KEPT * down.y[1, -1]), events=turning, **tight)
+    assert up.y[0, -1] == pytest.approx(r.next_lean(), rel=1e-7)
+    assert up.t[-1] == pytest.approx(r.quarter(r.next_lean()), rel=1e-7)
+
+
+@pytest.mark.parametrize(("count", "time_step"), hanging_cable.ASKED)
+def test_every_link_of_the_hanging_cable_is_balanced(count: int, time_step: float) -> None:
+    """Forces passed on from link to link, and moments about each link's left end; the last ends at the other support."""
+    c = hanging_cable
+    places, weight, pull = np.array(c.nodes(count)), c.MASS * c.GRAVITY / count, c.horizontal(count)
+    held = 0.5 * c.MASS * c.GRAVITY  # upwards at the left end
+    for (x, z), (u, w) in itertools.pairwise(places):
+        right = held - weight  # passed on to the next link, upwards
+        # About the left end: the weight in the middle, and at the right end H to the right and `right` downwards.
+        assert -0.5 * weight * (u - x) - right * (u - x) - pull * (w - z) == pytest.approx(
+            0.0, abs=1e-9 * pull
+        )
+        held = right
+    assert held == pytest.approx(-0.5 * c.MASS * c.GRAVITY)
+    assert places[-1] == pytest.approx((0.5 * c.SPAN, 0.0), abs=1e-9)
+    assert c.horizontal(400) == pytest.approx(c.catenary(), rel=1e-5)
+    tension = math.hypot(pull, 0.5 * c.MASS * c.GRAVITY)
+    assert tension * time_step**2 / (c.MASS / count * c.LENGTH / count) < 0.15

@@ -20,6 +20,7 @@ from spook_tracker.scalar_tests import (
     motor,
     robot_arm,
     sinking_sphere,
+    slider_crank,
     wires,
 )
 from spook_tracker.scalar_tests.beam import scene as beam
@@ -387,3 +388,32 @@ def test_every_closed_form_of_theory_is_asked_by_a_scalar_test_or_a_test() -> No
     assert [
         name for name in forms if name != "row_coefficients" and not re.search(rf"\b{name}\b", text)
     ] == []
+
+
+def test_the_slider_cranks_torque_by_newton_and_euler() -> None:
+    """Forces at pin and wrist, the guide's and the motor's: six equations of three bodies in the plane."""
+    s = slider_crank
+    for theta in (0.3, 1.0, 2.5, 4.4):
+        rod = (lambda t: s.CRANK * np.cos(t) + 0.5 * s.ROD * np.cos(s.pin(t)[1]), lambda t: 0.5 * s.pin(t)[2])
+        x, y, turn = (
+            s.SPEED**2 * float(s.slope(lambda t, f=f: s.slope(f, t, 1e-3), theta, 1e-3))
+            for f in (*rod, lambda t: -s.pin(t)[1])
+        )
+        slide = s.SPEED**2 * float(s.slope(lambda t: s.slope(lambda u: s.pin(u)[0], t, 1e-3), theta, 1e-3))
+        c, h = s.CRANK * math.cos(theta), s.CRANK * math.sin(theta)
+        a, b = 0.5 * (float(s.pin(theta)[0]) - c), 0.5 * h  # from the rod's middle: the wrist is (a, −b) away
+        # Unknown: P on the rod at the pin, Q on the slider at the wrist, N on the slider, τ on the crank.
+        matrix = np.array(
+            [
+                (1, 0, -1, 0, 0, 0),
+                (0, 1, 0, -1, 0, 0),
+                (-b, -a, -b, -a, 0, 0),
+                (0, 0, 1, 0, 0, 0),
+                (0, 0, 0, 1, 1, 0),
+                (h, -c, 0, 0, 0, 1),
+            ]
+        )
+        inertia = s.ROD_MASS * s.ROD**2 / 12.0
+        right = (s.ROD_MASS * x, s.ROD_MASS * y, inertia * turn, s.SLIDER * slide, 0.0, 0.0)
+
+        assert np.linalg.solve(matrix, right)[5] == pytest.approx(float(s.torque(theta)), rel=1e-6)

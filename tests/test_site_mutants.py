@@ -36,6 +36,7 @@ def test_the_page_names_each_what_was_broken_and_which_test_caught_it(tmp_path: 
     assert page.index('id="sly"') < page.index('id="bold"')
     assert "a hinge pushes the wrong way" in page
     assert 'href="tests/pendulum.html"' in page
+    assert "<bdi>test y</bdi>" in page and "<bdi>tests/test_x.py</bdi>" in page
     assert "&lt;b&gt;nothing&lt;/b&gt; is worse" in page
     assert "<code>cccccccccccc</code>" in page
     assert 'href="mutants.html"' in (tmp_path / "public" / "regressions.html").read_text()

@@ -17,14 +17,20 @@ COLOUR = re.compile("(\x1b\\[(?:0|1|2|3[0-7]|9[0-7])m)")  # what we write oursel
 COMMAND = re.compile(r"(?m)^((?:\s|\x1b\[\d+m)*)(?=::|##\[)")  # a line that a CI service would run
 
 
+class _Seen(dict[int, str]):
+    """What each character is shown as, remembered: most texts have a narrow space or a line's end."""
+
+    def __missing__(self, code: int) -> str:
+        hidden = unicodedata.category(chr(code)) in INVISIBLE and chr(code) not in "\n\t"
+        return self.setdefault(code, "\N{REPLACEMENT CHARACTER}" if hidden else chr(code))
+
+
+_SEEN = _Seen()
+
+
 def clean(text: str) -> str:
     """Text from outside with what cannot be seen made visible: control and direction characters."""
-    if text.isprintable():
-        return text
-    return "".join(
-        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(c) in INVISIBLE and c not in "\n\t" else c
-        for c in text
-    )
+    return text if text.isprintable() else text.translate(_SEEN)
 
 
 def inert(text: str) -> str:

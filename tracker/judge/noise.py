@@ -2,12 +2,13 @@
 
 Usual is the median of the nights that hold, noise their median absolute deviation. What counts is a relative
 change above a floor that follows the noise, and above what the nights that hold have reached themselves: two
-clusters and spikes are learnt. One slow night is only suspected; if the next one holds, it joins
-what is usual. Nights in a row that chance explains too well are suspected as well: every alarm is rarer than `RARE`,
-so that a night with a thousand series stays silent nineteen times in twenty if nothing happened. Smaller changes are found by several nights together (tracker/judge/shifts.py) and stay red until
-the last nights came halfway back. Two fast nights in a row are a new level, so that a slow-down after them is
-seen. A level that was left again twice is one of the machine's: a third visit that is no longer than those
-before is no news. Slow creep is found by the median of the last nights against those at the last release.
+clusters and spikes are learnt. One slow night is only suspected; if the next one holds, it joins what is usual.
+Nights in a row that chance explains too well are suspected as well: every alarm is rarer than `RARE`, so that a
+night with a thousand series stays silent nineteen times in twenty if nothing happened. Smaller changes are found
+by several nights together (tracker/judge/shifts.py) and stay red until the last nights came halfway back. Two
+fast nights in a row are a new level, so that a slow-down after them is seen. A level that was left again twice is
+one of the machine's: a third visit that is no longer than those before is no news. Slow creep is found by the
+median of the last nights against those at the last release, and is red until half of it is gone.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from heapq import nlargest
 from statistics import median
 from typing import TYPE_CHECKING, Literal
 
@@ -108,6 +108,7 @@ class _Walk:
     suspects: list[int] = field(default_factory=list)  # unusual nights in a row, not yet or already red
     gains: list[int] = field(default_factory=list)  # fast nights in a row
     red_since: int | None = None
+    crept: float = 0.0  # the largest drift since it is red; zero while it is not
     shifted: tuple[int, float] | None = None  # the place and the size of a shift that is red
     visited: list[_Visited] = field(default_factory=list)
     staying: list[int] = field(default_factory=list)  # nights in a row at a level that was visited before
@@ -118,7 +119,7 @@ class _Walk:
     def usual_now(self) -> Usual:
         """The level, and what stands clear of it for the worse."""
         if self._told is None or self._told[0] is not self.usual:
-            self._told = self.usual, self._clear(nlargest(2, self.reached))
+            self._told = self.usual, self._clear(_outermost(self.reached))
         return self._told[1]
 
     def night(self, place: int, release: bool, accepted: bool) -> Noisy:
@@ -158,6 +159,7 @@ class _Walk:
         """A level that starts here."""
         self.usual, self.level_since, self.anchor = [place], [place], [place]
         self.suspects, self.gains, self.red_since, self.shifted = [], [], None, None
+        self.crept = 0.0
         self.visited, self.staying = [], []
 
     def _slow(self, place: int, change: float, level: float, accepted: bool) -> Noisy:
@@ -170,11 +172,17 @@ class _Walk:
         if accepted:
             self._begin(place)
             return Noisy(verdict=verdict, state="accepted", against=against)
+        if not confirmed and self.crept:  # red already, and no better for this night
+            return self._drifted(replace(verdict, word="regressed", name="drift"))
         if not confirmed:
             return Noisy(verdict=verdict, state="suspected", against=against)
         if self.red_since is None:
             self.red_since = self.suspects[0]
         return self._red(verdict)
+
+    def _drifted(self, verdict: Verdict) -> Noisy:
+        first = self.anchor
+        return Noisy(verdict=verdict, state="detected", against=first[0], first_bad=first[-1])
 
     def _chance(self, nights: Sequence[int]) -> float:
         """How probable it is that these nights lie so far off by chance: the tail of Student's t.
@@ -184,7 +192,7 @@ class _Walk:
         level, noise = self._spread()
         off = [worse_by(level, self.values[i], self.larger_is_better) for i in nights]
         count = sum(math.isfinite(self.values[i]) for i in self.usual)
-        reached = nlargest(2, self.reached)
+        reached = _outermost(self.reached)
         noise = max(noise, reached[1] / SECOND) if len(reached) > 1 else noise
         if count < FEWEST:
             noise = max(noise, FEW_NIGHTS_FLOOR / SIGMAS)
@@ -279,7 +287,7 @@ class _Walk:
             self._leave(place)
         dismissed = [] if recovered else self.suspects  # what no second night confirmed is noise
         self.suspects, self.red_since = [], None
-        fast = -change > threshold and -change > self._clear(nlargest(2, [-x for x in self.reached]))[1]
+        fast = -change > threshold and -change > self._clear(_outermost([-x for x in self.reached]))[1]
         self.gains = [*self.gains, place] if fast else []
         if self.gains and recovered:
             self.usual, self.level_since = self.usual[-1:], self.usual[-1:]
@@ -287,13 +295,14 @@ class _Walk:
             self.usual, self.level_since = self.gains[:-1], self.gains[:-1]  # two fast nights are a new level
         self._join([*dismissed, place])
         if release and len(self.anchor) >= CREEP:
-            self.anchor = [place]
+            self.anchor, self.crept = [place], 0.0
         elif len(self.anchor) < CREEP:
             self.anchor = [*self.anchor, place]
+        drifted = self.crept > 0.0
         creep = self._creep()
+        recovered = recovered or (drifted and creep is None)
         if creep is not None and not accepted:
-            first = self.anchor
-            return Noisy(verdict=creep, state="detected", against=first[0], first_bad=first[-1])
+            return self._drifted(creep)
         if not fast and not accepted and (together := self._shift()) is not None:
             return together
         faster = Verdict(word="improved", sentence=change_in_words(change)) if fast else None
@@ -348,7 +357,7 @@ class _Walk:
         level, noise = self._spread()
         if not math.isfinite(level):
             return math.inf, FLOOR
-        count = sum(map(math.isfinite, (self.values[i] for i in self.usual)))
+        count = sum(map(math.isfinite, [self.values[i] for i in self.usual]))
         if (count < FEWEST and len(self.reached) < FEWEST) or level == 0.0:
             return level, FEW_NIGHTS_FLOOR
         clear = max(FLOOR, SIGMAS * noise)
@@ -377,10 +386,18 @@ class _Walk:
             return None
         _, threshold = self.usual_now()
         change = worse_by(median(old), median(recent), self.larger_is_better)
-        if change <= threshold or change * median(old) <= self._wanders():
+        enough = min(threshold, 0.5 * self.crept) if self.crept else threshold
+        if change <= enough or (not self.crept and change * median(old) <= self._wanders()):
+            self.crept = 0.0
             return None
+        self.crept = max(self.crept, change)
         words = f"{change_in_words(change)}, little by little since the last release"
         return Verdict(word="regressed", sentence=words, name="drift")
+
+
+def _outermost(reached: Sequence[float]) -> list[float]:
+    """The largest two, the largest first."""
+    return sorted(reached)[:-3:-1]
 
 
 def _level_and_noise(values: Sequence[float]) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from functools import lru_cache
 
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import EngineVersion, Sample, SeriesDefinition
@@ -61,29 +62,37 @@ def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[Series
             grouped.setdefault(place, []).append((definition, sample))
     found = dict(samples)
     for (test, configuration, family), members in grouped.items():
-        facts = [f"{d.key} {d.test_version}" for d, _ in members]
-        version = _hash(*sorted(facts), engine.compiler, engine.flags)
-        answers = _hash(*sorted(f"{d.key} {s.value!r} {s.state_hash}" for d, s in members))
-        for group, (counters, tolerance) in GROUPS.items():
-            done = sum(n for _, s in members for name, n in s.counters.items() if name in counters)
+        facts = tuple(sorted([f"{d.key} {d.test_version}" for d, _ in members]))
+        answers = _hash(*sorted([f"{d.key} {s.value!r} {s.state_hash}" for d, s in members]))
+        for group, (counters, _) in GROUPS.items():
+            done = sum([n for _, s in members for name, n in s.counters.items() if name in counters])
             if not done:
                 continue
-            key = f"{test}/{configuration}/work:{family}:{group}"
-            definition = SeriesDefinition(
-                key=key, test=test, title=members[0][0].title, configuration=configuration,
-                metric=f"work:{family}:{group}", description=f"{group} counted in the {family}", unit="1",
-                role="reported", better="smaller", kind="work", time_step=None, parameters={}, limit=None,
-                limit_source="", set_point=None, set_point_source="", reference=None, tolerance=0.0,
-                relative_tolerance=tolerance, test_version=version,
-            )  # fmt: skip
-            found[key] = (
+            asked = (test, configuration, family, group)
+            definition = _definition(asked, members[0][0].title, facts, engine.compiler, engine.flags)
+            found[definition.key] = (
                 definition,
                 Sample(
-                    series=key, value=Number(done), outcome="value", passed=True, set_point_held=True,
+                    series=definition.key, value=Number(done), outcome="value", passed=True, set_point_held=True,
                     state_hash=answers,
                 ),
             )  # fmt: skip
     return found
+
+
+@lru_cache(maxsize=4096)
+def _definition(
+    place: tuple[str, str, str, str], title: str, facts: tuple[str, ...], compiler: str, flags: str
+) -> SeriesDefinition:
+    """The series of a sum; from night to night it is mostly the same."""
+    test, configuration, family, group = place
+    return SeriesDefinition(
+        key=f"{test}/{configuration}/work:{family}:{group}", test=test, title=title, configuration=configuration,
+        metric=f"work:{family}:{group}", description=f"{group} counted in the {family}", unit="1",
+        role="reported", better="smaller", kind="work", time_step=None, parameters={}, limit=None,
+        limit_source="", set_point=None, set_point_source="", reference=None, tolerance=0.0,
+        relative_tolerance=GROUPS[group][1], test_version=_hash(*facts, compiler, flags),
+    )  # fmt: skip
 
 
 def _hash(*parts: str) -> str:

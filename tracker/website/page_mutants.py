@@ -51,6 +51,10 @@ def mutants_page(mutants: Sequence[Mutant], book: Book) -> Page:
             **msgspec.structs.asdict(mutant),
             "commit": clean(mutant.commit)[:12],
             "state": "pass" if mutant.caught else "fail",
+            "by": mutant.caught_by.rpartition("::")[2].replace("_", " ")
+            if "::" in mutant.caught_by
+            else mutant.caught_by,
+            "file": mutant.caught_by.rpartition("::")[0],
             "address": page_of(mutant.caught_by) if mutant.caught_by in tests else "",
         }
         for mutant in sorted(mutants, key=lambda mutant: mutant.caught)

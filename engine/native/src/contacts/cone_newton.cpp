@@ -13,10 +13,18 @@ namespace {
 constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
 constexpr double known = 1e-13;                     // of a start that is an answer already
 constexpr double refined = 1e-16;                   // of the square of what a direction is to answer
-constexpr int patience = 60;                        // iterations without half the residual, or half the blur
-constexpr double narrow = 0.03;                     // a step so short has left the path
-constexpr double centre = 0.01;                  // of the blur's square: what is left where the path is met
-constexpr double fastest = 1e-3, slowest = 0.9;  // the blur's next part of itself, learnt on the way
+constexpr double start_blur = 0.2;                  // of the largest natural map
+constexpr double nearest = 1.0;  // of the blur: how far units may be from the path, in the mean
+constexpr double narrow = 0.03;  // a step so short has lost the path
+constexpr double loosest_hold = 1e-5, tightest_hold = 1e-10;
+constexpr double behind = 10.0,
+                 slow = 0.1;  // of the blur, and of itself: a residual that holding back leaves
+constexpr double far = 1e-3;  // a residual, of the speeds, from which the path may crawl
+constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
+constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
+constexpr int max_jumps = 10;                    // without half the residual
+constexpr int max_losses = 3;                    // of the path, sought again
+constexpr double back = 10.0;                    //   so many blurs away
 
 }  // namespace
 
@@ -98,12 +106,16 @@ void ConeNewton::connect() {
     }
 }
 
-double ConeNewton::merit(double blur, double length) const {
+/// The square of the smoothed map a part of the way along Newton's direction and the path.
+double ConeNewton::merit(double blur, double length, double along) const {
     double sum = 0.0, map[3];
     for (const ConeUnit& unit : units_) {
         ConeUnit::Vec z = unit.z, u = unit.u;
-        for (int i = 0; i < unit.size; ++i) z[i] += length * unit.dz[i], u[i] += length * unit.du[i];
-        sum += unit.natural(z, u, blur, map);
+        for (int i = 0; i < unit.size; ++i) {
+            z[i] += length * unit.dz[i] + along * unit.tz[i];
+            u[i] += length * unit.du[i] + along * unit.tu[i];
+        }
+        sum += unit.natural(z, u, {blur, hold_}, map);
     }
     return sum;
 }
@@ -113,7 +125,7 @@ ConeNewton::Left ConeNewton::worst() const {
     Left largest;
     double map[3];
     for (const ConeUnit& unit : units_) {
-        const double size = std::sqrt(unit.natural(unit.z, unit.u, 0.0, map));
+        const double size = std::sqrt(unit.natural(unit.z, unit.u, {}, map));
         if (!(size <= largest.map)) largest.map = size;
         if (!(size / unit.root <= largest.speed)) largest.speed = size / unit.root;
     }
@@ -130,7 +142,7 @@ bool ConeNewton::step(const MixedSystem& system, double blur) {
     matrix_.clear();
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
     for (ConeUnit& unit : units_) {
-        unit.linearise(blur, relief);
+        unit.linearise({blur, hold_});
         const int n = unit.size;
         for (const bool column : {true, false}) {
             if ((column ? unit.first : unit.second) < 0) continue;
@@ -155,89 +167,57 @@ bool ConeNewton::step(const MixedSystem& system, double blur) {
     ++factorisations_;
     block_operations_ += static_cast<std::uint64_t>(matrix_.operations());
     if (!matrix_.factor()) return false;
-    return find_direction();
+    return find_directions(blur);
 }
 
-/// dz by generalised conjugate residuals. The factor, with its relief, is the preconditioner, and what each direction
-/// does is measured without it, so the residual falls whatever rounding does to the factor. Where rows are redundant
-/// that takes a few directions more. False if nothing finite was found.
-bool ConeNewton::find_direction() {
+/// Newton's direction, and the path's for the whole blur. False if nothing finite was found.
+bool ConeNewton::find_directions(double blur) {
+    for (ConeUnit& unit : units_) unit.lack = {-unit.map[0], -unit.map[1], -unit.map[2]};
+    if (!answer(&ConeUnit::dz, &ConeUnit::du)) return false;
+    for (ConeUnit& unit : units_) unit.lack = {blur * unit.bend[0], blur * unit.bend[1], blur * unit.bend[2]};
+    return answer(&ConeUnit::tz, &ConeUnit::tu);
+}
+
+/// The dz and du that answer what the units' laws lack, refined while that helps.
+bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du) {
     double asked = 0.0;
     for (ConeUnit& unit : units_) {
-        unit.dz = {};
-        unit.lack = {-unit.map[0], -unit.map[1], -unit.map[2]};
+        unit.*dz = {};
         asked += unit.square(unit.lack);
     }
-    double left = asked;
-    int count = 0, stalled = 0;
-    for (; count < max_directions && left > refined * asked && stalled < 4; ++count) {
-        if (static_cast<int>(directions_.size()) <= count) directions_.emplace_back();
-        Direction& now = directions_[count];
-        now.z.resize(units_.size());
-        now.image.resize(units_.size());
-        precondition(now);
-        image_of(now);
-        for (int k = 0; k < count; ++k) {
-            const Direction& old = directions_[k];
-            double share = 0.0;
-            for (std::size_t i = 0; i < units_.size(); ++i) share += dot(now.image[i], old.image[i]);
-            for (std::size_t i = 0; i < units_.size(); ++i)
-                for (int a = 0; a < 3; ++a)
-                    now.z[i][a] -= share * old.z[i][a], now.image[i][a] -= share * old.image[i][a];
+    double before = asked;
+    for (int round = 0; round < 3; ++round) {
+        image_.assign(mass_factor_.size(), Vec6{});
+        for (ConeUnit& unit : units_) {
+            unit.respond(unit.lack);
+            push(unit, unit.c, image_);
         }
-        double size = 0.0, along = 0.0;
-        for (std::size_t i = 0; i < units_.size(); ++i) {
-            size += dot(now.image[i], now.image[i]);
-            along += dot(now.image[i], units_[i].lack);
-        }
-        if (!std::isfinite(size)) return false;
-        if (size == 0.0) break;
-        const double over = 1.0 / std::sqrt(size);
-        along *= over;
-        const double before = left;
-        left = 0.0;
-        for (std::size_t i = 0; i < units_.size(); ++i) {
-            ConeUnit& unit = units_[i];
-            for (int a = 0; a < 3; ++a) {
-                now.z[i][a] *= over, now.image[i][a] *= over;
-                unit.dz[a] += along * now.z[i][a];
-                unit.lack[a] -= along * now.image[i][a];
+        matrix_.solve(image_[0].data());
+        for (ConeUnit& unit : units_) {
+            const ConeUnit::Vec turn = along(unit, image_);
+            for (int i = 0; i < unit.size; ++i) {
+                double sum = unit.c[i];
+                for (int j = 0; j < unit.size; ++j) sum -= unit.k[unit.size * i + j] * turn[j];
+                unit.c[i] = sum;
             }
+        }
+        velocities_of([](const ConeUnit& unit) { return unit.c; }, image_);
+        double left = 0.0;
+        for (ConeUnit& unit : units_) {
+            const ConeUnit::Vec change = unit.law(unit.c, speed_along(unit, image_, unit.c));
+            for (int i = 0; i < unit.size; ++i) unit.lack[i] -= change[i];
             left += unit.square(unit.lack);
         }
-        stalled = left < 0.5 * before ? 0 : stalled + 1;
+        if (!std::isfinite(left)) return false;
+        if (round > 0 && !(left < before)) break;
+        for (ConeUnit& unit : units_)
+            for (int i = 0; i < unit.size; ++i) (unit.*dz)[i] += unit.c[i];
+        if (left <= refined * asked) break;
+        before = left;
     }
-    velocities_of([](const ConeUnit& unit) { return unit.dz; }, change_);
-    for (ConeUnit& unit : units_) unit.du = speed_along(unit, change_, unit.dz);
+    velocities_of([dz](const ConeUnit& unit) { return unit.*dz; }, change_);
+    for (ConeUnit& unit : units_) unit.*du = speed_along(unit, change_, unit.*dz);
     return true;
-}
-
-/// The dz that answers what the units' laws lack, by the factor.
-void ConeNewton::precondition(Direction& direction) {
-    image_.assign(mass_factor_.size(), Vec6{});
-    for (ConeUnit& unit : units_) {
-        unit.respond(unit.lack, relief);
-        push(unit, unit.c, image_);
-    }
-    matrix_.solve(image_[0].data());
-    for (std::size_t k = 0; k < units_.size(); ++k) {
-        const ConeUnit& unit = units_[k];
-        const ConeUnit::Vec turn = along(unit, image_);
-        direction.z[k] = {};
-        for (int i = 0; i < unit.size; ++i) {
-            double sum = unit.c[i];
-            for (int j = 0; j < unit.size; ++j) sum -= unit.k[unit.size * i + j] * turn[j];
-            direction.z[k][i] = sum;
-        }
-    }
-}
-
-/// What a direction changes in the units' laws, momentum kept to rounding.
-void ConeNewton::image_of(Direction& direction) {
-    std::size_t next = 0;
-    velocities_of([&](const ConeUnit&) { return direction.z[next++]; }, image_);
-    for (std::size_t k = 0; k < units_.size(); ++k)
-        direction.image[k] = units_[k].law(direction.z[k], speed_along(units_[k], image_, direction.z[k]));
 }
 
 /// v ← M⁻¹ Gᵀ z, with z of each unit.
@@ -306,17 +286,37 @@ double ConeNewton::speed_of(const MixedSystem& system) const {
     return speed;
 }
 
-/// The longest of a few steps along Newton's direction that lowers the smoothed map enough, else the best of them.
+/// The next point: on along the path as far as it stays near, else towards it.
 ConeNewton::Search ConeNewton::search(double blur) const {
-    Search found{merit(blur, 0.0), unbounded, 0.0};
-    double length = 1.0;
-    for (int halving = 0; halving < 8; ++halving, length *= 0.5) {
-        const double now = merit(blur, length);
-        if (now < found.after) found.after = now, found.length = length;
-        if (now <= (1.0 - 2e-4 * length) * found.before) break;
+    const double wide = near_ * near_ * static_cast<double>(units_.size());
+    for (const double share : {1e-3, 1e-2, 0.1, 0.3, 0.6, 0.9}) {
+        const double next = share * blur, after = merit(next, 1.0, 1.0 - share);
+        if (after <= wide * next * next) return {next, 1.0, 1.0 - share};
     }
-    if (!(found.after < found.before)) found.length = 0.0;
+    const double before = merit(blur, 0.0, 0.0);
+    double length = 1.0, least = before;
+    Search found{blur, 0.0, 0.0};
+    for (int halving = 0; halving < 8; ++halving, length *= 0.5) {
+        const double now = merit(blur, length, 0.0);
+        if (now < least) least = now, found.length = length;
+        if (now <= (1.0 - 2e-4 * length) * before) break;
+    }
     return found;
+}
+
+/// Takes down where the units stand: they are held there.
+void ConeNewton::hold() {
+    for (ConeUnit& unit : units_) {
+        unit.held = unit.scaled();
+        unit.load = std::abs(unit.held[0]);
+    }
+}
+
+void ConeNewton::move(const MixedSystem& system, const Search& found) {
+    if (!(found.length > 0.0)) return;
+    for (ConeUnit& unit : units_)
+        for (int i = 0; i < unit.size; ++i) unit.z[i] += found.length * unit.dz[i] + found.along * unit.tz[i];
+    measure(system);
 }
 
 ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoint>& points) {
@@ -325,47 +325,56 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     connect();
     speed_ = speed_of(system);
     measure(system);
-    Left left = worst(), best = left;
+    Left best = worst();
     keep();
-    double blur = 0.2 * left.map, met = blur,
-           lowest = blur;  // where the path was met last, and nearest to its end
-    double shrink = fastest;
-    int stalled = 0;
-    const double goal = left.speed > known * speed_ ? tightest * speed_ : unbounded;
-    while (best.speed > goal && report.iterations < max_iterations && stalled < patience) {
+    double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
+    int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
+    near_ = nearest, hold_ = loosest_hold;
+    Left before = best;
+    const double goal = best.speed > known * speed_ ? tightest * speed_ : unbounded;
+    while (best.speed > goal && report.iterations < max_iterations && losses < max_losses) {
         double enough = 1e-12;  // the longer nothing better is found, the less is asked
         for (int k = 0; k < stalled && enough < loosest; ++k) enough *= 10.0;
         if (stalled > 0 && best.speed <= std::min(loosest, enough) * speed_) break;
         Watch::look();
-        for (ConeUnit& unit : units_) unit.kink_share = blur / (blur + std::abs(unit.z[0] / unit.root));
+        hold();
         if (!step(system, blur)) break;
         ++report.iterations;
-        const Search found = search(blur);
-        if (found.length > 0.0) {
-            for (ConeUnit& unit : units_)
-                for (int i = 0; i < unit.size; ++i) unit.z[i] += found.length * unit.dz[i];
-            measure(system);
-            left = worst();
-        }
-        stalled = left.speed < 0.5 * best.speed ? 0 : stalled + 1;
+        const Search found = jumps >= 0 ? Search{0.0, 1.0, 0.0} : search(blur);
+        move(system, found);
+        const Left left = worst();
+        stalled = left.speed < 0.5 * best.speed || found.along > 0.3 ? 0 : stalled + 1;
         if (left.speed < best.speed) {
             best = left;
             keep();
         }
-        if (found.length < narrow) {  // off the path: back towards where it was met, then less far at once
-            shrink = std::min(std::sqrt(shrink), slowest);
-            blur = blur < met ? shrink * met : 2.0 * blur;
-            met = std::max(met, blur);
+        // Far behind the blur: what is held back is all that is left.
+        if (left.map > behind * found.blur && left.map > slow * before.map)
+            hold_ = std::max(0.1 * hold_, tightest_hold);
+        before = left;
+        if (found.along > 0.0) {
+            met = found.blur;
+            for (ConeUnit& unit : units_) unit.met = unit.z;
+        }
+        blur = found.blur;
+        const bool lost =
+            stalled >= (best.speed > far * speed_ ? long_patience : patience) || found.length < narrow;
+        if (lost && best.speed <= near_enough * speed_) break;
+        if (jumps >= 0 ? ++jumps < max_jumps || stalled == 0 : !lost) continue;
+        if (jumps < 0 && met > 0.0) {
+            jumps = 0, blur = 0.0;
             continue;
         }
-        if (found.after < centre * blur * blur) {
-            if (blur < 0.5 * lowest) lowest = blur, stalled = 0;
-            met = blur;
-            if (found.length == 1.0) shrink = std::max(shrink * shrink, fastest);
+        // Begin anew, further from the end and more carefully.
+        jumps = -1, stalled = 0, hold_ = loosest_hold, ++losses;
+        if (met > 0.0) {
+            near_ *= 0.3;
+            blur = back * met;
+            for (ConeUnit& unit : units_) unit.z = unit.met;
+            measure(system);
+        } else {
+            blur *= back;
         }
-        if (found.after < 1e-4 * blur * blur) blur = std::min(blur, std::max(shrink * blur, 0.01 * left.map));
-        else if (found.after < 0.25 * found.before)
-            blur = std::min(blur, std::max(std::max(0.05, shrink) * blur, 0.2 * left.map));
     }
     for (std::size_t k = 0; k < units_.size(); ++k) {
         ConeUnit& unit = units_[k];

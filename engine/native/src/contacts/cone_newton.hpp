@@ -7,15 +7,21 @@
 // the same with P the clamp between them, bilateral ones with P the identity.
 //
 // P is smoothed: each eigenvalue's max(0, λ) becomes (λ + √(λ² + 4 b²))/2. The points of y = P_b(y − rho w) form the
-// central path of the problem, b = 0 its solution. Newton's method follows it with b tied to what is left, each step
-// damped by a search along it. In a step all multipliers are eliminated, contact by contact; what is left is a
-// system in the velocities with one 6×6 block per body and one pair per pair of bodies that touch, however many
-// points they touch at. It is not symmetric, since friction is not.
+// central path of the problem, b = 0 its solution. It is followed as interior methods do: one factor gives the way back
+// to the path and the way along it, and b falls as far as the next point still is near the path. In a step all
+// multipliers are eliminated, contact by contact; what is left is a system in the velocities with one 6×6 block per
+// body and one pair per pair of bodies that touch, however many points they touch at. It is not symmetric, since
+// friction is not.
 //
-// Where a point sticks, dz/dv is infinite. A touch of `relief` in the matrix, never in the equations, keeps it finite
-// and spreads loads evenly where points are redundant; what it leaves undone the next step sees as residual.
+// Where a point sticks, dz/dv is infinite, and where points are redundant z is not one. So y is held, lightly, where
+// it was: w + hold (y − y before) in place of w, anew in every iteration (a proximal method). At rest nothing is held,
+// so no equation is changed, and loads spread evenly where points are redundant.
 //
-// Sources: De Saxcé and Feng 1998 (the cone's law); Fukushima, Luo, Tseng 2002 (smoothing on second-order cones);
+// Coulomb's law has systems with several answers, and the path may end where two of them part: a box that slides on
+// four corners that are not quite in a plane rests on either three. Then the path is left: Newton's steps at b = 0,
+// taken whole, jump from one set of rows that push to another, as pivoting does, and the best point met is the answer.
+//
+// Sources: De Saxcé and Feng 1998 (the cone's law); Fukushima, Luo, Tseng 2002 (smoothing on second-order cones); Burke, Xu 2000 (following such paths);
 // Acary, Brémond, Huber 2018 (a comparison of solvers for this law).
 #pragma once
 
@@ -37,9 +43,7 @@ struct ConeReport {
 
 class ConeNewton {
 public:
-    double relief = 1e-7;  // of a row's own (G M⁻¹ Gᵀ)ᵢᵢ, in the factored matrix only
     int max_iterations = 100;
-    int max_directions = 6;  // of a step, against the matrix without relief
 
     /// Starts from the multipliers in `system` and fills velocities and multipliers with the best it met. Points obey the
     /// cone; rows that are no point's obey their bounds.
@@ -49,26 +53,25 @@ public:
     std::uint64_t block_operations() const noexcept { return block_operations_; }
 
 private:
-    struct Direction {  // dz of every unit, and what it changes in their laws
-        std::vector<ConeUnit::Vec> z, image;
-    };
     struct Left {
         double map = 0.0, speed = 0.0;  // √J, m/s
     };
     struct Search {
-        double before, after, length;  // squares of the smoothed map, and the step; 0: none lowers it
+        double blur, length,
+            along;  // the next blur, parts of Newton's direction and of the path's; 0: none is better
     };
     void prepare(MixedSystem& system, const std::vector<FrictionPoint>& points);
     void read(const RowBlock& given, int row, const FrictionPoint* friction, ConeUnit& unit) const;
     void connect();
     void measure(const MixedSystem& system);
-    double merit(double blur, double length) const;
+    double merit(double blur, double length, double along) const;
     Left worst() const;
     double rounding() const;
     Search search(double blur) const;
-    bool find_direction();
-    void precondition(Direction& direction);
-    void image_of(Direction& direction);
+    void hold();
+    void move(const MixedSystem& system, const Search& found);
+    bool find_directions(double blur);
+    bool answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du);
     template <class Multiplier> void velocities_of(const Multiplier& z, std::vector<Vec6>& v) const;
     static void push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to);
     static ConeUnit::Vec along(const ConeUnit& unit, const std::vector<Vec6>& v);
@@ -85,9 +88,8 @@ private:
     std::vector<ConeUnit> units_;
     std::vector<Mat6> mass_factor_;
     std::vector<Vec6> velocity_, change_, image_;
-    std::vector<Direction> directions_;
     std::vector<std::pair<ConeUnit::Vec, ConeUnit::Vec>> best_;  // z and u of every unit
-    double speed_ = 0.0;
+    double speed_ = 0.0, hold_ = 0.0, near_ = 1.0;
     std::uint64_t factorisations_ = 0, block_operations_ = 0;
 };
 

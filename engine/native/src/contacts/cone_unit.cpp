@@ -8,10 +8,11 @@
 
 namespace spook {
 
-double ConeUnit::natural(const Vec& at_z, const Vec& at_u, double blur, double* out) const {
+double ConeUnit::natural(const Vec& at_z, const Vec& at_u, const Aid& aid, double* out) const {
+    const double blur = aid.blur, hold = aid.hold;
     const double over = 1.0 / root;
     if (size == 1) {
-        const double y = at_z[0] * over, a = y - root * at_u[0];
+        const double y = at_z[0] * over, w = root * at_u[0] + hold * (y - held[0]), a = y - w;
         double p = a;
         if (lower == upper) p = lower;
         else if (lower > -unbounded) {
@@ -21,14 +22,14 @@ double ConeUnit::natural(const Vec& at_z, const Vec& at_u, double blur, double* 
             p = upper - positive(upper - a, blur).value;
         }
         out[0] = y - p;
-        if (lower == -unbounded && upper == unbounded) out[0] = root * at_u[0];
+        if (lower == -unbounded && upper == unbounded) out[0] = w;
         return out[0] * out[0];
     }
     const double mu = friction, w1 = root * mu * at_u[1], w2 = root * mu * at_u[2];
-    const double kink = blur * kink_share;
-    const double slide = std::sqrt(w1 * w1 + w2 * w2 + kink * kink) - kink;
+    const double rounded = kink(blur), slide = std::sqrt(w1 * w1 + w2 * w2 + rounded * rounded) - rounded;
     const double y0 = at_z[0] * over, y1 = at_z[1] * over / mu, y2 = at_z[2] * over / mu;
-    const double a0 = y0 - (root * at_u[0] + slide), a1 = y1 - w1, a2 = y2 - w2;
+    const double a0 = y0 - (root * at_u[0] + slide) - hold * (y0 - held[0]);
+    const double a1 = y1 - w1 - hold * (y1 - held[1]), a2 = y2 - w2 - hold * (y2 - held[2]);
     const Spectrum s = project(a0, a1, a2, blur);
     out[0] = y0 - s.value[0];
     out[1] = y1 - s.value[1] * s.t1;
@@ -36,47 +37,54 @@ double ConeUnit::natural(const Vec& at_z, const Vec& at_u, double blur, double* 
     return out[0] * out[0] + out[1] * out[1] + out[2] * out[2];
 }
 
-void ConeUnit::linearise_row(double blur, double relief) {
-    slope[0] = 1.0, rest[0] = 0.0;
-    const double a = z[0] / root - root * u[0];
+void ConeUnit::linearise_row(const Aid& aid) {
+    const double blur = aid.blur, hold = aid.hold;
+    slope[0] = 1.0, rest[0] = 0.0, bend[0] = 0.0;
+    const double y = z[0] / root, a = y - root * u[0] - hold * (y - held[0]);
     if (lower == upper) slope[0] = 0.0, rest[0] = 1.0;
     else if (lower > -unbounded) {
         const Positive low = positive(a - lower, blur);
-        slope[0] = low.slope, rest[0] = low.rest;
+        slope[0] = low.slope, rest[0] = low.rest, bend[0] = -low.bend;
         if (upper < unbounded) {
             const Positive high = positive(upper - a, blur);
-            slope[0] = std::max(0.0, slope[0] - high.rest), rest[0] += high.rest;
+            slope[0] = std::max(0.0, slope[0] - high.rest), rest[0] += high.rest, bend[0] += high.bend;
         }
     } else if (upper < unbounded) {
         const Positive high = positive(upper - a, blur);
-        slope[0] = high.slope, rest[0] = high.rest;
+        slope[0] = high.slope, rest[0] = high.rest, bend[0] = high.bend;
     }
-    const double stiffness = root * root * slope[0] / (rest[0] + relief);
+    rest[0] += hold * slope[0];
+    const double stiffness = root * root * slope[0] / rest[0];
     g[0] = 1.0 / (1.0 + stiffness * softness[0]);
     k[0] = g[0] * stiffness;
 }
 
-void ConeUnit::linearise(double blur, double relief) {
-    natural(z, u, blur, map.data());
-    if (size == 1) return linearise_row(blur, relief);
+void ConeUnit::linearise(const Aid& aid) {
+    const double blur = aid.blur, hold = aid.hold;
+    natural(z, u, aid, map.data());
+    if (size == 1) return linearise_row(aid);
     const double over = 1.0 / root, rho = root * root, mu = friction;
     const double w1 = root * mu * u[1], w2 = root * mu * u[2];
-    const double kink = blur * kink_share, sliding = std::sqrt(w1 * w1 + w2 * w2 + kink * kink);
+    const double rounded = kink(blur), sliding = std::sqrt(w1 * w1 + w2 * w2 + rounded * rounded);
     s1 = sliding > 0.0 ? w1 / sliding : 0.0, s2 = sliding > 0.0 ? w2 / sliding : 0.0;
-    const double a0 = z[0] * over - (root * u[0] + sliding - kink);
-    const Spectrum s = project(a0, z[1] * over / mu - w1, z[2] * over / mu - w2, blur);
+    const double y0 = z[0] * over, y1 = z[1] * over / mu, y2 = z[2] * over / mu;
+    const double a0 = y0 - (root * u[0] + sliding - rounded) - hold * (y0 - held[0]);
+    const Spectrum s = project(a0, y1 - w1 - hold * (y1 - held[1]), y2 - w2 - hold * (y2 - held[2]), blur);
     t1 = s.t1, t2 = s.t2;
-    double ratio[3];
+    double ratio[3], image[3];
     for (int i = 0; i < 3; ++i) {
-        slope[i] = s.slope[i], rest[i] = s.rest[i];
-        ratio[i] = s.slope[i] / (s.rest[i] + relief);
+        slope[i] = s.slope[i], rest[i] = s.rest[i] + hold * s.slope[i];
+        ratio[i] = slope[i] / rest[i];
     }
     for (int j = 0; j < 3; ++j) {  // K = rho E (1 − D)⁻¹ D E', column by column
         const double e[3] = {j == 0 ? 1.0 : mu * (j == 1 ? s1 : s2), j == 1 ? mu : 0.0, j == 2 ? mu : 0.0};
-        double image[3];
         spectral(ratio, e, image);
         for (int i = 0; i < 3; ++i) k[3 * i + j] = rho * (i == 0 ? 1.0 : mu) * image[i];
     }
+    const double by_blur = blur > 0.0 ? blur * (blur + 2.0 * load) / ((blur + load) * (blur + load)) : 0.0;
+    const double push[3] = {sliding > 0.0 ? by_blur * (1.0 - rounded / sliding) : 0.0, 0.0, 0.0};
+    spectral(slope, push, image);
+    bend = {-s.bend[0] - image[0], -s.bend[1] * t1 - image[1], -s.bend[1] * t2 - image[2]};
     if (soft) soften();
 }
 
@@ -112,13 +120,13 @@ void ConeUnit::spectral(const double* f, const double* x, double* y) const {
     y[2] = forth * t2 + across * t1;
 }
 
-void ConeUnit::respond(const Vec& missing, double relief) {
+void ConeUnit::respond(const Vec& missing) {
     if (size == 1) {
-        c[0] = g[0] * root * missing[0] / (rest[0] + relief);
+        c[0] = g[0] * root * missing[0] / rest[0];
         return;
     }
     double share[3], image[3];
-    for (int i = 0; i < 3; ++i) share[i] = 1.0 / (rest[i] + relief);
+    for (int i = 0; i < 3; ++i) share[i] = 1.0 / rest[i];
     spectral(share, missing.data(), image);
     for (int i = 0; i < 3; ++i) image[i] *= root * (i == 0 ? 1.0 : friction);
     for (int i = 0; i < 3; ++i)

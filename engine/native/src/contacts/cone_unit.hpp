@@ -13,34 +13,49 @@ namespace spook {
 struct ConeUnit {
     using Vec = std::array<double, 3>;
 
-    int block = 0, row = 0, size = 1;    // its rows in the system: three of a point with friction, or one
-    int first = -1, second = -1;         // bodies
-    int edge = -1;                       // of the matrix; −1 if one body does not move
-    bool turned = false;                 // its first body is the edge's second
-    double friction = -1.0;              // mu
-    double root = 1.0;                   // √rho
-    double lower = 0.0, upper = 0.0;     // of a single row, scaled
-    Vec6 first_row[3], second_row[3];    // G
-    Vec softness{}, right{};             // Sig, r
-    bool soft = false;                   // some Sig is not zero
-    Vec z{}, u{};                        // where it stands
-    Vec dz{}, du{};                      // Newton's direction
-    double kink_share = 0.0;             // of the blur, what rounds the kink of |u_t|
-    Vec map{};                           // of linearise(): the smoothed natural map,
-    double slope[3] = {}, rest[3] = {};  //   D's eigenvalues and those of 1 − D,
+    int block = 0, row = 0, size = 1;  // its rows in the system: three of a point with friction, or one
+    int first = -1, second = -1;       // bodies
+    int edge = -1;                     // of the matrix; −1 if one body does not move
+    bool turned = false;               // its first body is the edge's second
+    double friction = -1.0;            // mu
+    double root = 1.0;                 // √rho
+    double lower = 0.0, upper = 0.0;   // of a single row, scaled
+    Vec6 first_row[3], second_row[3];  // G
+    Vec softness{}, right{};           // Sig, r
+    bool soft = false;                 // some Sig is not zero
+    Vec z{}, u{};                      // where it stands
+    Vec met{};                         // z, where the path was met last
+    Vec held{};                        // y, what the proximal term holds on to
+    double load = 0.0;                 // of the normal, scaled: the kink of |u_t| is rounded by b²/(b + load)
+    Vec dz{}, du{};                    // Newton's direction
+    Vec tz{}, tu{};                    // along the path, for the whole blur
+    Vec map{}, bend{};  // of linearise(): the smoothed natural map, its derivative by the blur,
+    double slope[3] = {}, rest[3] = {};  //   D's eigenvalues and those of 1 − D + hold D,
     double t1 = 1.0, t2 = 0.0;           //   the direction of their frame,
     double s1 = 0.0, s2 = 0.0;           //   that of the slip,
     double k[9] = {}, g[9] = {};         //   K = −dz/d(G v), and (1 + K₀ Sig)⁻¹
     Vec lack{}, c{};                     // what is to be answered, and respond()'s answer
 
-    /// The natural map y − P_b(y − w) at (z, u), b = `blur`; returns its square.
-    double natural(const Vec& at_z, const Vec& at_u, double blur, double* out) const;
+    /// How the map is changed on the way to its root.
+    struct Aid {
+        double blur = 0.0;  // b
+        double hold = 0.0;  // on to y
+    };
 
-    /// What the law says to first order: (1 − D) dy + D dw = −map. A touch of `relief` keeps K finite.
-    void linearise(double blur, double relief);
+    /// The natural map y − P_b(y − w − hold (y − held)) at (z, u); returns its square.
+    double natural(const Vec& at_z, const Vec& at_u, const Aid& aid, double* out) const;
+
+    /// What the law says to first order: (1 − D + hold D) dy + D dw = −map.
+    void linearise(const Aid& aid);
 
     /// c: the dz that answers what is missing in the first-order law, G dv held.
-    void respond(const Vec& missing, double relief);
+    void respond(const Vec& missing);
+
+    /// y: z as the map takes it.
+    Vec scaled() const noexcept {
+        const double over = 1.0 / root, along = size == 1 ? 0.0 : over / friction;
+        return {z[0] * over, z[1] * along, z[2] * along};
+    }
 
     /// What changes of z and u change in the law: (1 − D) dy + D dw.
     Vec law(const Vec& change_z, const Vec& change_u) const;
@@ -52,7 +67,8 @@ struct ConeUnit {
 
 private:
     void spectral(const double* f, const double* x, double* y) const;
-    void linearise_row(double blur, double relief);
+    void linearise_row(const Aid& aid);
+    double kink(double blur) const noexcept { return blur > 0.0 ? blur * blur / (blur + load) : 0.0; }
     void soften();
 };
 

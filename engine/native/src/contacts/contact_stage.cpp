@@ -106,11 +106,11 @@ void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
 void ContactStage::add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const {
     const SurfaceMaterial& material = point.material;
     const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
-    if (material.friction > 0.0) friction.push_back({block, material.friction, soft, point.before});
-    if (material.rolling > 0.0)
-        friction.push_back({block, material.rolling / scale, 0.0, point.before, 3, 2});
-    if (material.torsional > 0.0)
-        friction.push_back({block, material.torsional / scale, 0.0, point.before, 5, 1});
+    const bool solved = point.solved && options_.friction != FrictionModel::box;
+    const double normal = solved ? point.normal : point.before;
+    if (material.friction > 0.0) friction.push_back({block, material.friction, soft, normal});
+    if (material.rolling > 0.0) friction.push_back({block, material.rolling / scale, 0.0, normal, 3, 2});
+    if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
 }
 
 FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
@@ -168,6 +168,7 @@ double ContactStage::resting_right(Point& point) const {
 /// Whether a point is likely to push: what a solver starts from.
 bool ContactStage::is_pressed(const Point& point) const noexcept {
     const double h = options_.time_step, gap = point.contact.point.gap;
+    if (point.solved) return point.normal > 0.0;
     return point.before > 0.0 || point.strike >= 0.0 ||
            (point.before < 0.0 &&
             (is_closed(point.contact) || gap + h * (point.approach + point.push) < 0.0));
@@ -184,12 +185,14 @@ RowBlock ContactStage::resting_row(Point& point) const {
     block.right[0] += resting_right(point);
     block.softness[0] = regularise(material.compliance, material.damping, h).softness;
     block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
-    block.multiplier[0] = std::max(0.0, point.before);
+    block.multiplier[0] = point.solved ? point.normal : std::max(0.0, point.before);
     if (material.friction > 0.0) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
-        for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangent_before[i - 1];
+        for (int i = 1; i <= 2; ++i)
+            block.multiplier[i] = point.solved ? point.tangents[i - 1] : point.tangent_before[i - 1];
     }
-    for (int i = 3; i < block.size; ++i) block.multiplier[i] = point.turning_before[i - 3];
+    for (int i = 3; i < block.size; ++i)
+        block.multiplier[i] = point.solved ? point.turning[i - 3] : point.turning_before[i - 3];
     return block;
 }
 
@@ -223,35 +226,45 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
         else if (!turned) break;
         counters_.contacts += points_.size() - known;
+        for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
+            read_back(system.rows[joints + k], points_[k]);
         order_points();
     }
     judge(system, friction, report);
 
     touches_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
-        const RowBlock& block = system.rows[joints + k];
-        Vec3 along;
-        Vec3 turning;
-        for (int i = 1; i < block.size;
-             ++i) {  // the solver may have turned the tangents: read them from the rows
-            const Vec6 row = block.first >= 0 ? block.first_jacobian[i] : block.second_jacobian[i];
-            const double sign = block.first >= 0 ? block.multiplier[i] : -block.multiplier[i];
-            if (i < 3) along += sign * linear(row);
-            else turning += sign * angular(row);
-        }
-        Touch& touch = record(points_[k], block.multiplier[0], along);
-        if (block.size < 6) continue;
-        const Vec3 n = points_[k].contact.point.normal, t = points_[k].tangent;
-        const double scale = 1.0 / size(points_[k].contact);
-        touch.turning[0] = scale * dot(turning, t);
-        touch.turning[1] = scale * dot(turning, cross(n, t));
-        touch.turning[2] = scale * dot(turning, n);
+        Point& point = points_[k];
+        const Vec3 along = read_back(system.rows[joints + k], point);
+        Touch& touch = record(point, point.normal, along);
+        std::copy_n(point.turning, 3, touch.turning);
     }
     if (report.finite) {
         part_overlaps(system, joints);
         correct_events(system);
     }
     return report.finite;
+}
+
+/// What a solve found for a point, along world tangents: it may have turned its own. Gives the impulse along the surface.
+Vec3 ContactStage::read_back(const RowBlock& block, Point& point) const {
+    Vec3 along, turning;
+    for (int i = 1; i < block.size; ++i) {
+        const Vec6& row = block.first >= 0 ? block.first_jacobian[i] : block.second_jacobian[i];
+        const double sign = block.first >= 0 ? block.multiplier[i] : -block.multiplier[i];
+        if (i < 3) along += sign * linear(row);
+        else turning += sign * angular(row);
+    }
+    const Vec3 n = point.contact.point.normal, t = point.tangent;
+    const double scale = 1.0 / size(point.contact);
+    point.solved = true;
+    point.normal = block.multiplier[0];
+    point.tangents[0] = dot(along, t);
+    point.tangents[1] = dot(along, cross(n, t));
+    point.turning[0] = scale * dot(turning, t);
+    point.turning[1] = scale * dot(turning, cross(n, t));
+    point.turning[2] = scale * dot(turning, n);
+    return along;
 }
 
 /// Takes down what a point did: its normal impulse, and that along the surface.

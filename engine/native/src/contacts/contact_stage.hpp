@@ -175,6 +175,8 @@ private:
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
         double parting_before = 0.0;
+        bool solved = false;  // in an earlier round of this step: these start the next
+        double normal = 0.0, tangents[2] = {0.0, 0.0}, turning[3] = {0.0, 0.0, 0.0};
         double impact = 0.0;
         Vec3 impact_impulse;
     };
@@ -216,6 +218,7 @@ private:
     bool is_pressed(const Point& point) const noexcept;
     RowBlock resting_row(Point& point) const;
     Touch& record(const Point& point, double normal, Vec3 along);
+    Vec3 read_back(const RowBlock& block, Point& point) const;
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
     bool find_more();

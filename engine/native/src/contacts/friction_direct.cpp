@@ -16,13 +16,25 @@ constexpr double settled = 1e-10;  // of the largest normal impulse
 constexpr double loosest = 1e-6;
 constexpr double reluctance =
     0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
-constexpr int pivot_rounds = 60;        // a round of the cone need not be exact while its bounds still move
 constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
 constexpr int plain_rounds = 3;         // most systems settle within these
-constexpr int quick_rounds = 4;         // what rests or moves on as it did is found within these, exactly
 constexpr int longest_wait = 16;        // solves
-constexpr int lost_rounds = 8;          // in a row without an end of the pivoting: it goes in circles
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
+constexpr double fair = 1e-9;           // one that is an answer
+constexpr double near = 1e-6;           // one that is not worth another turn
+constexpr int sweep_turns = 1, turn_sweeps = 100;  // where Newton's path ends without an answer
+
+/// How much is spent on rounds of pivoting.
+struct Effort {
+    int rounds;
+    int pivots = 60;  // of a round: the cone's need not be exact while its bounds still move
+    int lost =
+        8;  // rounds in a row without an end of the pivoting: it goes in circles; 1: nor the first guess
+    bool near = false;  // an answer is near: directions start from its slip, not from the predicted one
+};
+constexpr Effort quick{4, 4, 1};         // what rests or moves on as it did is found within these, exactly
+constexpr Effort small{12, 20, 1};       // nine systems in ten of few blocks settle
+constexpr Effort polish{6, 8, 1, true};  // after Newton's method
 
 void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexcept {
     for (int i = point.row; i < point.row + point.size; ++i) {
@@ -118,7 +130,7 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
 /// Whether the system is one for Newton's method on the cone.
 bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
     if (model != FrictionModel::cone && !points.empty()) return false;
-    if (system.rows.size() <= few_blocks) return false;
+    if (points.empty() && system.rows.size() <= few_blocks) return false;
     if (std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.row != 1; }))
         return false;  // it knows no friction of turning
     // Rigid joints need the factor of the whole, not a relief.
@@ -126,10 +138,22 @@ bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& 
                        [](const RowBlock& block) { return block.lower[0] == 0.0; });
 }
 
-/// Pivoting with bounds and directions renewed until the law holds; `quick`: given up where it is not near.
-/// True when it holds; a system that is not finite is reported.
+/// Takes over what multipliers and velocities say: who pushes, who sticks, and which way the others slide.
+void start_near(MixedSystem& system, const std::vector<FrictionPoint>& points,
+                const std::vector<double>& scale) {
+    for (RowBlock& block : system.rows)
+        block.state[0] = block.multiplier[0] > 0.0 ? RowState::free : RowState::at_lower;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        RowBlock& block = system.rows[points[k].block];
+        step_cone(block, points[k], scale[k], points[k].coefficient * block.multiplier[0], -1.0, reluctance,
+                  system.velocity);
+    }
+}
+
+/// Pivoting with bounds and directions renewed until the law holds. True when it does; a system that is not finite is
+/// reported.
 bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                      PivotSolver& solver, int max_rounds, bool quick, FrictionReport& report) {
+                      PivotSolver& solver, const Effort& effort, FrictionReport& report) {
     auto solve = [&](bool same_matrix) {
         const PivotReport pivots = solver.solve(system, same_matrix);
         ++report.rounds;
@@ -138,11 +162,18 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         report.finite = pivots.finite;
         return pivots.finite;
     };
+    const int round_limit = solver.round_limit;
+    if (effort.lost == 1) solver.round_limit = effort.pivots;  // the first guess, too
+    struct Restore {
+        PivotSolver& solver;
+        int value;
+        ~Restore() { solver.round_limit = value; }
+    } restore{solver, round_limit};
     const bool some_unknown =
         std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
     if (some_unknown) {  // no step before: the normal forces without friction are the first guess
         for (const FrictionPoint& point : points) bound_rows(system.rows[point.block], point, 0.0);
-        if (!solve(false)) return false;
+        if (!solve(false) || (effort.lost == 1 && !report.converged)) return false;
         for (FrictionPoint& point : points)
             if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
         for (const FrictionPoint& point : points)
@@ -152,26 +183,20 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     std::vector<Mat6> mass_factor;
     std::vector<double> scale(points.size(), 1.0);
     if (model == FrictionModel::cone) {
-        turn_along_predicted_slip(system, points);
+        if (!effort.near) turn_along_predicted_slip(system, points);
         for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
         for (std::size_t k = 0; k < points.size(); ++k)
             scale[k] = tangent_scale(system.rows[points[k].block], points[k], mass_factor);
     }
+    if (effort.near) start_near(system, points, scale);
 
     bool same_matrix = false;
     Acceleration acceleration;
     double accepted = settled;
     int lost = 0;
     std::vector<double> used(points.size()), given(points.size());
-    const int round_limit = solver.round_limit;
-    if (quick) solver.round_limit = quick_rounds;
-    else if (model == FrictionModel::cone) solver.round_limit = pivot_rounds;
-    struct Restore {
-        PivotSolver& solver;
-        int value;
-        ~Restore() { solver.round_limit = value; }
-    } restore{solver, round_limit};
-    for (int round = 0; round < (quick ? quick_rounds : max_rounds); ++round) {
+    if (model == FrictionModel::cone) solver.round_limit = effort.pivots;
+    for (int round = 0; round < effort.rounds; ++round) {
         for (const FrictionPoint& point : points)
             bound_rows(system.rows[point.block], point, point.coefficient * std::max(0.0, point.normal));
         if (!solve(same_matrix)) return false;
@@ -203,9 +228,8 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         }
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
         if (report.residual <= accepted && report.converged) return true;
-        if (quick && !report.converged) return false;
         lost = report.converged ? 0 : lost + 1;
-        if (lost >= lost_rounds) break;
+        if (lost >= effort.lost) break;
         if (points.empty() || model == FrictionModel::box) {
             report.residual = unbounded;  // the pivoting itself gave up
             break;
@@ -229,7 +253,8 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
     MixedSystem start = system;
     const std::vector<FrictionPoint> start_points = points;
     const FrictionReport before = report;
-    if (settle_by_rounds(system, points, model, direct.pivot, quick_rounds, true, report)) {
+    const Effort& effort = system.rows.size() <= few_blocks ? small : quick;
+    if (settle_by_rounds(system, points, model, direct.pivot, effort, report)) {
         direct.patience.failures = 0;
         return true;
     }
@@ -244,22 +269,44 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
     return false;
 }
 
-/// What Newton's method found; the report says how near the law it is. False if that is poor, and the system as it was:
-/// wedged, or rigid contacts that contradict. What is near is not handed on to pivoting: where Newton's method stalls,
-/// thousands of pivots were seen to end no nearer.
-bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
-                     FrictionReport& report) {
-    MixedSystem start = system;
-    const ConeReport found = direct.newton.solve(system, points);
-    report.rounds += found.iterations;
-    if (!(found.residual <= poor)) {
-        system = std::move(start);
-        return false;
+/// Newton's method; where its path ends without an answer, a few sweeps choose anew who pushes and who slides, and it
+/// goes on from there. Few blocks are handed to pivoting in the end, which shares loads evenly. False if all that is
+/// poor, and the system as it was.
+bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
+                     DirectSolver& direct, FrictionReport& report) {
+    MixedSystem start = system, best;
+    const std::vector<FrictionPoint> start_points = points;
+    report.residual = unbounded;
+    for (int turn = 0; turn <= sweep_turns && !(report.residual <= near); ++turn) {
+        if (turn > 0) report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
+        const ConeReport found = direct.newton.solve(system, points);
+        report.rounds += found.iterations;
+        if (turn == 0 || found.residual < report.residual) {
+            report.residual = found.residual;
+            best = system;
+        }
     }
-    report.residual = found.residual;
-    report.converged = found.converged;
+    system = best;
     for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
-    return true;
+    report.converged = report.residual <= fair;
+    if (!points.empty() && start.rows.size() <= few_blocks) {
+        FrictionReport polished;
+        const bool settled = settle_by_rounds(system, points, model, direct.pivot, polish, polished);
+        report.rounds += polished.rounds;
+        report.pivots += polished.pivots;
+        if (settled) {
+            report.residual = polished.residual;
+            report.converged = true;
+            return true;
+        }
+        system = std::move(best);
+        points = start_points;
+        for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
+    }
+    if (report.residual <= poor) return true;
+    system = std::move(start);
+    points = start_points;
+    return false;
 }
 
 }  // namespace
@@ -301,17 +348,17 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
     MixedSystem start;
+    const Effort patient{max_rounds};
     if (is_for_newton(system, points, model)) {
         if (settle_quickly(system, points, model, direct, report)) return report;
-        if (solve_by_newton(system, points, direct, report)) return report;
+        if (solve_by_newton(system, points, model, direct, report)) return report;
         start = system;
         report.residual = unbounded;
     } else {
         if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
                                            [](const RowBlock& block) { return block.lower[0] == 0.0; }))
             start = system;
-        if (settle_by_rounds(system, points, model, direct.pivot, max_rounds, false, report) ||
-            !report.finite)
+        if (settle_by_rounds(system, points, model, direct.pivot, patient, report) || !report.finite)
             return report;
     }
     finish_by_sweeps(system, start, points, model, report);

@@ -8,22 +8,23 @@
 
 namespace spook {
 
-/// max(0, λ), smoothed by b, and its derivative with what that lacks to one.
+/// max(0, λ), smoothed by b: its derivative, what that lacks to one, and the derivative by b.
 struct Positive {
-    double value, slope, rest;
+    double value, slope, rest, bend;
 };
 inline Positive positive(double lambda, double b) noexcept {
     const double root = std::sqrt(lambda * lambda + 4.0 * b * b);
-    if (root == 0.0) return {0.0, 0.5, 0.5};
-    const double large = 0.5 * (std::abs(lambda) + root), small = b * b / large;
-    return lambda > 0.0 ? Positive{large, large / root, small / root}
-                        : Positive{small, small / root, large / root};
+    if (root == 0.0) return {0.0, 0.5, 0.5, 1.0};
+    const double large = 0.5 * (std::abs(lambda) + root), small = b * b / large, bend = 2.0 * b / root;
+    return lambda > 0.0 ? Positive{large, large / root, small / root, bend}
+                        : Positive{small, small / root, large / root, bend};
 }
 
 /// P_b on L and its derivative by eigenvalues: along (1, −t), (1, t) and across.
 struct Spectrum {
     double value[3];  // of P_b, in the frame 0, t, across
     double slope[3], rest[3];
+    double bend[2];  // of value, by b
     double t1, t2;
 };
 inline Spectrum project(double a0, double a1, double a2, double b) noexcept {
@@ -34,6 +35,8 @@ inline Spectrum project(double a0, double a1, double a2, double b) noexcept {
     const Positive one = positive(a0 - reach, b), two = positive(a0 + reach, b);
     s.value[0] = 0.5 * (one.value + two.value);
     s.value[1] = 0.5 * (two.value - one.value);
+    s.bend[0] = 0.5 * (one.bend + two.bend);
+    s.bend[1] = 0.5 * (two.bend - one.bend);
     s.slope[0] = one.slope, s.rest[0] = one.rest;
     s.slope[1] = two.slope, s.rest[1] = two.rest;
     if (reach > 1e-8 * std::abs(a0) && reach > 1e-8 * b) {

@@ -41,7 +41,7 @@ void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet
 /// The forest, by breadth: every body as near to the world as it can be.
 bool JointTree::hang(std::span<const int> tied) {
     struct Hung {
-        int body, joint, parent;  // parent: a body, −1 the world
+        int body, joint, parent;  // joint: −1 if it floats; parent: a body, −1 the world
     };
     const auto blocks = joints_->blocks();
     const auto moving = [&](int body) { return body >= 0 && constants_[body].moves(); };
@@ -75,7 +75,24 @@ bool JointTree::hang(std::span<const int> tied) {
     };
     if (tied.size() > 2000) return false;
     hang_on(-1);
-    for (std::size_t next = 0; next < found.size(); ++next) hang_on(found[next].body);
+    std::size_t next = 0;
+    const auto follow = [&] {
+        for (; next < found.size(); ++next) hang_on(found[next].body);
+    };
+    follow();
+    for (int body : tied) {  // what nothing holds to the world floats with the first of its bodies
+        if (hung[body] >= 0) continue;
+        hung[body] = static_cast<int>(found.size());
+        const std::size_t root = found.size();
+        found.push_back({body, -1, -1});
+        follow();
+        for (const JointBlock& block : blocks)  // held after all, by a joint not known here
+            for (const bool second : {false, true}) {
+                const int end = second ? block.second : block.first,
+                          other = second ? block.first : block.second;
+                if (moving(end) && hung[end] >= static_cast<int>(root) && !moving(other)) return false;
+            }
+    }
     if (found.size() != tied.size()) return false;
 
     nodes_.clear();
@@ -85,16 +102,19 @@ bool JointTree::hang(std::span<const int> tied) {
     const auto add = [&](const auto& self, const Hung& one) -> void {
         Node node;
         node.body = one.body;
-        node.joint = blocks[one.joint].joint;
         node.parent = one.parent < 0 ? -1 : node_of_[one.parent];
-        const JointConstants& joint = joints_->constants(node.joint);
-        node.backwards = blocks[one.joint].first == one.body;
-        Vec3 axes[3];
-        freedom(joint, node.backwards, node.turns, node.slides, axes);
-        std::copy_n(axes, std::min(node.slides, 2), node.slide_axes);
-        node.axis = joint.axes[0];
-        node.parent_arm = node.backwards ? joint.second_arm : joint.first_arm;
-        node.arm = node.backwards ? joint.first_arm : joint.second_arm;
+        if (one.joint < 0) {
+            node.turns = node.slides = 3;
+            node.slide_axes[0] = {1, 0, 0}, node.slide_axes[1] = {0, 1, 0}, node.slide_axes[2] = {0, 0, 1};
+        } else {
+            node.joint = blocks[one.joint].joint;
+            const JointConstants& joint = joints_->constants(node.joint);
+            node.backwards = blocks[one.joint].first == one.body;
+            freedom(joint, node.backwards, node.turns, node.slides, node.slide_axes);
+            node.axis = joint.axes[0];
+            node.parent_arm = node.backwards ? joint.second_arm : joint.first_arm;
+            node.arm = node.backwards ? joint.first_arm : joint.second_arm;
+        }
         const double arms = norm(node.parent_arm) + norm(node.arm);
         node.extent = arms > 0.0 ? arms : 1.0;
         const BodyConstants& body = constants_[one.body];
@@ -311,7 +331,7 @@ bool JointTree::holds(const LargeArray<BodyState>& bodies) {
     take(bodies);
     for (Course& motion : courses_) {
         motion.moved = {};
-        motion.slid[0] = motion.slid[1] = 0.0;
+        motion.slid[0] = motion.slid[1] = motion.slid[2] = 0.0;
     }
     place();
     for (const Node& node : nodes_) {

@@ -23,12 +23,14 @@ namespace spook {
 
 class JointTree {
 public:
-    /// Takes the scene if it can: every tied body hangs on the world by joints it knows, in small trees, and what
-    /// closes loops is not redundant at the start. Empty otherwise.
+    /// Takes the scene if it can: every tied body hangs by joints it knows on the world or on a body that floats, in
+    /// small trees, and what closes loops is not redundant at the start. Empty otherwise.
     void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
                  const LargeArray<BodyState>& start);
     /// Joint coordinates that can move; 0: not a scene for this.
     int coordinates() const noexcept { return coordinates_; }
+    /// Rows that close loops.
+    int rows() const noexcept { return rows_; }
     /// Whether the joints of the forest hold where the bodies are, as joint coordinates take for granted.
     bool holds(const LargeArray<BodyState>& bodies);
 
@@ -39,13 +41,14 @@ public:
 
 private:
     struct Node {  // a body with the joint it hangs on; a parent stands before all that hang on it
-        int body = -1, joint = -1, parent = -1, end = 0;  // end: of the nodes that hang on it
+        // joint: −1 of a root that floats; end: of the nodes that hang on it.
+        int body = -1, joint = -1, parent = -1, end = 0;
         int turns = 0, slides = 0;  // coordinates: 0, 1 about the axis or 3; along slide_axes
         int first = 0;              // of its coordinates
         int tree = 0;               // which of the forest's
         bool backwards = false;     // the body is the joint's first
         Vec3 parent_arm, arm;       // from the centres to the joint, at the start
-        Vec3 axis, slide_axes[2];
+        Vec3 axis, slide_axes[3];
         double mass = 0.0, extent = 1.0;
         Vec3 inertia;
         int coordinates() const noexcept { return turns + slides; }
@@ -54,16 +57,16 @@ private:
         // At its start:
         Mat3 frame, axes;  // of what carries the joint; of the body
         Vec3 place, reach, parent_reach, gap, from_parent;
-        Vec3 along[5];  // directions of its coordinates
+        Vec3 along[6];  // directions of its coordinates
         Quat relative;
-        double slide[2];
+        double slide[3];
         // At its end, as far as found:
         Quat moved;  // the turn of the joint, in its frame
-        double slid[2];
+        double slid[3];
         Quat turn;    // of the body over the stage, world axes
         Mat3 turned;  // the same, less one
         Vec3 shift;   // of the body
-        Vec3 end_place, end_reach, end_along[5];
+        Vec3 end_place, end_reach, end_along[6];
         Vec3 half;         // vector part of the turn, body axes
         Vec3 momentum;     // angular, world axes
         Vec3 push, twist;  // momenta gained; then those of all that hangs on it

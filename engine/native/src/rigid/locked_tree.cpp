@@ -11,49 +11,59 @@ Vec3 carried(const BodyState& body, Vec3 v) noexcept { return v + body.turn_less
 }  // namespace
 
 Twist LockedTree::momentum_of(const Link& link, const BodyState& s, const LockedLoads& loads) const noexcept {
-    Vec3 kick = loads.time_step * loads.acceleration[link.body];
-    if (!loads.force.empty()) kick += (loads.time_step / link.mass) * loads.force[link.body];
-    return {link.mass * (s.velocity + kick),
-            s.angular_momentum + loads.time_step * loads.constants[link.body].torque};
+    const double h = loads.time_step;
+    Twist momentum{{}, s.angular_momentum};
+    Vec3 kick;
+    if (loads.acceleration.empty()) {
+        kick = h * loads.gravity;
+    } else {
+        kick = h * loads.acceleration[link.body];
+        momentum.angular += h * loads.constants[link.body].torque;
+    }
+    if (!loads.force.empty()) kick += (h / link.mass) * loads.force[link.body];
+    momentum.linear = link.mass * (s.velocity + kick);
+    return momentum;
 }
 
 /// Where the joint is and what its rows ask for.
-void LockedTree::locate(const Link& link, std::span<const BodyState> bodies, Work& work) const noexcept {
-    const Gain& gain = gains_[link.gain];
-    const BodyState& child = bodies[link.body];
-    const BodyState& other = link.other < 0 ? still_ : bodies[link.other];
-    const double sign = link.child_is_first ? -1.0 : 1.0;
-    const Vec3 bend = child.turn_less_one * link.arm, other_bend = other.turn_less_one * link.other_arm;
-    work.arm = link.arm + bend;
-    work.other_arm = link.other_arm + other_bend;
+void LockedTree::locate(std::size_t k, std::span<const BodyState> bodies, Work& work) const noexcept {
+    const Hold& hold = holds_[k];
+    const Gain& gain = gains_[links_[k].gain];
+    const BodyState& child = bodies[links_[k].body];
+    const BodyState& other = hold.other < 0 ? still_ : bodies[hold.other];
+    const double sign = hold.child_is_first ? -1.0 : 1.0;
+    const Vec3 bend = child.turn_less_one * hold.arm, other_bend = other.turn_less_one * hold.other_arm;
+    work.arm = hold.arm + bend;
+    work.other_arm = hold.other_arm + other_bend;
     const Vec3 gap = child.displacement - other.displacement + bend - other_bend;
     // The reaction acts where the second body holds the joint.
-    if (link.child_is_first) work.arm -= gap;
+    if (hold.child_is_first) work.arm -= gap;
     else work.other_arm += gap;
     const Twist velocity{child.velocity, child.angular_velocity};
     const Twist others{other.velocity, other.angular_velocity};
     const Twist slip = to_joint(velocity, work.arm) - to_joint(others, work.other_arm);
 
-    const BodyState &first = link.child_is_first ? child : other,
-                    &second = link.child_is_first ? other : child;
+    const BodyState &first = hold.child_is_first ? child : other,
+                    &second = hold.child_is_first ? other : child;
     Quat q = conjugate(first.turn) * second.turn;
     if (q.w < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
     work.tilt = carried(first, {q.x, q.y, q.z});
     const double over = 1.0 / q.w;
     work.tilt_softness = gain.softness[1] * (over * over);
-    work.right.linear = gain.upsilon[0] * slip.linear - gain.violation[0] * gap;
-    work.right.angular = gain.upsilon[1] * slip.angular - (sign * 2.0 * gain.violation[1] * over) * work.tilt;
-    if (link.parent < 0) work.right += to_joint(others, work.other_arm);
+    work.left.linear = gain.upsilon[0] * slip.linear - gain.violation[0] * gap;
+    work.left.angular = gain.upsilon[1] * slip.angular - (sign * 2.0 * gain.violation[1] * over) * work.tilt;
+    if (links_[k].parent < 0) work.left += to_joint(others, work.other_arm);
 }
 
 /// Leaves first. The first time K is found as well; then what the velocities so far leave of rows and momenta.
 template <bool FIRST>
-void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads& loads) noexcept {
+void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool again) noexcept {
     Inertia6 mass{};
     Twist momentum{};
     std::size_t waiting = 0;
     double sum = 0.0;
     for (std::size_t k = 0; k < links_.size(); ++k) {
+        ask(k + AHEAD, bodies, true);
         const Link& link = links_[k];
         Work& work = works_[k];
         const BodyState& s = bodies[link.body];
@@ -72,7 +82,7 @@ void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads&
         } else {
             momentum -= Twist{link.mass * work.velocity.linear, s.inertia * work.velocity.angular};
         }
-        if (link.joint < 0) {
+        if (link.gain < 0) {
             if (FIRST) factor_whole(work.stiffness = mass);
             work.base = momentum;
             sum += dot(momentum.linear, momentum.linear) + dot(momentum.angular, momentum.angular);
@@ -80,17 +90,18 @@ void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads&
         }
         const Gain& gain = gains_[link.gain];
         if constexpr (FIRST) {
-            locate(link, bodies, work);
+            locate(k, bodies, work);
             work.stiffness = shifted(mass, work.arm);
             soften_all(work.stiffness, gain.softness, work.tilt, work.tilt_softness);
         } else {
             momentum += about_centre(work.impulse, work.arm);
             Twist slip = to_joint(work.velocity, work.arm);
             if (link.parent >= 0) slip -= to_joint(works_[link.parent].velocity, work.other_arm);
-            work.left = work.right - slip - give(work, gain, work.impulse);
+            if (again) locate(k, bodies, work);  // a refinement before this one is in the place of y
+            work.left = work.left - slip - give(work, gain, work.impulse);
         }
         const Twist q = about_joint(momentum, work.arm);
-        work.base = work.stiffness * ((FIRST ? work.right : work.left) + give(work, gain, q)) - q;
+        work.base = work.stiffness * (work.left + give(work, gain, q)) - q;
         if (link.parent < 0) {
             sum += dot(work.base.linear, work.base.linear) + dot(work.base.angular, work.base.angular);
             continue;
@@ -108,22 +119,23 @@ void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads&
     finite_ = std::isfinite(sum);
 }
 
-void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first) noexcept {
-    if (first) eliminate<true>(bodies, loads);
-    else eliminate<false>(bodies, loads);
+void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first,
+                           bool again) noexcept {
+    if (first) eliminate<true>(bodies, loads, again);
+    else eliminate<false>(bodies, loads, again);
 }
 
 void LockedTree::deliver(std::span<JointSet::State> states) const noexcept {
     for (std::size_t k = 0; k < links_.size(); ++k) {
-        const Link& link = links_[k];
-        if (link.joint < 0) continue;
+        const Hold& hold = holds_[k];
+        if (hold.joint < 0) continue;
         const Work& work = works_[k];
-        JointSet::State& state = states[link.joint];
-        const double sign = link.child_is_first ? -1.0 : 1.0;
+        JointSet::State& state = states[hold.joint];
+        const double sign = hold.child_is_first ? -1.0 : 1.0;
         const Vec3 force = sign * work.impulse.linear, torque = sign * work.impulse.angular;
         state.multiplier = {force.x, force.y, force.z, torque.x, torque.y, torque.z};
-        state.first_reach = link.child_is_first ? work.arm : work.other_arm;
-        state.second_reach = link.child_is_first ? work.other_arm : work.arm;
+        state.first_reach = hold.child_is_first ? work.arm : work.other_arm;
+        state.second_reach = hold.child_is_first ? work.other_arm : work.arm;
     }
 }
 

@@ -22,8 +22,9 @@ namespace spook {
 /// What one solve is asked for besides the bodies' states.
 struct LockedLoads {
     double time_step;
-    std::span<const BodyConstants> constants;
-    std::span<const Vec3> acceleration, force;  // per body; force may be empty
+    Vec3 gravity;                               // m/s², of all bodies, if there are no loads
+    std::span<const BodyConstants> constants;   // for torques
+    std::span<const Vec3> acceleration, force;  // per body; empty where there are none
 };
 
 class LockedTree {
@@ -42,16 +43,20 @@ public:
     template <class Velocity>
     bool solve(std::span<const BodyState> bodies, const LockedLoads& loads, int refinements,
                Velocity velocity) noexcept {
-        eliminate(bodies, loads, true);
+        eliminate(bodies, loads, true, false);
         if (!finite_) return false;
         ++counters_.factorisations;
         counters_.block_operations += operations_;
         counters_.solves += 1 + static_cast<std::uint64_t>(refinements);
         for (int round = 0; round < refinements; ++round) {
-            for (std::size_t k = links_.size(); k-- > 0;) descend(k, round == 0);
-            eliminate(bodies, loads, false);
+            for (std::size_t k = links_.size(); k-- > 0;) {
+                ask(k - AHEAD, bodies, false);
+                descend(k, round == 0);
+            }
+            eliminate(bodies, loads, false, round > 0);
         }
         for (std::size_t k = links_.size(); k-- > 0;) {
+            ask(k - AHEAD, bodies, true);
             descend(k, refinements == 0);
             velocity(links_[k].body, works_[k].velocity);
         }
@@ -65,16 +70,20 @@ public:
     void clear_counters() noexcept { counters_ = {}; }
 
 private:
-    /// A body and the joint to its parent.
+    /// A body and what it hands on.
     struct Link {
-        int body = 0, other = -1;     // what it is locked to: a body, −1 the world
-        int parent = -1, joint = -1;  // the parent's link, −1: there is none; −1: a root that floats
-        int gain = 0;
-        bool child_is_first = false;
-        bool leaf = true;                                                     // nothing is carried to it
-        bool takes = false;                                                   // and adds what waits
+        int body = 0;
+        int parent = -1;     // its link; −1: there is none
+        int gain = -1;       // of the joint to it; −1: a root that floats
+        bool leaf = true;    // nothing is carried to it
+        bool takes = false;  // and adds what waits
         enum Next : std::uint8_t { hands_on, waits, joins } next = hands_on;  // what it carries to its parent
         double mass = 0.0;
+    };
+    /// The joint to its parent, as it was at the start.
+    struct Hold {
+        int joint = -1, other = -1;  // what the body is locked to: a body, −1 the world
+        bool child_is_first = false;
         Vec3 arm, other_arm;
     };
     struct Gain {
@@ -86,9 +95,8 @@ private:
         Vec3 tilt;            // vector part of the relative turn, world axes: the rows' angles are 2 × it
         double tilt_softness = 0.0;
         Inertia6 stiffness;  // K; of a floating root, the factor of its mass
-        Twist right, base;   // y and d
-        Twist left;          // of y, by the velocities so far; then the correction of the velocity
-        Twist impulse, velocity;
+        Twist base, impulse, velocity;
+        Twist left;  // y, or what the velocities so far leave of it; then the correction of the velocity
     };
     struct Carried {
         Inertia6 mass;
@@ -96,9 +104,10 @@ private:
     };
 
     template <bool FIRST>
-    void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads) noexcept;
-    void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first) noexcept;
-    void locate(const Link& link, std::span<const BodyState> bodies, Work& work) const noexcept;
+    void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool again) noexcept;
+    void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first,
+                   bool again) noexcept;
+    void locate(std::size_t k, std::span<const BodyState> bodies, Work& work) const noexcept;
     Twist momentum_of(const Link& link, const BodyState& s, const LockedLoads& loads) const noexcept;
 
     /// How far the rows give way under an impulse: C μ.
@@ -113,7 +122,7 @@ private:
         const Link& link = links_[k];
         Work& work = works_[k];
         Twist impulse, step;
-        if (link.joint < 0) {
+        if (link.gain < 0) {
             step = solve_whole(work.stiffness, work.base);
         } else {
             Twist ahead;
@@ -123,8 +132,7 @@ private:
                 ahead = to_joint(first ? parent.velocity : parent.left, work.other_arm);
                 impulse += work.stiffness * ahead;
             }
-            step = to_centre(
-                (first ? work.right : work.left) + ahead - give(work, gains_[link.gain], impulse), work.arm);
+            step = to_centre(work.left + ahead - give(work, gains_[link.gain], impulse), work.arm);
         }
         if (first) {
             work.velocity = step;
@@ -136,7 +144,20 @@ private:
         work.impulse += impulse;
     }
 
+    /// Beyond the caches the links' numbers are asked for before they are needed.
+    static constexpr std::size_t AHEAD = 6;
+    static void ask(const void* memory, std::size_t bytes) noexcept {
+        const char* from = static_cast<const char*>(memory);
+        for (std::size_t at = 0; at < bytes; at += 64) __builtin_prefetch(from + at, 1);
+    }
+    void ask(std::size_t k, std::span<const BodyState> bodies, bool states) const noexcept {
+        if (k >= links_.size()) return;
+        ask(&works_[k], sizeof(Work));
+        if (states) ask(&bodies[links_[k].body], sizeof(BodyState));
+    }
+
     std::vector<Link> links_;  // leaves first; a parent follows one of its children at once
+    std::vector<Hold> holds_;
     std::vector<Gain> gains_;
     LargeArray<Work> works_;
     std::vector<Carried> waiting_;

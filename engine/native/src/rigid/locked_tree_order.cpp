@@ -90,6 +90,7 @@ bool LockedTree::analyse(std::span<const BodyConstants> constants, const JointSe
     const int count = static_cast<int>(preorder.size());
     for (int k = 0; k < count; ++k) link_of[preorder[count - 1 - k]] = k;
     links_.assign(preorder.size(), {});
+    holds_.assign(preorder.size(), {});
     std::vector<std::uint8_t> waits_for(bodies, 0);
     std::size_t depth = 0, deepest = 0;
     operations_ = 0;
@@ -98,23 +99,24 @@ bool LockedTree::analyse(std::span<const BodyConstants> constants, const JointSe
         Link& link = links_[k];
         link.body = preorder[count - 1 - k];
         link.mass = constants[link.body].mass;
-        link.joint = joint_of[link.body];
+        Hold& hold = holds_[k];
+        hold.joint = joint_of[link.body];
         link.leaf = children[link.body].empty();
         link.takes = children[link.body].size() > 1;
         if (link.takes) --depth;
         operations_ += 2;
-        if (link.joint < 0) continue;
-        const JointConstants& joint = joints.constants(link.joint);
-        link.child_is_first = first[link.body] != 0;
-        link.arm = link.child_is_first ? joint.first_arm : joint.second_arm;
-        link.other_arm = link.child_is_first ? joint.second_arm : joint.first_arm;
-        const JointSet::RowLaw along = joints.law(link.joint, 0), about = joints.law(link.joint, 3);
+        if (hold.joint < 0) continue;
+        const JointConstants& joint = joints.constants(hold.joint);
+        hold.child_is_first = first[link.body] != 0;
+        hold.arm = hold.child_is_first ? joint.first_arm : joint.second_arm;
+        hold.other_arm = hold.child_is_first ? joint.second_arm : joint.first_arm;
+        const JointSet::RowLaw along = joints.law(hold.joint, 0), about = joints.law(hold.joint, 3);
         const Gain gain{{along.upsilon, about.upsilon},
                         {along.violation, about.violation},
                         {along.softness, about.softness}};
         if (gains_.empty() || !(gains_.back() == gain)) gains_.push_back(gain);
         link.gain = static_cast<int>(gains_.size()) - 1;
-        link.other = other_of[link.body];
+        hold.other = other_of[link.body];
         operations_ += 1;
         if (parent[link.body] < 0) continue;
         link.parent = link_of[parent[link.body]];

@@ -127,13 +127,15 @@ void RigidSystem::fill_block_momenta() {
 void RigidSystem::solve_locked() {
     const bool at_once = !clock_;
     mixed_values_ = false;
-    const bool finite = locked_.solve(live_.bodies, {h_, constants_, acceleration_, force_},
-                                      method_.refinements, [this, at_once](int body, const Twist& v) {
-                                          BodyState& s = live_.bodies[body];
-                                          s.velocity = v.linear;
-                                          s.angular_momentum = s.inertia * v.angular;
-                                          if (at_once) integrate_body(body);
-                                      });
+    LockedLoads loads{h_, stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{}, constants_, {}, force_};
+    if (stages_.runs(Stage::apply_loads) || !load_follows_.empty()) loads.acceleration = acceleration_;
+    const bool finite =
+        locked_.solve(live_.bodies, loads, method_.refinements, [this, at_once](int body, const Twist& v) {
+            BodyState& s = live_.bodies[body];
+            s.velocity = v.linear;
+            s.angular_momentum = s.inertia * v.angular;
+            if (at_once) integrate_body(body);
+        });
     if (!finite) live_.not_solved = tied_.front();
     tied_are_moved_ = at_once && finite;
     undelivered_ = finite;

@@ -152,10 +152,17 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
 }
 
 void RigidSystem::tell(StageChoices& choices) const {
-    if (locked_.empty()) return;
-    choices[static_cast<std::size_t>(Stage::solve_block)].reason =
-        std::string("locks make trees: solved link by link, leaves first, without a matrix") +
-        (contacts_ ? " (while nothing touches)" : "");
+    std::string& solve = choices[static_cast<std::size_t>(Stage::solve_block)].reason;
+    if (!locked_.empty())
+        solve = std::string("locks make trees: solved link by link, leaves first, without a matrix") +
+                (contacts_ ? " (while nothing touches)" : "");
+    if (!in_tree_) return;
+    solve = "joints make trees: " + std::to_string(tree_.coordinates()) + " joint coordinates, " +
+            std::to_string(tree_.rows()) + " rows to close loops, by Newton's method in a band";
+    choices[static_cast<std::size_t>(Stage::correct_curvature)].reason =
+        "joint coordinates keep the joints by construction";
+    choices[static_cast<std::size_t>(Stage::assemble_rows)].reason =
+        "all rows only where joint coordinates find no step, and for what is read";
 }
 
 }  // namespace spook

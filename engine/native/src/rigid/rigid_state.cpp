@@ -24,15 +24,8 @@ Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept {
 }
 
 BodyConstants constants_of(const RigidBodySpec& spec) noexcept {
-    return {spec.motion,
-            spec.particle,
-            spec.mass,
-            spec.inertia,
-            spec.position,
-            spec.orientation,
-            rotation(spec.orientation),
-            spec.force,
-            spec.torque};
+    return {spec.motion,   spec.particle,    spec.mass,  spec.inertia, rotation(spec.orientation),
+            spec.position, spec.orientation, spec.force, spec.torque};
 }
 
 BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept {

@@ -14,10 +14,10 @@ struct BodyConstants {
     Motion motion = Motion::dynamic;
     bool particle = false;
     double mass = 0.0;
-    Vec3 inertia;     // principal
-    Vec3 start;       // position at the start
-    Quat start_turn;  // orientation at the start
+    Vec3 inertia;  // principal
     Mat3 start_rotation;
+    Vec3 start;          // position at the start
+    Quat start_turn;     // orientation at the start
     Vec3 force, torque;  // constant loads
 
     bool moves() const noexcept { return motion == Motion::dynamic; }

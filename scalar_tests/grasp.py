@@ -1,0 +1,187 @@
+"""Do two fingers hold a capsule by friction, and let it slip when they press too little?"""
+
+from __future__ import annotations
+
+import functools
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    Box,
+    Capsule,
+    Final,
+    Load,
+    Material,
+    Method,
+    Position,
+    Prismatic,
+    Result,
+    RigidBody,
+    Scene,
+    Velocity,
+)
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, sweep
+
+GRAVITY = 9.81  # m/s²
+MASS, FINGER = 0.5, 0.2  # kg
+RADIUS, LENGTH = 0.03, 0.1  # m
+FRICTION = 0.4
+TIME_STEPS = (1.0 / 60.0, 1.0 / 20.0)  # s
+DURATION = 1.0  # s
+LEAST = 0.5 * MASS * GRAVITY / FRICTION  # N, what each finger must press with
+HELD, SLIPPING = 1.001, 0.9  # of that
+ACCURACY = 1e-9  # of the friction solver, relative
+
+
+@functools.cache
+def scene(share: float) -> Scene:
+    """A capsule across two fingers on vertical faces; each presses with `share` of what is needed."""
+    rough = Material(friction=FRICTION)
+    bodies = [
+        RigidBody(
+            name="capsule",
+            mass=MASS,
+            shape=Capsule(RADIUS, LENGTH),
+            position=(0, 0, 0),
+            orientation=(1, 1, 0, 0),
+            material=rough,
+        )
+    ]
+    joints, loads = [], []
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        place = (side * (RADIUS + 0.01), 0.0, 0.0)
+        bodies.append(
+            RigidBody(name=name, mass=FINGER, shape=Box((0.02, 0.2, 0.2)), position=place, material=rough)
+        )
+        joints.append(Prismatic(name=f"{name} guide", between=(WORLD, name), axis=(1, 0, 0), compliance=0.0))
+        loads.append(Load(name=f"{name} press", body=name, force=(-side * share * LEAST, 0, 0)))
+    return Scene(
+        bodies=tuple(bodies), constraints=tuple(joints), forces=tuple(loads), gravity=(0, 0, -GRAVITY)
+    )
+
+
+def acceleration(share: float) -> float:
+    """Downwards [m/s²]: what two fingers do not hold."""
+    return max(0.0, GRAVITY * (1.0 - share))
+
+
+def measure(simulate: Simulate, time_step: float) -> dict[str, float]:
+    """Held, and let go, for a second."""
+    observe = {
+        "x": Final(quantity=Position("capsule"), from_start=True),
+        "v": Final(quantity=Velocity("capsule")),
+    }
+    held = simulate(scene(HELD), time_step=time_step, duration=DURATION, observe=observe)
+    loose = simulate(scene(SLIPPING), time_step=time_step, duration=0.2, observe=observe)
+    return {
+        "held_moved": max(abs(float(x)) for x in held["x"]),
+        "slip_error": -float(loose["v"][2]) / (0.2 * acceleration(SLIPPING)) - 1.0,
+    }
+
+
+def sunk(simulate: Simulate, time_step: float, method: Method) -> float:
+    """How far the held capsule has moved in a second [m]."""
+    observe = {"x": Final(quantity=Position("capsule"), from_start=True)}
+    result = simulate(scene(HELD), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return float(result["x"][2])
+
+
+def run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(scene(HELD), time_step=time_step, duration=DURATION, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Acceleration against the force of the fingers."""
+    shares = tuple(0.05 * k for k in range(10, 27))
+
+    def found(share: float) -> float:
+        observe = {"v": Final(quantity=Velocity("capsule"))}
+        return -float(simulate(scene(share), time_step=TIME_STEPS[0], steps=6, observe=observe)["v"][2]) / 0.1
+
+    return Drawing(
+        curves=(
+            line("simulation", shares, sweep(shares, found), "points"),
+            line("g − 2 µ F/m", shares, map(acceleration, shares), "reference"),
+        ),
+        x_label="force of each finger over the least that holds",
+        y_label="acceleration downwards [m/s²]",
+    )
+
+
+def _asked(time_step: float) -> Measurement:
+    slack = 10.0 * ACCURACY * SLIPPING / (1.0 - SLIPPING)
+    return ask(
+        functools.partial(measure, time_step=time_step),
+        (
+            error(
+                "held_moved",
+                "how far the capsule moves in a second while it is held",
+                "m",
+                1e-9,
+                "statics: friction is below its bound, so that nothing slips at any time step",
+            ),
+            error(
+                "slip_error",
+                "relative error of its speed, pressed with nine tenths of that, after 0.2 s",
+                "1",
+                slack,
+                "closed form; ten times the solver's 1e-9 of the friction force over what is left of the weight",
+                "companion",
+            ),
+        ),
+        "the time of holding does not depend on the time step",
+        time_step,
+    )
+
+
+TEST = ScalarTest(
+    title="Grasp",
+    question="Do two fingers hold a capsule by friction, and let it slip when they press too little?",
+    why="Grasps slip slowly out of the fingers in engines whose friction creeps, the faster the longer the step (Erez, "
+    "Tassa and Todorov 2015). A hand that holds must hold, and at the least force there is.",
+    model="A capsule lies across between the upright faces of two fingers, which are guided sideways and press with "
+    "1.001 and with 0.9 of the least force that holds it.",
+    parameters=(
+        ("capsule", "0.5 kg, radius 0.03 m, length 0.1 m"),
+        ("fingers", "0.2 kg each, 0.02 × 0.2 × 0.2 m"),
+        ("friction coefficient", "0.4"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1/60 s and 1/20 s"),
+    ),
+    theory=(
+        "It is held if 2 µ F ≥ m g.",
+        "Below, both contacts slip: a = g − 2 µ F/m.",
+    ),
+    reference="Statics and Coulomb's law (closed form).",
+    conclusion="Green: what is held stays at any time step. Red: friction creeps, or its bound is wrong.",
+    source="ours; after T. Erez, Y. Tassa and E. Todorov, Simulation tools for model-based robotics, 2015",
+    measurements=tuple(_asked(h) for h in TIME_STEPS),
+    example=lambda: Example(scene=scene(SLIPPING), time_step=TIME_STEPS[0], duration=0.4),
+    figures=(Figure(name="force", title="Acceleration against the force of the fingers", draw=draw),),
+    ladders=(
+        Ladder(
+            name="held",
+            description="how far the held capsule sinks in a second: not at all is right",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (20, 60, 180)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=sunk,
+            run=run,
+        ),
+    ),
+)

@@ -1,0 +1,208 @@
+"""Does a cable of rigid links hang in its discrete catenary, and pull at its ends as statics says?"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    Ball,
+    Capsule,
+    ConstraintForce,
+    Final,
+    MaximumAbsolute,
+    Method,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+)
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+GRAVITY = 9.81  # m/s²
+SPAN, LENGTH, MASS = 8.0, 10.0, 5.0  # m, m, kg, of the whole cable
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 1.0  # s
+# Links, and a step in which T h²/(m l) stays below 0.15: from 0.3 on rigid links under tension run away (string stiffness).
+ASKED = ((10, TIME_STEP), (25, TIME_STEP), (50, TIME_STEP / 4.0))
+
+
+def angles(count: int, pull: float) -> list[float]:
+    """Of each link from the horizontal [rad], hung with the horizontal force `pull` [N]: moments about its middle."""
+    weight = MASS * GRAVITY / count
+    return [math.atan((k + 0.5 - 0.5 * count) * weight / pull) for k in range(count)]
+
+
+@functools.cache
+def horizontal(count: int) -> float:
+    """The horizontal force [N] with which the links reach over the span; by halving."""
+    low, high = 1e-3, 1e4
+    for _ in range(200):
+        pull = 0.5 * (low + high)
+        reach = LENGTH / count * math.fsum(math.cos(angle) for angle in angles(count, pull))
+        low, high = (pull, high) if reach < SPAN else (low, pull)
+    return 0.5 * (low + high)
+
+
+def catenary() -> float:
+    """The horizontal force [N] of a cable without links: 2 a sinh(span/(2 a)) = length, H = a w."""
+    low, high = 0.5, 1e3
+    for _ in range(200):
+        a = 0.5 * (low + high)
+        low, high = (a, high) if 2.0 * a * math.sinh(0.5 * SPAN / a) > LENGTH else (low, a)
+    return low * MASS * GRAVITY / LENGTH
+
+
+def nodes(count: int) -> list[tuple[float, float]]:
+    """Joints from the left end to the right [m]."""
+    x, z, found = -0.5 * SPAN, 0.0, [(-0.5 * SPAN, 0.0)]
+    for angle in angles(count, horizontal(count)):
+        x, z = x + LENGTH / count * math.cos(angle), z + LENGTH / count * math.sin(angle)
+        found.append((x, z))
+    return found
+
+
+@functools.cache
+def scene(count: int) -> Scene:
+    """Thin rods on ball joints, at rest where statics puts them."""
+    length, places = LENGTH / count, nodes(count)
+    rods, joints = [], []
+    for k, angle in enumerate(angles(count, horizontal(count))):
+        (x, z), (u, w) = places[k], places[k + 1]
+        turn = 0.5 * (0.5 * math.pi - angle)  # the rod lies along its z axis
+        rods.append(
+            RigidBody(
+                name=f"link {k}",
+                mass=MASS / count,
+                shape=Capsule(0.02, length - 0.04),
+                inertia=(MASS / count * length**2 / 12.0, MASS / count * length**2 / 12.0, 1e-5),
+                position=(0.5 * (x + u), 0.0, 0.5 * (z + w)),
+                orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
+            )
+        )
+    names = [WORLD, *(rod.name for rod in rods), WORLD]
+    for k, (x, z) in enumerate(places):
+        between = (names[k], names[k + 1]) if k < count else (WORLD, names[k])
+        joints.append(Ball(name=f"joint {k}", between=between, at=(x, 0.0, z), compliance=0.0))
+    return Scene(bodies=tuple(rods), constraints=tuple(joints), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+
+
+def measure(simulate: Simulate, count: int, time_step: float) -> dict[str, float]:
+    """A second at rest."""
+    middle = f"link {count // 2}"
+    observe = {
+        "x": MaximumAbsolute(quantity=Position(middle), from_start=True),
+        "force": Final(quantity=ConstraintForce("joint 0")),
+    }
+    result = simulate(scene(count), time_step=time_step, duration=DURATION, observe=observe)
+    pull, weight = horizontal(count), MASS * GRAVITY
+    # On the first link at the left end: to the left, and half of the weight up.
+    return {
+        "pull_error": -float(result["force"][0]) / pull - 1.0,
+        "carried_error": float(result["force"][2]) / (0.5 * weight) - 1.0,
+        "moved": float(max(result["x"])),
+    }
+
+
+def pull_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Relative error of the horizontal force of the cable of ten links after a second."""
+    observe = {"force": Final(quantity=ConstraintForce("joint 0"))}
+    result = simulate(scene(10), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return -float(result["force"][0]) / horizontal(10) - 1.0
+
+
+def run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(scene(10), time_step=time_step, duration=DURATION, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Where the links lie after a second, and the catenary."""
+    count = 10
+    observe = {str(k): Final(quantity=Position(f"link {k}")) for k in range(count)}
+    result = simulate(scene(count), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    places = [result[str(k)] for k in range(count)]
+    a = catenary() * LENGTH / (MASS * GRAVITY)
+    x = [SPAN * (k / 60.0 - 0.5) for k in range(61)]
+    top = math.cosh(0.5 * SPAN / a)
+    return Drawing(
+        curves=(
+            line("middles of the links", (p[0] for p in places), (p[2] for p in places), "points"),
+            line("catenary", x, (a * (math.cosh(u / a) - top) for u in x), "reference"),
+        ),
+        x_label="x [m]",
+        y_label="z [m]",
+        note=f"Ten links pull with {told(horizontal(count), 4)} N, a smooth cable with {told(catenary(), 4)} N.",
+    )
+
+
+def _asked(count: int, time_step: float) -> Measurement:
+    asked = ask(
+        functools.partial(measure, count=count, time_step=time_step),
+        (
+            error("pull_error", "relative error of the horizontal force at an end", "1", 1e-9),
+            error(
+                "carried_error", "relative error of the vertical force at an end", "1", 1e-9, role="companion"
+            ),
+            error("moved", "how far the middle of the cable moves in a second", "m", 1e-9, role="companion"),
+        ),
+        f"{count} links",
+        time_step,
+    )
+    return Measurement(
+        configuration=asked.configuration,
+        time_step=time_step,
+        parameters={"N": float(count)},
+        metrics=asked.metrics,
+        measure=asked.measure,
+        note=asked.note,
+    )
+
+
+TEST = ScalarTest(
+    title="Hanging cable",
+    question="Does a cable of rigid links hang in its discrete catenary, and pull at its ends as statics says?",
+    why="A cable's pull comes from its shape alone: joints that give way, or forces that leak along the chain, change it.",
+    model="Thin uniform rods on ball joints hang between two points of the same height, at rest where statics puts them.",
+    parameters=(
+        ("span", "8 m"),
+        ("cable", "10 m, 5 kg, in 10, 25 and 50 links"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1/60 s; 1/240 s with 50 links, which 1/60 s makes run away: T h²/(m l) = 0.42"),
+    ),
+    theory=(
+        "Moments about the middle of link k: tan φ_k = V_k/H, V_k the weight between it and the lowest point.",
+        "H follows from the span: Σ l cos φ_k = 8 m. The ends carry half of the weight each.",
+        "With ever shorter links it becomes the catenary, 2 a sinh(span/(2 a)) = length, H = a w, as 1/N².",
+    ),
+    reference="Statics of the links (closed form but for H, found by halving).",
+    conclusion="Green: joints carry the cable's weight and pull. Red: they give way or forces are wrong.",
+    source="ours; the catenary is J. Bernoulli's problem of 1690",
+    measurements=tuple(_asked(*asked) for asked in ASKED),
+    example=lambda: Example(scene=scene(10), time_step=TIME_STEP, duration=2.0),
+    figures=(Figure(name="shape", title="A hanging cable", draw=draw),),
+    ladders=(
+        Ladder(
+            name="pull",
+            description="relative error of the horizontal force at an end after a second, ten links",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120)),
+            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),
+            error=pull_error,
+            run=run,
+        ),
+    ),
+)

@@ -1,0 +1,198 @@
+"""Does what slides or rolls over a surface of triangles feel the seams between them?"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    Box,
+    Final,
+    HeightField,
+    Material,
+    Method,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line
+
+GRAVITY = 9.81  # m/s²
+FRICTION = 0.3
+CELL, CELLS = 0.23, 16  # m: the corners and sides of the triangles lie askew to every way taken
+TIME_STEP = 1.0 / 60.0  # s
+STEPS = 60
+SPEED = (2.1, 0.9)  # m/s, of the box
+RADIUS = 0.1  # m, of the ball
+SLOPE = 0.2  # tan θ: the ball rolls, as tan θ < 3.5 µ
+TILT = math.atan(SLOPE)
+PLACE = (0.5, 0.4)  # m, of both at the start
+
+
+def floor(friction: float, slope: float) -> RigidBody:
+    """A plane of 512 triangles that falls towards +x."""
+    rows = tuple(tuple(-slope * CELL * i for _ in range(CELLS + 1)) for i in range(CELLS + 1))
+    return RigidBody(
+        name="floor",
+        motion="static",
+        shape=HeightField((CELL, CELL), rows),
+        position=(0, 0, 0),
+        material=Material(friction=friction),
+    )
+
+
+@functools.cache
+def sliding(friction: float) -> Scene:
+    """A box that slides over the level floor."""
+    box = RigidBody(
+        name="body",
+        mass=2.0,
+        shape=Box((0.3, 0.2, 0.1)),
+        position=(*PLACE, 0.05),
+        velocity=(*SPEED, 0.0),
+        material=Material(friction=friction),
+    )
+    return Scene(bodies=(floor(friction, 0.0), box), gravity=(0.0, 0.0, -GRAVITY))
+
+
+@functools.cache
+def rolling() -> Scene:
+    """A ball let go on the slope."""
+    c, s = math.cos(TILT), math.sin(TILT)
+    ball = RigidBody(
+        name="body",
+        mass=2.0,
+        shape=Sphere(RADIUS),
+        position=(PLACE[0] + RADIUS * s, PLACE[1], -SLOPE * PLACE[0] + RADIUS * c),
+        material=Material(friction=FRICTION),
+    )
+    return Scene(bodies=(floor(FRICTION, SLOPE), ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def measure(simulate: Simulate) -> dict[str, float]:
+    """A second each: without friction, with it, and rolling."""
+    observe = {"v": Trace(quantity=Velocity("body"))}
+    smooth, rough, ball = (
+        simulate(scene, time_step=TIME_STEP, steps=STEPS, observe=observe)["v"]
+        for scene in (sliding(0.0), sliding(0.05), rolling())
+    )
+    start, whole = math.hypot(*SPEED), STEPS * TIME_STEP
+    along = np.array((math.cos(TILT), 0.0, -math.sin(TILT)))
+    reached = 5.0 / 7.0 * GRAVITY * math.sin(TILT) * whole
+    slowed = (1.0 - 0.05 * GRAVITY * whole / start) * np.array((*SPEED, 0.0))
+    return {
+        "smooth_error": float(np.abs(smooth - (*SPEED, 0.0)).max()) / start,
+        "rough_error": float(np.abs(rough[-1] - slowed).max()) / start,
+        "rolling_error": float(np.abs(ball[-1] - reached * along).max()) / reached,
+    }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Where the ball is after a second, less ½ a t² [m]: of first order, as everywhere."""
+    observe = {"x": Final(quantity=Position("body"), from_start=True)}
+    x = simulate(rolling(), time_step=time_step, duration=1.0, method=method, observe=observe)["x"]
+    return math.hypot(float(x[0]), float(x[2])) - 2.5 / 7.0 * GRAVITY * math.sin(TILT)
+
+
+def run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same second with nothing observed."""
+    return simulate(rolling(), time_step=time_step, duration=1.0, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """The box's speed with and without friction."""
+    times = [k * TIME_STEP for k in range(STEPS + 1)]
+    curves = []
+    for friction in (0.0, 0.05, 0.2):
+        observe = {"v": Trace(quantity=Velocity("body"))}
+        v = simulate(sliding(friction), time_step=TIME_STEP, steps=STEPS, observe=observe)["v"]
+        curves.append(line(f"µ = {friction:g}", times, np.hypot(v[:, 0], v[:, 1]), "points"))
+        speeds = [max(0.0, math.hypot(*SPEED) - friction * GRAVITY * t) for t in times]
+        curves.append(line(f"v − µ g t, µ = {friction:g}", times, speeds, "reference"))
+    return Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed of the box [m/s]")
+
+
+TEST = ScalarTest(
+    title="Seams",
+    question="Does what slides or rolls over a surface of triangles feel the seams between them?",
+    why="Floors, roads and terrains are triangles. An engine that meets each triangle alone trips over sides that are "
+    "no edges: balls hop, boxes stop and cars shake on a level floor.",
+    model="A plane of 512 triangles, fixed. A box slides over it without and with friction; a ball rolls down it.",
+    parameters=(
+        ("cells", "16 × 16 of 0.23 m, two triangles each"),
+        ("box", "0.3 × 0.2 × 0.1 m, 2 kg, at 2.28 m/s across the cells"),
+        ("ball", "radius 0.1 m, 2 kg, on a slope of tan θ = 0.2"),
+        ("friction coefficient", "0 and 0.05 (box), 0.3 (ball)"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1/60 s, 60 steps"),
+    ),
+    theory=(
+        "In one plane a seam is nothing: without friction the velocity stays, with it v − µ g t.",
+        "The ball rolls: a = (5/7) g sin θ.",
+    ),
+    reference="Newton's law on a plane (closed form).",
+    conclusion="Green: inner edges are no obstacles. Red: seams push, stop or lift what passes.",
+    source="ours",
+    measurements=(
+        ask(
+            measure,
+            (
+                error(
+                    "smooth_error",
+                    "largest change of the box's velocity without friction, over its speed",
+                    "1",
+                    1e-12,
+                ),
+                error(
+                    "rough_error",
+                    "error of its velocity after a second with friction, over its first speed",
+                    "1",
+                    1e-9,
+                    role="companion",
+                ),
+                error(
+                    "rolling_error",
+                    "relative error of the ball's velocity after a second",
+                    "1",
+                    1e-9,
+                    role="companion",
+                ),
+            ),
+            "a level floor and a slope",
+            TIME_STEP,
+        ),
+    ),
+    example=lambda: Example(scene=rolling(), time_step=TIME_STEP, duration=1.5),
+    figures=(Figure(name="speed", title="A box over seams", draw=draw),),
+    ladders=(
+        Ladder(
+            name="rolled",
+            description="distance rolled in a second less ½ a t²",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=run,
+        ),
+    ),
+)

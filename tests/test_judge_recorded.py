@@ -1,0 +1,67 @@
+"""Histories that the continuous integration of other projects has published: red where something changed, once."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.judge.noise import judge_noisy
+from tests import noise_battery as battery
+
+ROOT = Path(__file__).parent.parent
+FILES = sorted((ROOT / "tests" / "data" / "recorded").glob("*.json"))
+LEARNING = 60
+ROW = re.compile(r"\| (\w+): (\d+) series, (\d+) values \| (\d+) \| (\d+) \| (\d+) \|")
+
+
+def recorded(file: Path) -> Any:
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+@cache
+def alarms(file: Path) -> dict[str, int]:
+    """Starts of red stretches after the nights of learning, by series."""
+    found = {}
+    for name, values in recorded(file)["values"].items():
+        red = [night.state == "detected" for night in judge_noisy(values)]
+        found[name] = battery.starts(red, LEARNING)
+    return found
+
+
+def test_each_file_names_its_source_and_holds_numbers_only() -> None:
+    assert len(FILES) >= 2
+    assert sum(file.stat().st_size for file in FILES) <= 200_000
+    for file in FILES:
+        told = recorded(file)
+        assert told["source"].startswith("https://github.com/") and re.fullmatch(
+            r"[0-9a-f]{40}", told["commit"]
+        )
+        assert all(name and min(values) > 0.0 for name, values in told["values"].items())
+
+
+def test_there_are_no_more_alarms_than_asv_and_otava_see_steps_and_the_page_says_how_many() -> None:
+    page = (ROOT / "docs" / "detectors.md").read_text(encoding="utf-8")
+    rows = {row[1]: [int(number) for number in row.groups()[1:]] for row in ROW.finditer(page)}
+
+    assert rows.keys() == {file.stem for file in FILES}
+    for file in FILES:
+        series, values, ours, *_ = rows[file.stem]
+        told = recorded(file)["values"]
+        assert (len(told), sum(map(len, told.values()))) == (series, values)
+        assert sum(alarms(file).values()) == ours
+    assert sum(row[2] for row in rows.values()) <= sum(row[3] + row[4] for row in rows.values())
+
+
+def test_a_drift_that_is_red_stays_red_until_half_of_it_is_gone() -> None:
+    """A list's items took 60 % more time from one commit on, in noise of 15 %: one story, not seventeen."""
+    file = next(file for file in FILES if file.stem == "pyo3")
+
+    assert alarms(file)["list_get_item"] <= 3
+    ramp = [1.0 + 0.004 * max(0, night - 20) + 0.03 * (-1) ** night for night in range(80)]
+    states = [night.state for night in judge_noisy([*ramp, *[1.1] * 10, *[1.0] * 40])]
+    assert battery.starts([state == "detected" for state in states]) == 1
+    assert "recovered" in states[80:]
+    assert states[-1] == "green"
