@@ -52,6 +52,7 @@ struct Around {
 
     /// Calls visit(cos φ, sin φ) at every local maximum on the whole circle.
     template <class Visit> void peaks(Visit visit) const noexcept {
+        if (r == 0.0) return apex(visit);
         constexpr int parts = 16;
         double bend, before = slope(circle().turns[0], bend);
         for (int k = 1; k <= parts; ++k) {
@@ -62,6 +63,7 @@ struct Around {
     }
     /// The same from one angle to another.
     template <class Visit> void peaks(double from, double to, Visit visit) const noexcept {
+        if (r == 0.0) return apex(visit);
         const int parts = 1 + static_cast<int>(8.0 * (to - from) / std::numbers::pi);
         const double part = (to - from) / parts;
         double bend, before = slope(sine_cosine(from), bend);
@@ -73,6 +75,10 @@ struct Around {
     }
 
 private:
+    template <class Visit> void apex(Visit visit) const noexcept {
+        const double most = length(a, b);
+        if (most > 0.0) visit(a / most, b / most);
+    }
     template <class Visit> void peak(double low, double high, Visit visit) const noexcept {
         double bend, angle = 0.5 * (low + high);
         for (int round = 0; round < 80; ++round) {
@@ -198,17 +204,17 @@ void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& 
     double before = slope(circle().turns[0]);
     for (int k = 1; k <= parts; ++k) {
         double low = circle_angle(k - 1, parts), high = circle_angle(k, parts);
-        double at_low = before, at_high = before = slope(circle().turns[k * Circle::count / parts]);
+        const double at_low = before, at_high = before = slope(circle().turns[k * Circle::count / parts]);
         if ((at_low > 0.0) == (at_high > 0.0)) continue;
-        for (int round = 0; round < 100 && high - low > 4e-16;
-             ++round) {  // false position, halving now and then
-            double angle =
-                round % 3 == 2 ? 0.5 * (low + high) : low + at_low / (at_low - at_high) * (high - low);
-            if (!(angle > low && angle < high)) angle = 0.5 * (low + high);
-            const double here = slope(sine_cosine(angle));
-            if (here == 0.0) break;
-            if ((here > 0.0) == (at_low > 0.0)) low = angle, at_low = here;
-            else high = angle, at_high = here;
+        double angle = high, here = at_high, old = low, there = at_low;
+        for (int round = 0; round < 100 && here != 0.0;
+             ++round) {  // secants, halving where one leaves the bracket
+            double next = angle - here / (here - there) * (angle - old);
+            if (!(next > low && next < high)) next = 0.5 * (low + high);
+            if (std::abs(next - angle) <= 4e-16 || !(next > low && next < high)) break;
+            old = angle, there = here;
+            angle = next, here = slope(sine_cosine(angle));
+            ((here > 0.0) == (at_low > 0.0) ? low : high) = angle;
         }
         const double distance = norm(apart);
         const Vec3 crossed = cross(first_along, second_along);
