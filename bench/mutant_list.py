@@ -342,8 +342,8 @@ MUTANTS = (
         "friction holds one part in a thousand more",
         "friction",
         "contacts/contact_stage.cpp",
-        "friction.push_back({block, material.friction, soft, point.before});",
-        "friction.push_back({block, 1.001 * material.friction, soft, point.before});",
+        "friction.push_back({block, material.friction, soft, normal});",
+        "friction.push_back({block, 1.001 * material.friction, soft, normal});",
     ),
     wrong(
         "friction",

@@ -49,7 +49,7 @@ MUTANTS = (
     mutant("low-floor", "noise", "FLOOR = 0.05", "FLOOR = 0.03"),
     mutant("noise-from-four", "noise", "FEWEST = 5", "FEWEST = 4"),
     mutant("lenient-start", "noise", "FEW_NIGHTS_FLOOR = 0.5", "FEW_NIGHTS_FLOOR = 0.6"),
-    mutant("one-night-confirms", "noise", "len(self.suspects) > 1 or", "len(self.suspects) > 0 or"),
+    mutant("one-night-confirms", "noise", "len(self.suspects) > 1 and", "len(self.suspects) > 0 and"),
     mutant("no-normal", "noise", "NORMAL = 1.4826", "NORMAL = 1.0"),
     mutant("larger-is-not-better", "slower", "return -change if larger_is_better else change", "return change"),
     mutant("no-creep", "noise", "if len(recent) < CREEP or len(old) < CREEP:", "if True:"),

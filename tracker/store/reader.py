@@ -62,9 +62,9 @@ class FileReader:
 
 
 def listed(name: str, values: Iterable[Any]) -> tuple[str, dict[str, Any]]:
-    """The list of an IN (...), with its parameters."""
+    """The list of an IN (...), with its parameters; an empty one, which PostgreSQL does not know, holds nothing."""
     parameters = {f"{name}{place}": value for place, value in enumerate(values)}
-    return f"({', '.join(f':{key}' for key in parameters)})", parameters
+    return f"({', '.join(f':{key}' for key in parameters) or 'NULL'})", parameters
 
 
 def file_reader(database: str) -> FileReader | None:
