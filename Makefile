@@ -33,7 +33,7 @@ help:
 	@echo "make clean     remove what was built (the database stays)"
 
 nightly: install
-	$(BIN)/tracker nightly --db $(DB) --out $(OUT)
+	$(BIN)/tracker nightly --db $(DB) --out $(OUT) --mutants bench/mutants.json
 
 # Each worker has a core of its own: linear algebra with threads beside them only waits for them.
 test: export OPENBLAS_NUM_THREADS = 1
@@ -130,7 +130,7 @@ formulas-font: develop
 	    --flavor=woff2 --layout-features=ssty --no-hinting --output-file=site/static/formulas.woff2
 
 site: install
-	$(BIN)/tracker publish --db $(DB) --out $(OUT)
+	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json
 
 serve: install
 	$(BIN)/tracker serve $(OUT)
