@@ -16,7 +16,7 @@ constexpr double refined = 1e-16;                   // of the square of what a d
 constexpr double start_blur = 0.2;                  // of the largest natural map
 constexpr double nearest = 1.0;  // of the blur: how far units may be from the path, in the mean
 constexpr double narrow = 0.03;  // a step so short has lost the path
-constexpr double loosest_hold = 1e-5, tightest_hold = 1e-10;
+constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
 constexpr double behind = 10.0,
                  slow = 0.1;  // of the blur, and of itself: a residual that holding back leaves
 constexpr double far = 1e-3;  // a residual, of the speeds, from which the path may crawl
