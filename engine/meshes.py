@@ -81,18 +81,21 @@ def _triangle(number: int, face: Any, points: list[Vector]) -> polytope.Face:
     """Three different corners that enclose an area."""
     try:
         corners = tuple(int(k) for k in face)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         corners = ()
     if len(corners) != 3 or not all(0 <= k < len(points) for k in corners) or corners != tuple(face):
         raise SceneError(
             f"triangle mesh: triangle {number} must be three indices of its {len(points)} corners, not {face!r}"
         )
-    a, b, c = (points[k] for k in corners)
-    longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, a))
-    twice = math.hypot(*polytope.cross(polytope.minus(b, a), polytope.minus(c, a)))
-    if not twice > THIN * longest * longest:
+    if not _encloses_area(*(points[k] for k in corners)):
         raise SceneError(f"triangle mesh: triangle {number} has no area; leave it out")
     return corners
+
+
+def _encloses_area(a: Vector, b: Vector, c: Vector) -> bool:
+    longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, a))
+    twice = math.hypot(*polytope.cross(polytope.minus(b, a), polytope.minus(c, a)))
+    return twice > THIN * longest * longest
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +137,13 @@ class HeightField(_Sheet):
             raise SceneError(
                 f"height field: makes {len(triangles)} triangles, and at most {MOST_TRIANGLES} are taken"
             )
+        for face in triangles:
+            if not _encloses_area(*(points[k] for k in face)):
+                i, j = divmod(face[0], wide)
+                raise SceneError(
+                    f"height field: its triangle at row {i}, column {j} has no area at spacing {spacing}; "
+                    "make the cells more even, or the steps lower"
+                )
         object.__setattr__(self, "spacing", spacing)
         object.__setattr__(self, "heights", heights)
         object.__setattr__(self, "corners", tuple(points))

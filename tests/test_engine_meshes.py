@@ -325,6 +325,7 @@ SQUARE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0))
         (SQUARE, ((0, 1, 4),), "three indices of its 4 corners"),
         (SQUARE, ((0, 1),), "three indices"),
         (SQUARE, ((0, 1.5, 2),), "three indices"),
+        (SQUARE, ((0, 1, math.inf),), "three indices"),
         (((0, 0, math.nan), *SQUARE), ((0, 1, 2),), "corners"),
         ("corners", ((0, 1, 2),), "must be a list"),
     ],
@@ -343,6 +344,9 @@ def test_a_mesh_that_cannot_be_is_refused_in_a_sentence(corners: Any, faces: Any
         ((0, 1), ((0, 0), (0, 0)), "spacing"),
         (1.0, ((0, 0), (0, 0)), "two numbers"),
         ((1, 1), ((0, math.inf), (0, 0)), "heights"),
+        ((1e-200, 1e-200), ((0, 0), (0, 0)), "row 0, column 0 has no area"),
+        ((1e-12, 1), ((0, 0), (0, 0)), "row 0, column 0 has no area"),
+        ((1, 1), ((0, 0, 0), (0, 0, 1e12)), "row 0, column 1 has no area"),
     ],
 )
 def test_a_height_field_that_cannot_be_is_refused_in_a_sentence(
