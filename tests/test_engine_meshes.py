@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spook_tracker.engine import (
+    AngularVelocity,
     Box,
     Capsule,
     Compound,
@@ -256,6 +257,38 @@ def test_a_plank_lies_on_two_tips() -> None:
     np.testing.assert_allclose(found["x"], (0, 0, 0.55), atol=1e-8)
     shares = [-float(found[f"f{k}"][2]) for k in range(3)]
     assert shares == pytest.approx([20 * 0.8 / 1.3 / 2] * 2 + [20 * 0.5 / 1.3], rel=1e-6)
+
+
+@pytest.mark.parametrize("quarter", range(4))
+def test_whichever_edge_of_a_box_lies_across_a_ridge_it_is_held_where_they_cross(quarter: int) -> None:
+    """All four edges along it have one direction, hence one axis with the ridge; the force acts at the lowest."""
+    roof = TriangleMesh(((-3, 0, 0), (3, 0, 0), (0, 1, -1), (0, -1, -1)), ((0, 1, 2), (1, 0, 3)))
+    tilt = Rotation.from_rotvec((0.1, 0, 0))
+    about = Rotation.from_rotvec((math.pi / 4 + quarter * math.pi / 2, 0, 0))
+    turn = tilt * Rotation.from_rotvec((0, 0, math.pi / 2)) * about
+    along, up = tilt.apply((0, 1, 0)), tilt.apply((0, 0, 1))
+    centre = (0.2, 0, 0) - 0.3 * along + (0.2 * math.sqrt(2) - 1e-4) * up
+    falling = body(
+        Box((2, 0.4, 0.4)),
+        SMOOTH,
+        position=tuple(map(float, centre)),
+        orientation=quaternion(turn),
+        velocity=tuple(map(float, -up)),
+    )
+    found = run(
+        sheet(roof, SMOOTH),
+        falling,
+        steps=1,
+        gravity=(0, 0, 0),
+        v=Final(quantity=Velocity("body")),
+        w=Final(quantity=AngularVelocity("body")),
+    )
+    push = 2.0 * (found["v"] + up)
+
+    assert push @ up > 0.1
+    np.testing.assert_allclose(push / (push @ up), up, atol=1e-9)
+    torque = 0.1 * found["w"] / (push @ up)
+    np.testing.assert_allclose(torque, np.cross((0.2, 0, 0) - centre, up), atol=1e-3)
 
 
 @pytest.mark.parametrize("slider", SLIDERS)

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from spook_tracker.engine import (
+    AngularVelocity,
     Box,
     Capsule,
     Cone,
@@ -247,6 +248,61 @@ def test_logs_lie_in_a_pile() -> None:
 
     np.testing.assert_allclose(found["x"], (0, 0, 1.3), atol=1e-6)
     np.testing.assert_allclose(found["force"], (0, 0, 20.0), atol=1e-5)
+
+
+@pytest.mark.parametrize("quarter", range(4))
+@pytest.mark.parametrize("shape", [Cylinder(0.3, 2.0), Cone(0.3, 2.0)])
+def test_whichever_edge_of_a_block_a_side_lies_across_it_is_held_where_they_cross(
+    shape: Cylinder | Cone, quarter: int
+) -> None:
+    """Parallel edges share their axis with the side; the force acts at the one that is met."""
+    beam = fixed(
+        Box((2, 0.4, 0.4)),
+        material=Material(),
+        orientation=quaternion(Rotation.from_rotvec((math.pi / 4 + quarter * math.pi / 2, 0, 0))),
+    )
+    turn = Rotation.from_rotvec((math.pi / 2 + 0.1, 0, 0))
+    axis, out = turn.apply((0, 0, 1)), turn.apply((0, -1, 0))  # out of the side, downwards
+    crossing, place = np.array((0.3, 0, 0.2 * math.sqrt(2))), 0.2  # along the axis
+    narrows = 0.15 if isinstance(shape, Cone) else 0.0
+    reach = 0.225 - narrows * place if isinstance(shape, Cone) else 0.3
+    up = -(out + narrows * axis) / math.hypot(1.0, narrows)
+    centre = crossing - place * axis - reach * out - 1e-4 * up
+    falling = body(
+        shape,
+        material=Material(),
+        position=tuple(map(float, centre)),
+        orientation=quaternion(turn),
+        velocity=tuple(map(float, -up)),
+    )
+    found = run(
+        beam,
+        falling,
+        steps=1,
+        gravity=(0, 0, 0),
+        v=Final(quantity=Velocity("body")),
+        w=Final(quantity=AngularVelocity("body")),
+    )
+    push = 2.0 * (found["v"] + up)
+
+    assert push @ up > 0.1
+    np.testing.assert_allclose(push / (push @ up), up, atol=1e-9)
+    torque = 0.1 * found["w"] / (push @ up)
+    np.testing.assert_allclose(torque, np.cross(crossing - centre, up), atol=1e-3)
+
+
+def test_a_long_cone_dropped_across_a_block_gains_no_energy_on_its_edges() -> None:
+    lying = quaternion(Rotation.from_rotvec((math.pi / 2, 0, 0)))
+    found = run(
+        fixed(Box((2, 2, 1)), material=Material()),
+        RigidBody(name="body", mass=1.0, shape=Cone(1, 10), position=(0, 0, 1.51), orientation=lying),
+        steps=60,
+        energy=Trace(quantity=Energy()),
+        depth=Maximum(quantity=Penetration()),
+    )
+
+    assert np.max(found["energy"]) <= found["energy"][0] * (1 + 1e-12)
+    assert float(found["depth"]) < 0.02  # it was 0.66
 
 
 @pytest.mark.parametrize(("inside", "falls"), [(0.01, False), (-0.01, True)])

@@ -201,19 +201,20 @@ Segment farthest_line(const Frustum& frustum, Vec3 n, double slop) noexcept {
     return {low > high ? a : b, (0.5 / half) * (b - a), 0.0};
 }
 
-/// The edge or the corner that is lowest along `n`.
+/// The edge or the corner that is lowest along `n`: parallel edges share an axis, and the named one may not be lowest.
 Segment lowest_line(const Facets& facets, Vec3 n, int edge, double slop) noexcept {
     int lowest = 0;
     for (int k = 1; k < facets.corner_count; ++k)
         if (dot(n, facets.corners[k]) < dot(n, facets.corners[lowest])) lowest = k;
     const double level = dot(n, facets.corners[lowest]);
-    for (int k = 0; k < facets.edge_count; ++k) {
-        if (edge >= 0 && k != edge) continue;
-        const Vec3 a = facets.corners[facets.edges[k].from], b = facets.corners[facets.edges[k].to];
-        if (std::max(dot(n, a), dot(n, b)) - level > slop) continue;
-        const double half = 0.5 * norm(b - a);
-        return {0.5 * (a + b), (0.5 / half) * (b - a), half};
-    }
+    for (const bool any : {false, true})
+        for (int k = 0; k < facets.edge_count; ++k) {
+            if (!any && k != edge) continue;
+            const Vec3 a = facets.corners[facets.edges[k].from], b = facets.corners[facets.edges[k].to];
+            if (std::max(dot(n, a), dot(n, b)) - level > slop) continue;
+            const double half = 0.5 * norm(b - a);
+            return {0.5 * (a + b), (0.5 / half) * (b - a), half};
+        }
     return {facets.corners[lowest], any_normal_to(n), 0.0};
 }
 
