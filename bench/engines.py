@@ -65,17 +65,23 @@ def page(database: str) -> str:
         samples = {name: history.samples(run.id) for name, run in runs.items()}
     if OURS not in runs:
         raise SystemExit(f"{database} has no run of ours to set the others beside")
-    machines = {run.machine.processor for run in runs.values()}
+    machine = runs[OURS].machine
+    timed = {
+        name: told for name, told in samples.items() if runs[name].machine.fingerprint == machine.fingerprint
+    }
+    races = ranks.races(ranks.standings(timed))
+    elsewhere = ", ".join(name for name in samples if name not in timed)
     lines = [
         "# Every engine on every scene",
         "",
         "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
-        f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {' and '.join(sorted(machines))}.",
+        f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
+        *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
         "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts.",
         "",
         *_gates(samples),
-        *_first(ranks.standings(samples)),
-        *_behind(ranks.standings(samples), causes()),
+        *_first(races),
+        *_behind(races, causes()),
     ]
     return "\n".join(lines) + "\n"
 
@@ -112,14 +118,7 @@ def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
     ]
 
 
-def _places(found: Sequence[ranks.Standing]) -> dict[tuple[str, str, str], list[ranks.Standing]]:
-    groups: dict[tuple[str, str, str], list[ranks.Standing]] = {}
-    for one in found:
-        groups.setdefault((one.test, one.ladder, one.unit), []).append(one)
-    return groups
-
-
-def _first(found: Sequence[ranks.Standing]) -> list[str]:
+def _first(races: Sequence[ranks.Race]) -> list[str]:
     """Scene by scene: who comes within an error first, in what time, and what the next needs."""
     lines = [
         "## Who is first",
@@ -129,40 +128,30 @@ def _first(found: Sequence[ranks.Standing]) -> list[str]:
         "| scene | " + " | ".join(f"{error:g}" for error in ranks.ERRORS) + " |",
         "|---|" + "---|" * len(ranks.ERRORS),
     ]
-    won: Counter[str] = Counter()
-    for (test, ladder, unit), group in _places(found).items():
-        cells = []
-        for place in range(len(ranks.ERRORS)):
-            order = sorted((t, one.engine) for one in group if (t := one.seconds[place]) is not None)
-            if not order:
-                cells.append("nobody")
-                continue
-            (best, name), *rest = order
-            won[name] += 1
-            further = f"{number(rest[0][0] / best, 2)} × {rest[0][1]}" if rest and best > 0.0 else "alone"
-            cells.append(f"{name} {seconds(best)} ({further})")
-        lines.append(f"| {test}, {ladder.replace('_', ' ')} [{unit}] | {' | '.join(cells)} |")
+    scenes: dict[str, dict[float, str]] = {}
+    for race in races:
+        (best, name), *rest = race.order
+        further = f"{number(rest[0][0] / best, 2)} × {rest[0][1]}" if rest and best > 0.0 else "alone"
+        scene = f"{race.test}, {race.ladder.replace('_', ' ')} [{race.unit}]"
+        scenes.setdefault(scene, {})[race.error] = f"{name} {seconds(best)} ({further})"
+    for scene, cells in scenes.items():
+        lines.append(f"| {scene} | {' | '.join(cells.get(error, 'nobody') for error in ranks.ERRORS)} |")
+    won = Counter(race.order[0][1] for race in races)
     score = ", ".join(f"{name} {count}" for name, count in won.most_common())
-    return [*lines, "", f"First in {sum(won.values())} places (a scene at an error): {score}.", ""]
+    return [*lines, "", f"First in {len(races)} places (a scene at an error): {score}.", ""]
 
 
-def _behind(found: Sequence[ranks.Standing], known: Causes) -> list[str]:
+def _behind(races: Sequence[ranks.Race], known: Causes) -> list[str]:
     """Where another engine is first though ours was asked, by how much, and why."""
     lines = ["## Where another engine is first, and why", ""]
-    for (test, ladder, unit), group in _places(found).items():
-        for place, error in enumerate(ranks.ERRORS):
-            times = {one.engine: t for one in group if (t := one.seconds[place]) is not None}
-            asked = any(one.engine == OURS for one in group)
-            first = min(times, key=times.__getitem__, default=OURS)
-            mine = times.get(OURS)
-            if not asked or first == OURS:
-                continue
-            far = f"{number(mine / times[first], 2)} times as long" if mine is not None else "never"
-            cause, cure = known.get((test, first), ("no cause found yet", ""))
-            what = f"{test}, {ladder.replace('_', ' ')} to {quantity(error, unit)}"
-            lines.append(
-                f"- **{what}**: {first} in {seconds(times[first])}, ours {far}. {_sentences(cause, cure)}"
-            )
+    for race in races:
+        if (behind := race.behind(OURS)) is None:
+            continue
+        first, theirs, mine = behind
+        far = "never" if mine is None else f"{number(mine / theirs, 2)} times as long"
+        cause, cure = known.get((race.test, first), ("no cause found yet", ""))
+        what = f"{race.test}, {race.ladder.replace('_', ' ')} to {quantity(race.error, race.unit)}"
+        lines.append(f"- **{what}**: {first} in {seconds(theirs)}, ours {far}. {_sentences(cause, cure)}")
     return lines if len(lines) > 2 else [*lines, "Nowhere."]
 
 

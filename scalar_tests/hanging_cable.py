@@ -186,7 +186,7 @@ TEST = ScalarTest(
     theory=(
         "Moments about the middle of link k: tan φ_k = V_k/H, V_k the weight between it and the lowest point.",
         "H follows from the span: Σ l cos φ_k = 8 m. The ends carry half of the weight each.",
-        "With ever shorter links it becomes the catenary, length = 2 a sinh(span/2a), H = a w, as 1/N².",
+        "With ever shorter links it becomes the catenary of length L and span s, as 1/N²: L = 2 a sinh(s/2a), H = a w.",
     ),
     reference="Statics of the links (closed form but for H, found by halving).",
     conclusion="Green: joints carry the cable's weight and pull. Red: they give way or forces are wrong.",

@@ -15,9 +15,8 @@ from tests import postgresql
 from tests.browser import MISSING, browser, programs
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
 
-if (
-    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-):  # a shell starts what runs behind it deaf to the keyboard
+# A shell starts what runs behind it deaf to the keyboard; what tests start is to hear it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Minutes of work in few tests: they start first, so that all workers end at about the same time.

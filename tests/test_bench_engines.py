@@ -53,3 +53,15 @@ def test_a_page_without_a_run_of_ours_is_refused(engines: Any, tmp_path: Path) -
     tracker.record(THEIRS, database)
     with pytest.raises(SystemExit, match="no run of ours"):
         engines.page(database)
+
+
+def test_times_of_another_machine_are_not_set_against_ours(engines: Any, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/engines.db"
+    machine = msgspec.structs.replace(THEIRS.machine, fingerprint="another")
+    for run in (document(0), msgspec.structs.replace(THEIRS, machine=machine)):
+        tracker.record(run, database)
+    told = engines.page(database)
+
+    assert "not timed here: rival." in told
+    assert "| rival | 5 | 1 | 0 | 1 |" in told, "its answers count wherever they were given"
+    assert told.endswith("Nowhere.\n")

@@ -168,3 +168,16 @@ def test_what_it_lacks_is_not_supported_by_name_before_anything_runs() -> None:
     )
     with pytest.raises(NotSupported, match="beside a centre of mass"):
         CANNON.simulate(Scene(bodies=(box,), constraints=(rod,), gravity=GRAVITY), time_step=STEP, steps=1)
+
+
+@pytest.mark.parametrize(("kept_apart", "moves"), [((), True), ((("b", "a"),), False)])
+def test_pairs_that_must_not_touch_do_not(kept_apart: Any, moves: bool) -> None:
+    """Two boxes that overlap by half: pushed apart, unless they must not touch, whichever is named first."""
+    boxes = [
+        RigidBody(name=name, mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.5 * k, 0.0, 0.0))
+        for k, name in enumerate("ab")
+    ]
+    scene = Scene(bodies=tuple(boxes), no_contact=kept_apart)
+    run = CANNON.simulate(scene, time_step=STEP, steps=5, observe={"end": Final(quantity=Position("a"))})
+
+    assert (abs(float(run["end"][0])) > 1e-3) is moves

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -80,6 +81,25 @@ def test_a_task_longer_than_a_pipe_holds_arrives_whole(tmp_path: Path) -> None:
     for _ in range(2):
         made = node.run(script(tmp_path, text), task(names=names), 30.0)
         assert made.positions[0, 0, 0] == len(names)
+
+
+@needs_node
+def test_a_process_that_dies_idle_is_no_fault_of_the_next_task(tmp_path: Path) -> None:
+    engine = script(tmp_path, "return { state: () => [process.pid, ...Array(12).fill(0)], step: () => {} };")
+    pid = int(node.run(engine, task(), 30.0).positions[0, 0, 0])
+    os.kill(pid, signal.SIGKILL)
+    next(one for one in node._SERVED.values() if one._process.pid == pid)._process.wait(20.0)
+    assert int(node.run(engine, task(), 30.0).positions[0, 0, 0]) != pid
+
+
+@needs_node
+def test_a_task_that_is_never_read_is_timed_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What hangs after its answer reads no task, and a pipe holds only the beginning of a large one."""
+    monkeypatch.setattr(node, "GRACE", 0.5)
+    text = "return { state: () => Array(13).fill(0), step: () => {}, free: () => { for (;;); } };"
+    engine = script(tmp_path, text)
+    assert node.run(engine, task(), 30.0).status == "completed"
+    assert node.run(engine, task(names="x" * 1_000_000), 0.5).status == "timed_out"
 
 
 @needs_node

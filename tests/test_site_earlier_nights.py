@@ -6,9 +6,12 @@ from datetime import timedelta
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
+
+from spook_tracker.tracker.website.diagrams import ladder_charts, view
 from spook_tracker.tracker.website.earlier_nights import earlier_nights
 from spook_tracker.tracker.website.nights import book
-from tests.synthetic_history import START, history
+from tests.synthetic_history import START, DocumentHistory, history
 
 
 def night(index: int, day: float, version: str = "1.0.0+g12", started: str = "", dirty: bool = False) -> Any:
@@ -19,7 +22,7 @@ def night(index: int, day: float, version: str = "1.0.0+g12", started: str = "",
 
 
 def chosen(nights: list[Any], before: int) -> list[tuple[str, int]]:
-    return [(one.key, one.index) for one in earlier_nights(nights, before)]
+    return [(one.key, one.index) for one in earlier_nights(nights[-1], nights[: before + 1])]
 
 
 def test_a_week_and_a_month_are_the_newest_nights_at_least_that_old() -> None:
@@ -44,9 +47,6 @@ def test_a_night_is_offered_once_and_a_changed_tree_is_no_release() -> None:
 
 def test_a_start_that_is_no_moment_offers_no_week() -> None:
     assert chosen([night(0, 0), night(1, 20, started="yesterday")], 0) == [("before", 0)]
-    assert (
-        chosen([night(0, 0, started="?"), night(1, 1), night(2, 20)], 1) == [("before", 1), ("week", 1)][:1]
-    )
 
 
 def test_a_ladder_keeps_the_values_of_the_nights_that_are_offered() -> None:
@@ -54,3 +54,21 @@ def test_a_ladder_keeps_the_values_of_the_nights_that_are_offered() -> None:
     assert [(one.key, one.index) for one in told.earlier] == [("before", 10), ("week", 4)]
     ladder = next(t for test in told.tests for t in test.of_kind("ladder"))
     assert {i: sample.value for i, sample in ladder.earlier.items()} == {i: ladder.values[i] for i in (10, 4)}
+
+
+def test_a_night_without_ladders_is_not_offered_and_does_not_hide_an_older_one_that_has_some() -> None:
+    runs = list(history(12).documents.values())
+    bare = msgspec.structs.replace(
+        runs[4], samples=tuple(s for s in runs[4].samples if "/ladder:" not in s.series)
+    )
+    told = book(DocumentHistory([*runs[:4], bare, *runs[5:]]))
+    assert [(one.key, one.index) for one in told.earlier] == [("before", 10), ("week", 3)]
+
+
+def test_the_table_of_a_chart_has_tonights_points_before_any_earlier_ones() -> None:
+    told = book(history(40))
+    test = next(test for test in told.tests if test.of_kind("ladder"))
+    for chart in ladder_charts(test, earlier=told.earlier):
+        shown = view(chart)
+        assert not shown.left_out, "no point of tonight was thinned out"
+        assert not any("week" in row[0] or "month" in row[0] for row in shown.rows)

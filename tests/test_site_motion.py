@@ -68,6 +68,17 @@ def replay(driver, site, state=""):
     wait_for(driver, "!!document.getElementById('replay').player")
 
 
+def test_a_wide_ground_leaves_room_for_nothing_above_or_below_it(driver, site):
+    """Drawn as far as its farthest corner in every direction, what stands on it would be a dot."""
+    replay(driver, site)
+    ends = driver.execute_script(
+        "return extentOf({bodies: 1, count: 1, links: [], attractors: [], position: [0, 0, 0], solids: ["
+        "{kind: 'facets', fixed: true, body: 0, position: [1, 0, 0.5], orientation: [1, 0, 0, 0],"
+        " size: [3, 0, 0, 0, 8, 0, 0, 8, 6, 0]}]})"
+    )
+    assert ends == {"low": [1, 0, 0.5], "high": [9, 6, 0.5]}
+
+
 def test_a_replay_shows_where_the_engine_put_the_body(driver, site, recorded):
     replay(driver, site)
     driver.execute_script("document.getElementById('replay').player.seek(200)")

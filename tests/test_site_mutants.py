@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from bench import mutants as bench
+from spook_tracker.tracker import library
+from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.website.page_mutants import RecordError, read_mutants
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import history
@@ -57,6 +60,23 @@ def test_a_file_that_is_no_record_is_one_sentence(tmp_path: Path, content: str) 
         read_mutants(tmp_path / "record.json")
     with pytest.raises(RecordError, match="make mutants"):
         read_mutants(tmp_path / "nowhere.json")
+
+
+@pytest.mark.parametrize("command", [["nightly", "--engine", "spook,mujoco"], ["ci", "night"]])
+def test_no_night_is_measured_in_vain_when_the_record_cannot_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    def measured(*asked: Any, **named: Any) -> None:
+        raise AssertionError("it was measured")
+
+    monkeypatch.setattr("spook_tracker.tracker.measure.run.run", measured)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, [*command, "--mutants", "nowhere.json", "--db", "sqlite:///tracker.db"])
+
+    assert done.exit_code == 2
+    assert "tracker: nowhere.json: No such file or directory; `make mutants` writes it" in done.output
+    with pytest.raises(RecordError, match="nowhere"):
+        library.nightly("sqlite:///tracker.db", Path("public"), mutants=Path("nowhere.json"))
 
 
 def test_the_record_is_of_the_mutants_there_are() -> None:

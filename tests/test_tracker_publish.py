@@ -294,6 +294,26 @@ def test_values_without_a_description_have_a_page_too(tmp_path: Path) -> None:
     assert Reader((tmp_path / "public" / "index.html").read_text()).open == []
 
 
+def test_gates_at_two_time_steps_say_which_is_which(tmp_path: Path) -> None:
+    run = document(0)
+    gate = next(s for s in run.series if s.role == "gate" and s.test == "beam")
+    fine = msgspec.structs.replace(gate, key=f"{gate.key}-fine", time_step=1.0 / 240.0)
+    same = next(s for s in run.samples if s.series == gate.key)
+    both = msgspec.structs.replace(
+        run,
+        series=(*run.series, fine),
+        samples=(*run.samples, msgspec.structs.replace(same, series=fine.key)),
+    )
+    publish(DocumentHistory([both]), tmp_path / "public")
+    pages = tmp_path / "public" / "tests"
+
+    assert all(f", h = {h} s</bdi>" in (pages / "beam.html").read_text() for h in ("0.01667", "0.004167"))
+    assert (
+        ", h = "
+        not in (pages / "door.html").read_text().partition('class="gate card')[2].partition("<nav")[0]
+    )
+
+
 def test_a_night_of_one_test_does_not_pass_for_the_others(tmp_path: Path) -> None:
     whole, part = document(0), document(1)
     short = msgspec.structs.replace(

@@ -40,6 +40,19 @@ def test_both_roads_lead_to_the_same_history(database: str) -> None:
     alone.close()
 
 
+def test_as_many_series_and_runs_are_read_as_are_asked_for_whatever_the_driver_binds(database: str) -> None:
+    alone = file_reader(database)
+    assert alone is not None
+    alone.connection.setlimit(sqlite3.SQLITE_LIMIT_VARIABLE_NUMBER, 0)  # usually 32766
+    history = History(alone)
+    keys, ids = history.series_keys(), [info.id for info in history.runs()]
+    assert keys and len(ids) == 2
+    assert tuple(history.series(keys)) == keys
+    assert all(tuple(sorted(samples)) == keys for samples in history.samples_of(ids, keys=keys).values())
+    assert history.series([]) == {}
+    alone.close()
+
+
 def test_a_comparison_starts_without_sqlalchemy(database: str) -> None:
     script = f"""
 import sys

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,9 +14,12 @@ from msgspec.structs import replace
 from spook_tracker.tracker import library
 from spook_tracker.tracker.document.run_document import Again, RunDocument, Timing
 from spook_tracker.tracker.document.wording import instant
-from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
+from spook_tracker.tracker.judge import compare_ladders
+from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts, unquiet
 from spook_tracker.tracker.measure import timing as clock
+from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.record import add_again
 
 ASKED: dict[str, Any] = {
     "catalogue": "toy_timed:CATALOGUE", "engine": "spook_tracker.engine", "sweep": True, "workers": 0, "repeats": 2,
@@ -153,3 +157,48 @@ def test_the_measurement_that_was_disturbed_less_counts() -> None:
     assert that_counts(replace(both, again=replace(again, calibration=(1.0,)))).cpu_seconds == (2.0, 2.5)
     assert ladder_timing([both, both]).again == replace(again, calibration=(2.0, 2.0))
     assert ladder_timing([both, first]).again is None  # means over other rungs say nothing
+
+
+def test_a_comparison_counts_the_lesser_time_too(measured: Night) -> None:
+    before = library.run(**ASKED)
+    measured.times, measured.factors = 0, [1.3]
+    slow = library.run(**ASKED)
+    measured.times, measured.factors = 0, [1.0]
+    again = library.time_again(slow, ["falling_object"], **ASKED)
+
+    def words(after: RunDocument) -> set[str]:
+        sides = [
+            {sample.series: (definition, sample) for definition in run.series for sample in run.samples
+             if sample.series == definition.key}
+            for run in (before, after)
+        ]  # fmt: skip
+        return {change.word for change in compare_ladders.run_times(*sides)}
+
+    assert "regressed" in words(slow)
+    assert words(again) == {"same"}
+
+
+def night_of(timing: Timing) -> Any:
+    return SimpleNamespace(sample=SimpleNamespace(timing=timing))
+
+
+def test_whether_the_machine_was_quiet_is_asked_of_the_time_that_counts() -> None:
+    loud = Timing(seconds=(3.0,), runs_per_repeat=1, cpu_seconds=(2.0,), calibration=(1.0, 2.0))
+    quiet = Again(seconds=(1.0,), cpu_seconds=(1.0,), calibration=(1.0, 1.0))
+
+    assert "not quiet" in unquiet(night_of(loud))
+    assert unquiet(night_of(replace(loud, again=quiet))) == ""
+
+
+def test_what_was_timed_again_is_written_once(measured: Night, tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'tracker.db'}"
+    first = library.run(**ASKED)
+    library.record(first, url)
+    once = library.time_again(first, ["falling_object"], **ASKED)
+    measured.factors = [2.0]
+    twice = library.time_again(first, ["falling_object"], **ASKED)
+    with session_on(url) as session:
+        add_again(session, once)
+        add_again(session, twice)
+    with History.open(url) as stored:
+        assert stored.document(first.id) == once != twice

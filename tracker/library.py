@@ -235,15 +235,19 @@ def nightly(
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
 
-    The database is opened first: no night is measured in vain. `tell` is called with the run document and
-    with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded as far as
-    it came (Interrupted says which run), neither judged nor published.
+    The database and `mutants` are opened first: no night is measured in vain. `tell` is called with the run
+    document and with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded
+    as far as it came (Interrupted says which run), neither judged nor published.
     """
     from spook_tracker.tracker.measure.run import Interrupted
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
 
+    if mutants:
+        from spook_tracker.tracker.website.page_mutants import read_mutants
+
+        read_mutants(mutants)
     with session_on(database) as session:
         try:
             document = run(watch=watch, trigger="nightly", **asked)

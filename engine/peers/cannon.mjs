@@ -3,7 +3,6 @@ import { serve } from "./loop.mjs";
 
 serve(async (task) => {
   const C = await import(task.module);
-  C.Body.idCounter = 0; // it orders pairs by them: every scene counts from its own start
 
   const vec = (v) => new C.Vec3(...v);
   const quat = ([w, x, y, z]) => new C.Quaternion(x, y, z, w);
@@ -68,10 +67,14 @@ serve(async (task) => {
     for (const row of made.equations)
       row.setSpookParams(task.options.stiffness, task.options.relaxation, task.time_step);
   }
-  const apart = new Set(task.apart.map(([a, b]) => bodies[a].id * 1e6 + bodies[b].id));
+  const apart = new Map(bodies.map((body) => [body, new Set()]));
+  for (const [a, b] of task.apart) {
+    apart.get(bodies[a]).add(bodies[b]);
+    apart.get(bodies[b]).add(bodies[a]);
+  }
   const meet = world.broadphase.needBroadphaseCollision.bind(world.broadphase);
   world.broadphase.needBroadphaseCollision = (a, b) =>
-    task.contacts && !apart.has(Math.min(a.id, b.id) * 1e6 + Math.max(a.id, b.id)) && meet(a, b);
+    task.contacts && !apart.get(a)?.has(b) && meet(a, b);
 
   function push() {
     for (const load of task.loads) {

@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from time import monotonic
@@ -68,6 +69,8 @@ def run(script: Path, task: dict[str, Any], time_limit: float | None) -> Recordi
     """One simulation by `script`; a process that hangs is ended and timed out. Raises NodeError if it died."""
     place = (os.getpid(), script, HEAP)
     with _ONE_AT_A_TIME:
+        if place in _SERVED and not _SERVED[place].alive():  # it died idle: no fault of this task
+            _SERVED.pop(place).end()
         if place not in _SERVED:
             _SERVED[place] = Served(script)
         try:
@@ -101,13 +104,9 @@ class Served:
     def answer(self, task: dict[str, Any], timeout: float | None) -> tuple[dict[str, Any], bytes]:
         """Head and states. Raises TimeoutError after `timeout` seconds, EOFError where the process died."""
         until = None if timeout is None else monotonic() + timeout
-        assert self._process.stdin is not None
-        given = memoryview(json.dumps(task).encode() + b"\n")
-        try:
-            while given:
-                given = given[self._process.stdin.write(given) :]
-        except BrokenPipeError:
-            raise EOFError from None
+        self._errors.seek(0)  # what it said of earlier tasks
+        self._errors.truncate()
+        self._give(json.dumps(task).encode() + b"\n", until)
         got = bytearray()
         while (end := got.find(b"\n")) < 0:
             got += self._piece(until)
@@ -116,10 +115,25 @@ class Served:
             got += self._piece(until)
         return head, bytes(got[end + 1 :])
 
+    def alive(self) -> bool:
+        """Whether it waits for a task."""
+        return self._process.poll() is None
+
+    def _give(self, task: bytes, until: float | None) -> None:
+        """A pipe holds less than a large task, and who hangs reads none of it: writing may time out, too."""
+        assert self._process.stdin is not None
+        left = memoryview(task)
+        try:
+            while left:
+                if not select.select([], [self._process.stdin], [], _rest(until))[1]:
+                    raise TimeoutError
+                left = left[os.write(self._process.stdin.fileno(), left[: select.PIPE_BUF]) :]
+        except BrokenPipeError:
+            raise EOFError from None
+
     def _piece(self, until: float | None) -> bytes:
         assert self._process.stdout is not None
-        rest = None if until is None else max(0.0, until - monotonic())
-        if not select.select([self._process.stdout], [], [], rest)[0]:
+        if not select.select([self._process.stdout], [], [], _rest(until))[0]:
             raise TimeoutError
         piece = os.read(self._process.stdout.fileno(), 1 << 20)
         if not piece:
@@ -136,13 +150,19 @@ class Served:
 
     def last_words(self) -> str:
         """Why it died, in a line; nothing is left of it afterwards."""
-        code = self._process.wait()
+        with suppress(subprocess.TimeoutExpired):  # it may have closed its output and run on
+            self._process.wait(GRACE)
+        code = self._process.poll()
         self._errors.seek(0)
         text = self._errors.read().decode(errors="replace")
         self.end()
         words = [line.strip() for line in text.splitlines() if line.strip()]
         said = next((line for line in words if re.match(r"\w*Error: |FATAL", line)), "it said nothing")
         return f"the process of {self._name} ended with {code}: {said[:200]}"
+
+
+def _rest(until: float | None) -> float | None:
+    return None if until is None else max(0.0, until - monotonic())
 
 
 _SERVED: dict[tuple[int, Path, int], Served] = {}

@@ -5,7 +5,6 @@ serve(async (task) => {
   // Which precision it keeps is read once, when the module is: each is a module of its own.
   globalThis.P2_ARRAY_TYPE = task.options.double ? Float64Array : Float32Array;
   const P = await import(`${task.module}?${globalThis.P2_ARRAY_TYPE.name}`);
-  P.Body._idCounter = 0; // it orders pairs by them: every scene counts from its own start
 
   const { across, up, normal } = task.plane; // unit vectors, across × up = normal
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -81,6 +81,14 @@ function extentOf(movie) {
   const reach = new Float64Array(movie.bodies), drawn = new Uint8Array(movie.bodies);
   for (const solid of movie.solids) {
     if (solid.kind === "plane") { continue; }
+    if (solid.kind === "facets" && solid.fixed) {  // a ground is as far as it reaches, and flat
+      const corner = [0, 0, 0];
+      for (const p of facesOf(solid.size).flat()) {
+        turnInto(corner, solid.orientation, ...p);
+        see(...corner.map((v, k) => v + solid.position[k]), 0);
+      }
+      continue;
+    }
     const r = solid.kind === "box" ? Math.hypot(...solid.size) / 2 : solid.kind === "capsule" ? solid.size[0] + solid.size[1] / 2 :
       solid.kind === "facets" ? Math.max(...facesOf(solid.size).flat().map((p) => Math.hypot(...p))) : solid.size[0] || 0;
     if (solid.body === WORLD_BODY) { see(...solid.position, r); } else { reach[solid.body] = Math.max(reach[solid.body], r); drawn[solid.body] = 1; }

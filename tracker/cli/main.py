@@ -178,9 +178,12 @@ def nightly(
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.run import Request
     from spook_tracker.tracker.website.folder import refuse_unusable
+    from spook_tracker.tracker.website.page_mutants import read_mutants
 
     refuse_unwritable(json_file, junit_file)
     refuse_unusable(out)
+    if mutants:
+        read_mutants(mutants)  # before the other engines are measured, too
     first, *others = engine.split(",")
     for other in others:
         asked = Request(

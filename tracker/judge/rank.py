@@ -48,6 +48,23 @@ class Lead:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Race:
+    """One error on one scene: who comes within it, soonest first; who never does is missing."""
+
+    test: str
+    ladder: str
+    unit: str
+    error: float
+    order: tuple[tuple[float, str], ...]  # run time [s] and engine, at least one
+
+    def behind(self, engine: str) -> tuple[str, float, float | None] | None:
+        """Who is first, in what time, and the time of this engine (None: never); None if nobody is sooner."""
+        best, first = self.order[0]
+        mine = {name: time for time, name in self.order}.get(engine)
+        return None if mine is not None and mine <= best else (first, best, mine)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Answer:
     """What one engine says to the question of a gate, in the configuration that it names first."""
 
@@ -93,6 +110,26 @@ def standings(engines: Mapping[str, Samples]) -> list[Standing]:
     return [
         _standing(place, name, found.get(place, {})) for place in places for name, found in groups.items()
     ]
+
+
+def scenes(found: Sequence[Standing]) -> list[list[Standing]]:
+    """The standings of each scene that at least two engines were asked."""
+    groups: dict[tuple[str, str, str], list[Standing]] = {}
+    for one in found:
+        groups.setdefault((one.test, one.ladder, one.unit), []).append(one)
+    return [group for group in groups.values() if sum(one.outcome != "not asked" for one in group) > 1]
+
+
+def races(found: Sequence[Standing]) -> list[Race]:
+    """Every scene with every error that somebody reaches."""
+    run = []
+    for group in scenes(found):
+        for place, error in enumerate(ERRORS):
+            order = sorted((t, one.engine) for one in group if (t := one.seconds[place]) is not None)
+            if order:
+                test, ladder, unit = group[0].test, group[0].ladder, group[0].unit
+                run.append(Race(test=test, ladder=ladder, unit=unit, error=error, order=tuple(order)))
+    return run
 
 
 def leads(found: Sequence[Standing], before: str, after: str) -> list[Lead]:

@@ -118,15 +118,12 @@ class History:
             return {run_id: self.samples(run_id) for run_id in run_ids}
         chosen = self._canonical.keys() if keys is None else self._ids_of(keys)
         wanted = [i for i in chosen if tests is None or self._canonical[i].partition("/")[0] in tests]
-        series, asked = listed("series", wanted)
+        series = listed(wanted)
         found: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {run_id: {} for run_id in run_ids}
         for start in range(0, len(run_ids), CHUNK):
             runs = [self.run(run_id) for run_id in run_ids[start : start + CHUNK]]
-            keyed, parameters = listed("run", [run.key for run in runs])
-            where = f"r.key IN {keyed} AND s.series_id IN {series}"
-            for run, series_id, definition, sample in self._read_samples(
-                where, asked | parameters, by_run=True
-            ):
+            where = f"r.key IN {listed(run.key for run in runs)} AND s.series_id IN {series}"
+            for run, series_id, definition, sample in self._read_samples(where, {}, by_run=True):
                 key = self._canonical.get(series_id, definition.key)
                 if key not in found[run.id] or definition.key == key:
                     found[run.id][key] = definition, sample
@@ -138,17 +135,13 @@ class History:
         Unknown keys are left out. `evidence=False` leaves out failure, counters, state hash and timing, which
         makes reading long histories several times faster.
         """
-        where = ""
-        parameters: dict[str, Any] = {}
-        if keys is not None:
-            series, parameters = listed("series", self._ids_of(keys))
-            where = f"s.series_id IN {series}"
+        where = "" if keys is None else f"s.series_id IN {listed(self._ids_of(keys))}"
         with _no_collection():
-            return self._gathered(where, parameters, evidence)
+            return self._gathered(where, evidence)
 
-    def _gathered(self, where: str, parameters: dict[str, Any], evidence: bool) -> dict[str, SeriesHistory]:
+    def _gathered(self, where: str, evidence: bool) -> dict[str, SeriesHistory]:
         gathered: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {}
-        for run, series_id, definition, sample in self._read_samples(where, parameters, evidence):
+        for run, series_id, definition, sample in self._read_samples(where, {}, evidence):
             key = self._canonical.get(series_id, definition.key)
             points = gathered.setdefault(key, {})
             if run.id not in points or definition.key == key:
@@ -295,9 +288,8 @@ class History:
     def _read_definitions(self, ids: Iterable[int]) -> dict[int, SeriesDefinition]:
         lacking = sorted(set(ids) - self._definitions.keys())
         for start in range(0, len(lacking), CHUNK):
-            chosen, parameters = listed("id", lacking[start : start + CHUNK])
-            query = f"SELECT id, body FROM definition WHERE id IN {chosen}"
-            for definition_id, body in self._reader.rows(query, **parameters):
+            query = f"SELECT id, body FROM definition WHERE id IN {listed(lacking[start : start + CHUNK])}"
+            for definition_id, body in self._reader.rows(query):
                 self._definitions[definition_id] = rows.definition_of(body)
         return self._definitions
 

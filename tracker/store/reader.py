@@ -61,10 +61,13 @@ class FileReader:
         self.connection.close()
 
 
-def listed(name: str, values: Iterable[Any]) -> tuple[str, dict[str, Any]]:
-    """The list of an IN (...), with its parameters; an empty one, which PostgreSQL does not know, holds nothing."""
-    parameters = {f"{name}{place}": value for place, value in enumerate(values)}
-    return f"({', '.join(f':{key}' for key in parameters) or 'NULL'})", parameters
+def listed(ids: Iterable[int]) -> str:
+    """The list of an IN (...); an empty one, which PostgreSQL does not know, holds nothing.
+
+    Ids are ours, and numbers: written out they need no parameters, whose number both databases bound, and whose
+    names SQLite looks up one after the other.
+    """
+    return f"({', '.join(str(int(found)) for found in ids) or 'NULL'})"
 
 
 def file_reader(database: str) -> FileReader | None:

@@ -29,8 +29,8 @@ def configuration(connection: Connection | None = None) -> Config:
 def migrate(connection: Connection, target: str) -> None:
     """Upgrade to `target` inside the transaction of `connection`; at the newest revision the views are made.
 
-    In an empty SQLite file the tables are made from the models at once, which is five times quicker; the tests hold
-    both ways to the same tables. (PostgreSQL's are not the same: older revisions named its constraints otherwise.)
+    In an empty SQLite file the tables are made from the models at once, which is quicker; the tests hold both ways to
+    the same tables. PostgreSQL goes by the revisions, which named a constraint otherwise than the models do.
     """
     empty = MigrationContext.configure(connection).get_current_revision() is None
     if empty and target == "head" and connection.dialect.name == "sqlite":

@@ -49,8 +49,8 @@ def values_table(reader: Reader, run_keys: Iterable[int]) -> pandas.DataFrame:
     keys = sorted(run_keys)
     rows: list[Any] = []
     for start in range(0, len(keys), CHUNK):
-        chosen, parameters = listed("run", keys[start : start + CHUNK])
-        found = reader.rows(QUERY.format(columns=", ".join(COLUMNS.values()), runs=chosen), **parameters)
+        chosen = listed(keys[start : start + CHUNK])
+        found = reader.rows(QUERY.format(columns=", ".join(COLUMNS.values()), runs=chosen))
         rows += [(stored_moment(night), *rest) for night, *rest in found]
     rows.sort(key=itemgetter(0))  # chunks of keys are not in the order of time; within a night they are
     table: pandas.DataFrame = frames.DataFrame(rows, columns=list(COLUMNS))

@@ -64,7 +64,7 @@ def view(chart: Chart, *, table: bool = True) -> View:
     columns: tuple[str, ...] = ()
     rows: list[tuple[str, ...]] = []
     every = 0
-    lines = [line for line in chart.lines if line.style != "limit"] if table else []
+    lines = [line for line in chart.lines if line.style != "limit" and not line.waits] if table else []
     if lines:
         columns = ("line", chart.x_label, chart.y_label)
         points = [(line, i) for line in lines for i in range(len(line.x))]
@@ -416,13 +416,17 @@ def _earlier_lines(
     """The same configuration on earlier nights, in short dashes."""
     lines = []
     for place, one in enumerate(earlier):
-        found = rungs(trends, lambda t, index=one.index: t.earlier.get(index))  # type: ignore[misc]
+        found = rungs(trends, _sample_of(one.index))
         if any(math.isfinite(r.seconds) for r in found):
             line = _ladder_line(f"{configuration}, {one.words}", found, lambda r: r.seconds, colour, unit)
             lines.append(
                 replace(line, style="reference", quiet=True, upto=(), night=one.key, waits=place > 0)
             )
     return lines
+
+
+def _sample_of(night: int) -> Callable[[Trend], Sample | None]:
+    return lambda trend: trend.earlier.get(night)
 
 
 def _ladder_line(

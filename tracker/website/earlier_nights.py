@@ -34,13 +34,12 @@ class Earlier:
         return f"{self.words} ({day(night.started)}, {version(night.engine)})"
 
 
-def earlier_nights(nights: Sequence[Night], before: int) -> list[Earlier]:
-    """The choices, `before` (the index of the newest night before tonight's ladders) first; each night once."""
-    found = [Earlier(BEFORE, "the night before", before)]
-    tonight = instant(nights[-1].started)
-    older = nights[: before + 1]
+def earlier_nights(tonight: Night, older: Sequence[Night]) -> list[Earlier]:
+    """The choices among older nights, the newest of them first; each night once. Only nights with ladders are asked."""
+    found = [Earlier(BEFORE, "the night before", older[-1].index)] if older else []
+    now = instant(tonight.started)
     for key, words, days in BACK:
-        place = _last_until(older, tonight - timedelta(days=days)) if tonight else None
+        place = _last_until(older, now - timedelta(days=days)) if now else None
         if place is not None:
             found.append(Earlier(key, words, place))
     releases: dict[str, Earlier] = {}

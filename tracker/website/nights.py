@@ -285,13 +285,12 @@ def _add_earlier_ladders(
 ) -> list[Earlier]:
     """The ladders of earlier nights beside tonight's."""
     timed = {key: trend for key, trend in trends.items() if trend.definition.kind == "ladder"}
-    before = max((trend.nights[-2] for trend in timed.values() if len(trend.nights) > 1), default=None)
-    if before is None:
-        return []
-    earlier = earlier_nights(nights, before)
+    older = sorted({index for trend in timed.values() for index in trend.nights[:-1]})
+    earlier = earlier_nights(nights[-1], [nights[index] for index in older])
+    samples = history.samples_of([nights[one.index].id for one in earlier], keys=timed)
     for one in earlier:
-        samples = history.samples(nights[one.index].id)
+        of_night = samples[nights[one.index].id]
         for key, trend in timed.items():
-            if key in samples and one.index in trend.nights[:-1]:
-                trend.earlier[one.index] = samples[key][1]
-    return [one for one in earlier if any(one.index in trend.earlier for trend in timed.values())]
+            if key in of_night and one.index in trend.nights[:-1]:
+                trend.earlier[one.index] = of_night[key][1]
+    return earlier

@@ -26,7 +26,17 @@ from spook_tracker.tracker.document.wording import (
     slug,
     version,
 )
-from spook_tracker.tracker.judge.rank import ERRORS, Answer, Samples, Standing, answers, question, standings
+from spook_tracker.tracker.judge.rank import (
+    ERRORS,
+    Answer,
+    Samples,
+    Standing,
+    answers,
+    question,
+    races,
+    scenes,
+    standings,
+)
 from spook_tracker.tracker.judge.release_notes import moved
 from spook_tracker.tracker.judge.standing import against_limit
 from spook_tracker.tracker.judge.vocabulary import Class
@@ -104,8 +114,8 @@ def _card(chapter: Chapter, book: Book, told: Sequence[Any], found: Sequence[Sta
     name = _title(chapter)
     mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
     supported = [a for a in mine if a.sample is not None and a.sample.outcome != "not_supported"]
-    first = Counter(error for error, engine in _winners(found) if engine == name)
-    reached = Counter(error for error, _ in _winners(found))
+    first = Counter(race.error for race in races(found) if race.order[0][1] == name)
+    reached = Counter(race.error for race in races(found))
     return {
         "name": name,
         "address": "index.html" if chapter is book else engine_address(chapter.name),
@@ -116,23 +126,6 @@ def _card(chapter: Chapter, book: Book, told: Sequence[Any], found: Sequence[Sta
         "asked": len(told),
         "first": [(number(error), first[error], reached[error]) for error in ERRORS if reached[error]],
     }
-
-
-def _winners(found: Sequence[Standing]) -> Iterator[tuple[float, str]]:
-    """For every scene and error that somebody reaches: who reaches it first."""
-    for group in _scenes(found):
-        for place, error in enumerate(ERRORS):
-            times = [(t, one.engine) for one in group if (t := one.seconds[place]) is not None]
-            if times:
-                yield error, min(times)[1]
-
-
-def _scenes(found: Sequence[Standing]) -> list[list[Standing]]:
-    """The standings of each scene that at least two engines were asked."""
-    groups: dict[tuple[str, str, str], list[Standing]] = {}
-    for one in found:
-        groups.setdefault((one.test, one.ladder, one.unit), []).append(one)
-    return [group for group in groups.values() if sum(one.outcome != "not asked" for one in group) > 1]
 
 
 def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> dict[str, Any]:
@@ -166,7 +159,7 @@ def _told(definition: SeriesDefinition, sample: Sample) -> str:
 def _ranks(found: Sequence[Standing], book: Book, untimed: Sequence[str]) -> Iterator[dict[str, Any]]:
     """A line for every scene: its errors at h = 1/60, and the run times to each error."""
     titles = {test.name: test.card.title for test in book.tests}
-    for group in _scenes(found):
+    for group in scenes(found):
         first = group[0]
         lacks = [one.outcome.replace("_", " ") for one in group]
         columns = [_cells([one.error for one in group], lacks, partial(_error, first.unit))]
@@ -209,28 +202,24 @@ def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[dict[str, 
     """Where another engine reaches an error before ours does, the largest factor first."""
     titles = {test.name: test.card.title for test in book.tests}
     places = []
-    for group in _scenes(found):
-        for place, error in enumerate(ERRORS):
-            times = {one.engine: t for one in group if (t := one.seconds[place]) is not None}
-            if not times or ours not in {one.engine for one in group}:
-                continue
-            ahead = min(times, key=times.__getitem__)
-            mine = times.get(ours, math.inf)
-            if ahead != ours and mine > times[ahead]:
-                first = group[0]
-                places.append(
-                    {
-                        "title": titles.get(first.test, first.test),
-                        "address": page_of(first.test),
-                        "what": first.ladder.replace("_", " "),
-                        "error": quantity(error, first.unit),
-                        "ahead": ahead,
-                        "theirs": seconds(times[ahead]),
-                        "mine": "never" if math.isinf(mine) else seconds(mine),
-                        "times": mine / times[ahead],
-                        "factor": "" if math.isinf(mine) else f"{number(mine / times[ahead], 2)} ×",
-                    }
-                )
+    for race in races(found):
+        if (behind := race.behind(ours)) is None:
+            continue
+        first, theirs, mine = behind
+        times = math.inf if mine is None else mine / theirs
+        places.append(
+            {
+                "title": titles.get(race.test, race.test),
+                "address": page_of(race.test),
+                "what": race.ladder.replace("_", " "),
+                "error": quantity(race.error, race.unit),
+                "ahead": first,
+                "theirs": seconds(theirs),
+                "mine": "never" if mine is None else seconds(mine),
+                "times": times,
+                "factor": "" if mine is None else f"{number(times, 2)} ×",
+            }
+        )
     return sorted(places, key=lambda one: -one["times"])
 
 
