@@ -53,8 +53,20 @@ Pair = tuple[SeriesDefinition, Sample]
 
 
 def error_points(ladder: Ladder, configuration: Configuration, simulate: Simulate) -> ErrorPoints:
-    """The errors of one configuration; failures are kept with their class."""
-    return ErrorPoints(tuple(_error_point(ladder, configuration, h, simulate) for h in ladder.time_steps))
+    """The errors of one configuration; failures are kept with their class.
+
+    A rung finer than one that ran out of time has more steps to take: it is not tried, and says so.
+    """
+    points: list[ErrorPoint] = []
+    for h in ladder.time_steps:
+        slow = next((p for p in points if p.outcome == "timed_out" and p.time_step > h), None)
+        points.append(_error_point(ladder, configuration, h, simulate) if slow is None else _untried(h, slow))
+    return ErrorPoints(tuple(points))
+
+
+def _untried(h: float, slow: ErrorPoint) -> ErrorPoint:
+    why = f"not tried: at {slow.time_step:g} s a step, with fewer steps, the time limit was reached"
+    return ErrorPoint(h, math.nan, "timed_out", why, {}, "")
 
 
 def _error_point(ladder: Ladder, configuration: Configuration, h: float, simulate: Simulate) -> ErrorPoint:
