@@ -46,6 +46,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "floating_box": "floating_box",
     "sinking_sphere": "sinking_sphere",
     "wires": "wires",
+    "capstan": "capstan",
     "scissor_lift": "scissor_lift",
     "gears": "gears",
     "robot_arm": "robot_arm",
