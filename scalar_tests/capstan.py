@@ -121,7 +121,7 @@ def slip(simulate: Simulate) -> dict[str, float]:
     rests = simulate(bollard(0.99 * HOLDS * LIGHT), time_step=TIME_STEP, duration=DURATION, observe=held)
     return {
         "acceleration_error": float(np.abs(fallen / SLIPS - 1.0).max()),
-        "ratio_error": behind / float(result["pull"]) / HOLDS - 1.0,
+        "ratio_error": float(behind / float(result["pull"]) / HOLDS - 1.0),
         "held_motion": float(rests["v"].max()),
         "gain": max(0.0, float(np.diff(result["energy"]).max())),
     }
