@@ -190,6 +190,7 @@ class Configuration:
     method: Method
     expected_order: float | None  # None: no order expected (rounding level, or no smooth error)
     order_range: tuple[float, float] | None = None  # time steps [s] of the asymptotic range
+    time_steps: tuple[float, ...] = ()  # s, coarse to fine; none: those of the ladder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +210,14 @@ class Ladder:
     run: Callable[[Simulate, float, Method], Result]
     target_error: float | None = None  # for "time to reach a given error", in `unit`
     target_seconds: float | None = None  # for "error reached in a given time", s
+
+    def steps_of(self, configuration: Configuration) -> tuple[float, ...]:
+        """Time steps [s] of one configuration, coarse to fine."""
+        return configuration.time_steps or self.time_steps
+
+    def all_steps(self) -> tuple[float, ...]:
+        """Time steps [s] of any configuration, coarse to fine."""
+        return tuple(sorted({h for one in self.configurations for h in self.steps_of(one)}, reverse=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -277,7 +277,22 @@ TEST = ScalarTest(
             description="relative error of the time between flips",
             unit="1",
             time_steps=tuple(1.0 / n for n in (7.5, 15.0, 30.0, 60.0, 120.0)),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0),
+                Configuration(
+                    name="order4",
+                    method=Method(composition="order4"),
+                    expected_order=4.0,
+                    order_range=(1 / 30, 1 / 7.5),
+                    time_steps=(1 / 7.5, 1 / 15, 1 / 30),
+                ),
+                Configuration(
+                    name="order6",
+                    method=Method(composition="order6"),
+                    expected_order=None,  # what is left is the search for the flips between the steps
+                    time_steps=(1 / 7.5, 1 / 15),
+                ),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-3,

@@ -347,7 +347,15 @@ TEST = ScalarTest(
             description="largest violation of a hinge over 10 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0),
+                Configuration(  # joint coordinates: nothing to violate
+                    name="order4",
+                    method=Method(composition="order4"),
+                    expected_order=None,
+                    time_steps=(1 / 8, 1 / 12, 1 / 16),
+                ),
+            ),
             error=violation_error,
             run=ladder_run,
             target_error=1e-3,

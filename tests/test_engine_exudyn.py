@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import warnings
 from dataclasses import replace
 from typing import Any
@@ -20,6 +21,7 @@ from spook_tracker.engine import (
     Position,
     RigidBody,
     Scene,
+    SimulationFailed,
     Trace,
     Violation,
 )
@@ -61,6 +63,20 @@ def test_the_tension_of_a_rod_at_rest_is_the_weight() -> None:
     result = simulate(scene, "trapezoidal", time_step=0.01, duration=1.0, observe=observe)
 
     assert float(result["pull"]) == pytest.approx(19.62, rel=1e-6)
+
+
+def test_its_time_limit_ends_it_within_its_own_loop(capfd: pytest.CaptureFixture[str]) -> None:
+    weight = Particle(name="weight", mass=1.0, position=(1.0, 0.0, 0.0))
+    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=0.0)
+    scene = Scene(bodies=(weight,), constraints=(rod,), gravity=GRAVITY)
+    began = time.monotonic()
+
+    with pytest.raises(SimulationFailed, match=r"0\.2 s was reached") as failed:
+        simulate(scene, "trapezoidal", time_step=1e-5, duration=100.0, time_limit=0.2)["anything"]
+
+    assert failed.value.result.status == "timed_out"
+    assert time.monotonic() - began < 20.0  # the whole takes minutes
+    assert "FAILED" not in "".join(capfd.readouterr())
 
 
 @pytest.mark.parametrize("kind", ["ball", "hinge", "lock", "prismatic"])

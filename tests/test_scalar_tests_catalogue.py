@@ -82,14 +82,16 @@ def test_every_series_has_a_name_of_its_own(name: str, test: ScalarTest) -> None
 @every_test
 def test_ladders_run_from_coarse_to_fine_and_say_what_they_expect(name: str, test: ScalarTest) -> None:
     for ladder in test.ladders:
-        assert list(ladder.time_steps) == sorted(ladder.time_steps, reverse=True)
+        for steps in (ladder.time_steps, *map(ladder.steps_of, ladder.configurations)):
+            assert list(steps) == sorted(steps, reverse=True)
         assert len({configuration.name for configuration in ladder.configurations}) == len(
             ladder.configurations
         )
         for configuration in ladder.configurations:
             if configuration.order_range is not None:
                 low, high = configuration.order_range
-                inside = [h for h in ladder.time_steps if low * (1 - 1e-9) <= h <= high * (1 + 1e-9)]
+                steps = ladder.steps_of(configuration)
+                inside = [h for h in steps if low * (1 - 1e-9) <= h <= high * (1 + 1e-9)]
                 assert len(inside) >= 3, (ladder.name, configuration.name)
 
 

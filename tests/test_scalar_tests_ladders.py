@@ -24,7 +24,7 @@ ORDERS = {(name, ladder.name, c.name): c.expected_order for name, ladder, c in L
 
 
 def order(ladder: Ladder, configuration: Configuration, engine: Simulate = simulate) -> float:
-    steps = [h for h in ladder.time_steps if in_range(h, configuration.order_range)]
+    steps = [h for h in ladder.steps_of(configuration) if in_range(h, configuration.order_range)]
     found = observed_order(steps, [ladder.error(engine, h, configuration.method) for h in steps])
     assert found is not None
     return found
@@ -63,8 +63,8 @@ def test_the_orders_that_were_promised_are_asked_for(
 def test_running_and_measuring_simulate_the_same(name: str) -> None:
     """What is timed does as many steps as what is measured, so that error and time belong together."""
     for ladder in CATALOGUE[name].ladders:
-        h = ladder.time_steps[0]
         for configuration in ladder.configurations:
+            h = ladder.steps_of(configuration)[0]
             steps: list[int] = []
 
             def counting(scene: Any, steps: list[int] = steps, **options: Any) -> Any:
@@ -104,5 +104,7 @@ def test_every_target_is_within_reach(name: str) -> None:
         if ladder.target_error is None:
             continue
         for configuration in ladder.configurations:
-            errors = [abs(ladder.error(simulate, h, configuration.method)) for h in ladder.time_steps]
+            errors = [
+                abs(ladder.error(simulate, h, configuration.method)) for h in ladder.steps_of(configuration)
+            ]
             assert min(e for e in errors if math.isfinite(e)) <= ladder.target_error, configuration.name

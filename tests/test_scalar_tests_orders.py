@@ -63,7 +63,7 @@ def test_every_scene_has_orders_four_six_and_eight() -> None:
     ("test", "ladder", "one"), FITS, ids=[f"{fit[0]} {fit[1].name} {fit[2].name}" for fit in FITS]
 )
 def test_an_order_is_fitted_where_theory_has_it(test: str, ladder: object, one: object) -> None:
-    steps = ladder.time_steps  # type: ignore[attr-defined]
+    steps = ladder.steps_of(one)  # type: ignore[attr-defined]
     span = one.order_range or (min(steps), max(steps))  # type: ignore[attr-defined]
     used = [h for h in steps if span[0] * (1 - 1e-9) <= h <= span[1] * (1 + 1e-9)]
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import itertools
 import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+import spook_tracker.tracker.measure.definition as definition
 from spook_tracker.tracker.measure.definition import definition_hash
 
 MODULE = '''"""A question."""
@@ -118,3 +123,21 @@ def test_values_caught_in_a_closure_count():
 
     assert definition_hash(asking(1.0), ()) == definition_hash(asking(1.0), ())
     assert definition_hash(asking(1.0), ()) != definition_hash(asking(2.0), ())
+
+
+def test_threads_parse_one_after_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """CPython 3.11 fails now and then where two threads parse at once: "AST constructor recursion depth mismatch"."""
+    within, most, parse = threading.Semaphore(1), [], ast.parse
+
+    def slowly(source: str) -> ast.Module:
+        most.append(within.acquire(blocking=False))
+        time.sleep(0.01)
+        within.release()
+        return parse(source)
+
+    monkeypatch.setattr(definition.ast, "parse", slowly)
+    definition._module_tree.cache_clear()
+    with ThreadPoolExecutor(3) as threads:
+        list(threads.map(definition._module_tree, ("json", "ast", "bisect", "inspect", "threading")))
+
+    assert most == [True] * 5

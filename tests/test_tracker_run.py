@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from spook_tracker.tracker.document.json_form import decode, encode
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.measure import ladder as ladders
+from spook_tracker.tracker.measure.question import NoAnswer
 from spook_tracker.tracker.measure.run import Questions, Request, RunError, ci_address, run
 
 SOURCE = Questions(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
@@ -151,6 +153,29 @@ def test_a_failed_rung_is_a_point_of_its_own_class(monkeypatch):
     assert samples["fall/plain/ladder:end-error/h=0.05"].timing is None
     assert samples["fall/plain/ladder:end-error:order"].outcome == "missing"
     assert samples["fall/plain/ladder:end-error:time-to-error"].value == math.inf
+
+
+def test_rungs_finer_than_one_that_ran_out_of_time_are_not_tried_and_say_so(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    from toy_questions import CATALOGUE
+
+    ladder, asked = CATALOGUE["fall"].ladders[0], []
+    slow = ladder.time_steps[1]
+
+    def out_of_time_from_the_second_on(simulate, h, method):
+        asked.append(h)
+        if h <= slow:
+            raise NoAnswer("timed_out", "2 s were over")
+        return 0.5
+
+    points = ladders.error_points(
+        replace(ladder, error=out_of_time_from_the_second_on), ladder.configurations[0], lambda: None
+    ).points
+
+    assert asked == list(ladder.time_steps[:2])
+    assert [p.outcome for p in points] == ["value"] + ["timed_out"] * (len(points) - 1)
+    assert points[1].failure == "2 s were over"
+    assert points[2].failure.startswith(f"not tried: at {slow:g} s a step, with fewer steps")
 
 
 def test_progress_names_every_test_once_it_is_finished():

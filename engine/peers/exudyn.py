@@ -5,6 +5,7 @@ The whole motion is one call of its solver; positions, rotations and velocities 
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from importlib.metadata import version
@@ -24,6 +25,8 @@ from spook_tracker.engine.recorded_joints import joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 
+exudyn.config.printToConsole = False  # it tells of every solve that fails, by the screenful
+exudyn.config.suppressWarnings = True
 SOLVERS = exudyn.DynamicSolverType
 SEEN = exudyn.OutputVariableType
 
@@ -165,6 +168,8 @@ class _Run:
         if len(task.scene.bodies) > 20:
             settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
         began = time.perf_counter()
+        end = math.inf if task.time_limit is None else began + task.time_limit
+        self.system.SetPreStepUserFunction(lambda system, t: time.perf_counter() < end)
         try:
             solved = self.system.SolveDynamic(
                 settings, solverType=task.configuration.options["solver"], showHints=False
@@ -173,9 +178,11 @@ class _Run:
         except Exception as error:  # what the solver could not do is an outcome
             failure = " ".join(str(error).split())[:200]
         seconds = time.perf_counter() - began
-        return self._read(seconds, failure)
+        if late := time.perf_counter() >= end:
+            failure = f"the time limit of {task.time_limit:g} s was reached"
+        return self._read(seconds, failure, "timed_out" if late else "diverged")
 
-    def _read(self, seconds: float, failure: str) -> Recording:
+    def _read(self, seconds: float, failure: str, bad: Any) -> Recording:
         task, bodies = self.task, self.task.scene.bodies
         stored = {name: [self._stored(s) for s in sensors] for name, sensors in self.sensors.items()}
         count = min((len(rows) for series in stored.values() for rows in series), default=1)
@@ -202,7 +209,7 @@ class _Run:
             seconds=seconds,
             setup_seconds=self.setup,
             constraint_forces=tensions,
-            status="diverged" if failure else "completed",
+            status=bad if failure else "completed",
             failure=failure,
         )
 

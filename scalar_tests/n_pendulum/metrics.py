@@ -257,6 +257,9 @@ LADDERS = (
                 expected_order=4.0,
                 order_range=(1 / 960, 1 / 120),
             ),
+            Configuration(  # joint coordinates: links keep their length at any step
+                name="order 4", method=ORDER_4, expected_order=None, time_steps=(1 / 20, 1 / 30, 1 / 60)
+            ),
         ),
         error=length_error,
         run=run,

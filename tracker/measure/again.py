@@ -48,7 +48,9 @@ def _errors(tests: Mapping[str, ScalarTest], document: RunDocument) -> Errors:
         for i, ladder in enumerate(test.ladders):
             for j, configuration in enumerate(ladder.configurations):
                 rungs = found.get((name, f"ladder:{ladder.name}", configuration.name), {})
-                errors[name, i, j] = ErrorPoints(tuple(_point(h, rungs) for h in ladder.time_steps))
+                errors[name, i, j] = ErrorPoints(
+                    tuple(_point(h, rungs) for h in ladder.steps_of(configuration))
+                )
     return errors
 
 

@@ -17,6 +17,7 @@ import hashlib
 import inspect
 import struct
 import sys
+import threading
 import types
 from collections.abc import Callable, Mapping, Set
 from typing import Any
@@ -197,10 +198,14 @@ def _plain(code: types.CodeType) -> tuple[Any, ...]:
     return tuple(_plain(c) if isinstance(c, types.CodeType) else repr(c) for c in code.co_consts)
 
 
+_PARSING = threading.Lock()  # CPython 3.11's parser counts its depth for all threads at once, and fails
+
+
 @functools.lru_cache(maxsize=256)
 def _module_tree(module: str) -> ast.Module | None:
     try:
-        return ast.parse(inspect.getsource(sys.modules[module]))
+        with _PARSING:
+            return ast.parse(inspect.getsource(sys.modules[module]))
     except (OSError, TypeError, KeyError, SyntaxError):
         return None  # no source: defined in a session or a frozen application
 

@@ -53,8 +53,20 @@ Pair = tuple[SeriesDefinition, Sample]
 
 
 def error_points(ladder: Ladder, configuration: Configuration, simulate: Simulate) -> ErrorPoints:
-    """The errors of one configuration; failures are kept with their class."""
-    return ErrorPoints(tuple(_error_point(ladder, configuration, h, simulate) for h in ladder.time_steps))
+    """The errors of one configuration; failures are kept with their class.
+
+    A rung finer than one that ran out of time has more steps to take: it is not tried, and says so.
+    """
+    points: list[ErrorPoint] = []
+    for h in ladder.steps_of(configuration):
+        slow = next((p for p in points if p.outcome == "timed_out" and p.time_step > h), None)
+        points.append(_error_point(ladder, configuration, h, simulate) if slow is None else _untried(h, slow))
+    return ErrorPoints(tuple(points))
+
+
+def _untried(h: float, slow: ErrorPoint) -> ErrorPoint:
+    why = f"not tried: at {slow.time_step:g} s a step, with fewer steps, the time limit was reached"
+    return ErrorPoint(h, math.nan, "timed_out", why, {}, "")
 
 
 def _error_point(ladder: Ladder, configuration: Configuration, h: float, simulate: Simulate) -> ErrorPoint:
@@ -97,10 +109,11 @@ def _timings(
     ]
 
     def timed(j: int, k: int, run_simulate: Simulate) -> object:
-        return ladder.run(run_simulate, ladder.time_steps[k], ladder.configurations[j].method)
+        configuration = ladder.configurations[j]
+        return ladder.run(run_simulate, ladder.steps_of(configuration)[k], configuration.method)
 
     runs = [lambda s, j=j, k=k: timed(j, k, s) for j, k in places]
-    table: list[list[Timing | None]] = [[None] * len(ladder.time_steps) for _ in measured]
+    table: list[list[Timing | None]] = [[None] * len(points.points) for points in measured]
     for (j, k), timing in zip(places, interleaved(runs, simulate, repeats), strict=True):
         table[j][k] = timing
     return table
@@ -205,7 +218,9 @@ def _scalars(
             limit=band,
             limit_source=f"the method's order, {expected:g}, within {ORDER_BAND:g}",
             reference=expected,
-            test_version=_version(ladder, configuration, ladder.time_steps, configuration.order_range),
+            test_version=_version(
+                ladder, configuration, ladder.steps_of(configuration), configuration.order_range
+            ),
         )
         used = [p for p in points.points if in_range(p.time_step, configuration.order_range)]
         order = observed_order([p.time_step for p in used], [p.error for p in used])
@@ -225,7 +240,7 @@ def _scalars(
             better="smaller",
             kind="time",
             parameters={"target_error": ladder.target_error},
-            test_version=_version(ladder, configuration, ladder.time_steps, ladder.target_error),
+            test_version=_version(ladder, configuration, ladder.steps_of(configuration), ladder.target_error),
         )
         value = time_at_error(seconds, errors, ladder.target_error)
         yield series, _scalar(series, value, f"no step reaches {ladder.target_error:g} {ladder.unit}")
@@ -236,7 +251,9 @@ def _scalars(
             description=f"error reached in {ladder.target_seconds:g} s: {ladder.description}",
             kind="time",
             parameters={"target_seconds": ladder.target_seconds},
-            test_version=_version(ladder, configuration, ladder.time_steps, ladder.target_seconds),
+            test_version=_version(
+                ladder, configuration, ladder.steps_of(configuration), ladder.target_seconds
+            ),
         )
         value = error_in_time(seconds, errors, ladder.target_seconds)
         yield series, _scalar(series, value, f"every step takes longer than {ladder.target_seconds:g} s")

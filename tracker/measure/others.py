@@ -81,6 +81,7 @@ def _metric(metric: Metric, gates: bool) -> Metric:
 def _ladder(ladder: Ladder, one: Configuration) -> Ladder:
     return replace(
         ladder,
+        time_steps=ladder.all_steps(),
         configurations=(case.Configuration(name=one.name, method=PLAIN, expected_order=None),),
         error=partial(in_configuration, ladder.error, one.name),
         run=partial(in_configuration, ladder.run, one.name),

@@ -83,8 +83,9 @@ public:
                 b.spin = {v[3], v[4], v[5]};
             }
             Vec3 moved = b.velocity, turned = b.spin;
-            if (b.mass > 0.0 && touching && !stage.correction().empty()) {
-                const Vec6& c = stage.correction()[u];
+            for (const std::vector<Vec6>* extra : {&stage.correction(), &stage.parting().velocity}) {
+                if (b.mass == 0.0 || !touching || extra->empty()) continue;
+                const Vec6& c = (*extra)[u];
                 moved += {c[0], c[1], c[2]};
                 turned += {c[3], c[4], c[5]};
             }

@@ -68,6 +68,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     std::fill(supported_.begin(), supported_.end(), 0);
     std::fill(depth_.begin(), depth_.end(), 0.0);
     correction_.clear();
+    parting_.velocity.clear();
     points_.clear();
     impact_needed_ = false;
     impact_rounds_ = 0;
@@ -370,6 +371,7 @@ void ContactStage::order_points() {
         if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
         point.before = touches_[old].normal;
         point.parting_before = touches_[old].parting;
+        point.pressed_before = touches_[old].pressed;
         std::copy_n(touches_[old].tangent, 2, point.tangent_before);
         std::copy_n(touches_[old].turning, 3, point.turning_before);
     }

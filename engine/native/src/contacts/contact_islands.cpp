@@ -7,7 +7,13 @@
 namespace spook {
 
 Islands find_islands(const MixedSystem& system) {
-    const int bodies = static_cast<int>(system.mass.size());
+    std::vector<Islands::Tie> ties;
+    ties.reserve(system.rows.size());
+    for (const RowBlock& block : system.rows) ties.push_back({block.first, block.second});
+    return find_islands(static_cast<int>(system.mass.size()), ties);
+}
+
+Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties) {
     std::vector<int> parent(bodies);
     std::iota(parent.begin(), parent.end(), 0);
     auto root = [&](int b) {
@@ -15,11 +21,11 @@ Islands find_islands(const MixedSystem& system) {
         return b;
     };
     std::vector<char> has_rows(bodies, 0);
-    for (const RowBlock& block : system.rows) {
-        if (block.first >= 0) has_rows[block.first] = 1;
-        if (block.second >= 0) has_rows[block.second] = 1;
-        if (block.first < 0 || block.second < 0) continue;
-        const int a = root(block.first), b = root(block.second);
+    for (const auto [first, second] : ties) {
+        if (first >= 0) has_rows[first] = 1;
+        if (second >= 0) has_rows[second] = 1;
+        if (first < 0 || second < 0) continue;
+        const int a = root(first), b = root(second);
         parent[std::max(a, b)] = std::min(a, b);  // the root is the island's first body
     }
     Islands islands;

@@ -12,10 +12,14 @@ namespace spook {
 /// Island of each body of the system: islands are numbered by their first body's index, upwards from 0; a body
 /// without rows has −1. Ends that do not move (−1 in a row) join nothing, so bodies on the same ground stay apart.
 struct Islands {
+    struct Tie {
+        int first, second;
+    };
     std::vector<int> of_body;
     int count = 0;
 };
-Islands find_islands(const MixedSystem& system);
+Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties);
+Islands find_islands(const MixedSystem& system);  // a tie per block of rows
 
 /// Splits a system into its islands and solves each with a solver of its own, which keeps its analysis as long as
 /// the island does not change. Islands are done in order on one thread: equal input gives equal bits.

@@ -1,4 +1,4 @@
-// The contact stage by sweeps: resting contact and the parting of overlaps for as many bodies as there are.
+// The contact stage by sweeps: resting contact for as many bodies as there are.
 #include <algorithm>
 
 #include "contacts/contact_geometry.hpp"
@@ -63,6 +63,7 @@ bool ContactStage::find_more() {
         if (old == touches_.end() || old->contact.key != point.contact.key) continue;
         point.before = old->normal;
         point.parting_before = old->parting;
+        point.pressed_before = old->pressed;
         std::copy_n(old->tangent, 2, point.tangent_before);
     }
     hand_over();
@@ -110,7 +111,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
         const Point& point = points_[k];
         const double* impulse = sweeps_.impulse(static_cast<int>(k));
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
-        record(point, impulse[0], impulse[1] * point.tangent + impulse[2] * across);
+        record(system, point, impulse[0], impulse[1] * point.tangent + impulse[2] * across);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;
@@ -122,48 +123,6 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     std::stable_sort(touches_.begin(), touches_.end(),
                      [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; });
     return report.finite;
-}
-
-/// part_overlaps(), by sweeps.
-void ContactStage::part_by_sweeps(const MixedSystem& system) {
-    if (!some_overlap()) return;
-    ++counters_.corrections;
-    const double h = options_.time_step;
-    if (!system.rows.empty()) parting_.mass = system.mass;
-    parting_.momentum.assign(system.mass.size(), Vec6{});
-    parting_.rows = system.rows;
-    for (RowBlock& block : parting_.rows)
-        for (int i = 0; i < block.size; ++i) {
-            block.right[i] = block.multiplier[i] = 0.0;
-            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
-            if (!below && !above) block.lower[i] = block.upper[i] = 0.0;
-        }
-    parting_sweeps_.start_beside(sweeps_, parting_, options_.friction);
-    for (std::size_t b = 0; b < unknown_.size(); ++b)
-        next_[b] = unknown_[b] >= 0 ? system.velocity[unknown_[b]] : velocity_[b];
-    for (const Point& point : points_) {
-        SweepContact row;
-        row.first = unknown_[point.contact.first];
-        row.second = unknown_[point.contact.second];
-        row.normal = point.contact.point.normal;
-        row.tangent = point.tangent;
-        row.first_arm = point.first_arm;
-        row.second_arm = point.second_arm;
-        const double gap = point.contact.point.gap, excess = -gap - explained_depth(point);
-        const double ahead = gap + h * relative(point, row.normal, next_, false);
-        const double rate = regularise(0.0, point.material.damping, h).violation_gain;
-        row.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
-        row.impulse[0] = point.parting_before;
-        parting_sweeps_.add(row);
-    }
-    const FrictionReport report =
-        parting_sweeps_.run(options_.iterations, options_.residual_tolerance, nullptr);
-    counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-    if (!report.finite) return;
-    parting_sweeps_.write(parting_);
-    correction_ = parting_.velocity;
-    for (std::size_t k = 0; k < points_.size(); ++k)
-        touches_[k].parting = parting_sweeps_.impulse(static_cast<int>(k))[0];
 }
 
 }  // namespace spook

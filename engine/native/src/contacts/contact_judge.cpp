@@ -8,9 +8,6 @@
 
 namespace spook {
 
-namespace {
-
-/// About (G M⁻¹ Gᵀ + Sig) of one row: the scale between an impulse and a velocity, off-diagonal inertia left out.
 double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
     double own = block.softness[i];
     for (const bool first : {true, false}) {
@@ -21,6 +18,8 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
     }
     return own;
 }
+
+namespace {
 
 /// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds.
 double bounded_residual(const RowBlock& block, int i, double own, const std::vector<Vec6>& velocity) {

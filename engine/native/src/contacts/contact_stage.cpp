@@ -17,12 +17,13 @@ constexpr int late_rounds = 3;   // of solves that set others in motion towards 
 
 ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials,
                            std::vector<int> unknown, const ContactOptions& options,
-                           std::vector<IndexPair> joints)
+                           std::vector<IndexPair> joints, std::vector<char> yielding)
     : detection_(std::move(detection)),
       materials_(std::move(materials)),
       unknown_(std::move(unknown)),
       options_(options),
-      joints_(std::move(joints)) {
+      joints_(std::move(joints)),
+      yielding_(std::move(yielding)) {
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
@@ -145,8 +146,7 @@ double ContactStage::time_left(const Point& point) const noexcept {
 }
 
 double ContactStage::explained_depth(const Point& point) const noexcept {
-    const double carried = std::max(0.0, point.before) / options_.time_step;
-    return 2.0 * point.material.compliance * carried + closed * size(point.contact);
+    return point.pressed_before + closed * size(point.contact);
 }
 
 /// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
@@ -236,7 +236,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     for (std::size_t k = 0; k < points_.size(); ++k) {
         Point& point = points_[k];
         const Vec3 along = read_back(system.rows[joints + k], point);
-        Touch& touch = record(point, point.normal, along);
+        Touch& touch = record(system, point, point.normal, along);
         std::copy_n(point.turning, 3, touch.turning);
     }
     if (report.finite) {
@@ -268,11 +268,13 @@ Vec3 ContactStage::read_back(const RowBlock& block, Point& point) const {
 }
 
 /// Takes down what a point did: its normal impulse, and that along the surface.
-ContactStage::Touch& ContactStage::record(const Point& point, double normal, Vec3 along) {
+ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point& point, double normal,
+                                          Vec3 along) {
     Touch& touch = touches_.emplace_back();
     const Vec3 n = point.contact.point.normal;
     touch.contact = point.contact;
     touch.normal = normal;
+    touch.pressed = pressed(system, point);
     touch.impact = point.impact;
     touch.impulse = normal * n + along + point.impact_impulse;
     touch.tangent[0] = dot(along, point.tangent);
@@ -322,42 +324,6 @@ void ContactStage::correct_events(const MixedSystem& system) {
             correction_[u][i] +=
                 event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
     }
-}
-
-/// Whether two bodies overlap by more than their contact's compliance explains.
-bool ContactStage::some_overlap() const {
-    return std::any_of(points_.begin(), points_.end(), [this](const Point& point) {
-        return point.contact.point.gap < -explained_depth(point);
-    });
-}
-
-void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) {
-    if (!some_overlap()) return;
-    ++counters_.corrections;
-    const double h = options_.time_step;
-    MixedSystem parting;
-    parting.mass = system.mass;
-    parting.momentum.assign(system.mass.size(), Vec6{});
-    parting.rows.assign(system.rows.begin(), system.rows.begin() + static_cast<std::ptrdiff_t>(joints));
-    for (RowBlock& block : parting.rows)
-        for (int i = 0; i < block.size; ++i) {
-            block.right[i] = block.multiplier[i] = 0.0;
-            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
-            if (!below && !above) block.lower[i] = block.upper[i] = 0.0;
-        }
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        RowBlock block = row_block(points_[k], 1);
-        const double gap = points_[k].contact.point.gap;
-        const double ahead =
-            gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
-        const double excess = -gap - explained_depth(points_[k]);
-        const double rate = regularise(0.0, points_[k].material.damping, h).violation_gain;
-        block.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
-        block.state[0] = excess > 0.0 ? RowState::free : RowState::at_lower;
-        parting.rows.push_back(block);
-    }
-    std::vector<FrictionPoint> none;
-    if (run(parting, none, parting_solver_, options_.friction).finite) correction_ = parting.velocity;
 }
 
 Vec3 ContactStage::force(int body, int other) const noexcept {

@@ -10,7 +10,7 @@
 //                    −g/h                     for an open one: it may close, no more;
 //                  then pairs that touch only because of these impulses are looked for, and all is solved again
 //                  (the iterative solver looks between its sweeps, and gives them rows in the same solve);
-//   4. correction  an extra displacement velocity that parts overlapping bodies and leaves no trace in v.
+//   4. parting     a displacement velocity that parts overlapping bodies and leaves no trace in v.
 //
 // What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
 // finds that they meet (`collision/sweep.hpp`). Bodies in contact are swept with v, which their supports agree
@@ -31,11 +31,11 @@
 // E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
 //
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
-// start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth a contact's own compliance
-// explains, twice eps times the force it carried last, enters r; the rest is parted by positions, at the same
-// rate 4 Ups per step, through the same solver with joints held.
-// Positions that move without velocities keep the centre of mass to rounding; the angular momentum of bodies in
-// flight, r × p, changes a little while they part.
+// start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was
+// pressed in while it was one, the way its bodies went along the normal, enters r: what it gives back it has been
+// given. The rest is parted by positions, at the same rate 4 Ups per step, through the same solver with joints held: far more rigidly than their compliance, which at
+// tiny steps yields more than a body does, and more rigidly than the contacts, so that joints win where both cannot
+// be. What such a step of finite size does to joints, momenta and energy is put right in `rigid/rigid_parting.cpp`.
 #pragma once
 
 #include <cstdint>
@@ -80,9 +80,11 @@ struct ContactCounters {  // exact, equal on every machine
 class ContactStage {
 public:
     /// One material and one `unknown` per body of the scene; unknown[b] is the body's index in MixedSystem, or −1
-    /// if it does not move by itself (static, kinematic). `joints` are the pairs of bodies that rows of joints tie.
+    /// if it does not move by itself (static, kinematic). `joints` are the pairs of bodies that rows of joints tie;
+    /// `yielding` tells of each block of those rows whether it gives way while overlaps are parted, as springs do.
     ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
-                 const ContactOptions& options, std::vector<IndexPair> joints = {});
+                 const ContactOptions& options, std::vector<IndexPair> joints = {},
+                 std::vector<char> yielding = {});
 
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return detection_.possible(); }
@@ -109,8 +111,17 @@ public:
     /// False if a value was not finite.
     bool solve(MixedSystem& system, const std::vector<Vec6>& velocity);
 
-    /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none.
+    /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none. It leads an event's
+    /// bodies to where they are at the step's end.
     const std::vector<Vec6>& correction() const noexcept { return correction_; }
+
+    /// How overlapping bodies are to be displaced at the end of the step.
+    struct Parting {
+        std::vector<Vec6> velocity;  // per moving body; empty when none is
+        Islands islands;             // of bodies that pushed each other aside, or hang together by joints
+        std::vector<char> grounded;  // per island: something that does not move by itself took part
+    };
+    const Parting& parting() const noexcept { return parting_; }
 
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
     bool held(int unknown) const noexcept { return held_[unknown] != 0; }
@@ -124,6 +135,7 @@ public:
         double tangent[2] = {0.0, 0.0};  // of the resting stage along world tangents, for a warm start
         double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
         double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
+        double pressed = 0.0;            // how far its bodies have pressed it in by the step's end, m
         bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
@@ -174,7 +186,7 @@ private:
         double rounding = 0.0;       // approaches slower than this are none, m/s
         double before = -1.0;        // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
-        double parting_before = 0.0;
+        double parting_before = 0.0, pressed_before = 0.0;
         bool solved = false;  // in an earlier round of this step: these start the next
         double normal = 0.0, tangents[2] = {0.0, 0.0}, turning[3] = {0.0, 0.0, 0.0};
         double impact = 0.0;
@@ -217,7 +229,8 @@ private:
     double resting_right(Point& point) const;
     bool is_pressed(const Point& point) const noexcept;
     RowBlock resting_row(Point& point) const;
-    Touch& record(const Point& point, double normal, Vec3 along);
+    Touch& record(const MixedSystem& system, const Point& point, double normal, Vec3 along);
+    double pressed(const MixedSystem& system, const Point& point) const;
     Vec3 read_back(const RowBlock& block, Point& point) const;
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
@@ -231,6 +244,8 @@ private:
     void blame(double residual, int unknown);
     void correct_events(const MixedSystem& system);
     void part_overlaps(const MixedSystem& system, std::size_t joints);
+    void hold_joints(MixedSystem& parting) const;
+    void note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties);
     double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
     double size(const Contact& contact) const noexcept;
@@ -247,7 +262,9 @@ private:
     std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
     ContactSweeps sweeps_, parting_sweeps_;
-    MixedSystem parting_;
+    MixedSystem parting_system_;
+    Parting parting_;
+    std::vector<char> yielding_;
     std::vector<Vec6> next_;                     // velocities between sweeps, per body of the scene
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 

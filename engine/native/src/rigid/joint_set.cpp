@@ -219,6 +219,23 @@ void JointSet::violation(int index, std::span<const BodyState> bodies, double* o
     joint_violation(joint.constants, body(joint.first, bodies), body(joint.second, bodies), out);
 }
 
+void JointSet::overstep(int index, std::span<const BodyState> bodies, double* out) const noexcept {
+    const JointBlock& block = blocks_[index];
+    const Joint& joint = joints_[block.joint];
+    std::fill_n(out, block.size, 0.0);
+    if (states[block.joint].broken) return;
+    if (!block.axial) {
+        violation(block.joint, bodies, out);
+        if (joint.general >= 0 && generals_[joint.general].one_sided) *out = std::max(0.0, *out);
+        return;
+    }
+    const Axial& axial = axials_[joint.axial];
+    if (!axial.has_limit) return;
+    const double at = coordinate(block.joint, bodies), low = at - axial.lower, high = at - axial.upper;
+    out[axial.has_motor ? 1 : 0] =
+        axial.lower == axial.upper ? low : std::min(0.0, low) + std::max(0.0, high);
+}
+
 double JointSet::coordinate(int index, std::span<const BodyState> bodies) const noexcept {
     const Joint& joint = joints_[index];
     const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));

@@ -94,6 +94,18 @@ public:
 
     /// Violations of a joint's own rows at the given state [m or rad].
     void violation(int joint, std::span<const BodyState> bodies, double* out) const noexcept;
+    /// How far the rows of a block are from where they hold; of limits and wires, how far they are overstepped; zero
+    /// for rows that give way: motors, springs, broken joints.
+    void overstep(int block, std::span<const BodyState> bodies, double* out) const noexcept;
+    /// Whether all rows of a block hold wherever it stands.
+    bool always_holds(const JointBlock& block) const noexcept {
+        const Joint& joint = joints_[block.joint];
+        const bool one_sided = joint.general >= 0 && generals_[joint.general].one_sided;
+        return !block.axial && !one_sided && !states[block.joint].broken;
+    }
+    bool has_spring(const JointBlock& block) const noexcept {
+        return block.axial && axials_[joints_[block.joint].axial].has_spring;
+    }
     /// Free coordinate of a hinge (unwrapped) or prismatic joint.
     double coordinate(int joint, std::span<const BodyState> bodies) const noexcept;
     /// From now on the turns of this hinge are counted.

@@ -6,6 +6,12 @@
 
 namespace spook {
 
+namespace {
+
+constexpr std::size_t looking_from = 16;  // bodies: steps of fewer are too short to look at the clock in each
+
+}  // namespace
+
 void RigidSystem::apply_forces() {
     std::fill(force_.begin(), force_.end(), Vec3{});
     for (const CentralField& field : fields_)
@@ -30,6 +36,7 @@ void RigidSystem::apply_forces() {
 }
 
 void RigidSystem::step() {
+    if (constants_.size() >= looking_from) Watch::look();
     ++live_.step;
     if (clock_) clock_->start();
     if (!live_.velocity_ready) velocity_stage();
@@ -111,6 +118,7 @@ void RigidSystem::integrate_all() {
             displace(constants_[tied_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
                      {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[tied_[k]]);
     }
+    if (contacts_ && !contacts_->parting().velocity.empty()) part_bodies();
     if (clock_) clock_->mark(Stage::integrate_positions);
 }
 

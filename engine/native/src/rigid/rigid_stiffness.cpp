@@ -98,26 +98,12 @@ void RigidSystem::keep_angular_momentum() {
     const int row_blocks = static_cast<int>(joints_.blocks().size());
     const auto values = [&](int k) { return solution_.data() + matrix_.offset(row_blocks + k); };
     for (const std::vector<int>& island : islands_) {
-        Vec3 centre, missing;
-        double mass = 0.0;
+        const auto [centre, inertia] = island_frame(island);
+        Vec3 missing;
         for (int k : island) {
-            const BodyConstants& body = constants_[tied_[k]];
-            centre += body.mass * position_of(tied_[k]);
-            mass += body.mass;
-            if (body.particle) continue;
+            if (constants_[tied_[k]].particle) continue;
             const double* x = values(k);
             missing += stiffness_[k] * (Vec3{x[3], x[4], x[5]} - live_.bodies[tied_[k]].angular_velocity);
-        }
-        centre *= 1.0 / mass;
-        Mat3 inertia;
-        for (int k : island) {
-            const BodyConstants& body = constants_[tied_[k]];
-            const Vec3 r = position_of(tied_[k]) - centre;
-            const double r2 = dot(r, r);
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j)
-                    inertia(i, j) += body.mass * ((i == j ? r2 : 0.0) - r[i] * r[j]) +
-                                     (body.particle ? 0.0 : live_.bodies[tied_[k]].inertia(i, j));
         }
         const Vec3 turn = solved(inertia, missing);
         for (int k : island) {
@@ -127,6 +113,28 @@ void RigidSystem::keep_angular_momentum() {
             for (int i = 0; i < 3 && !constants_[tied_[k]].particle; ++i) x[3 + i] += turn[i];
         }
     }
+}
+
+/// Centre of mass of some tied bodies, and their inertia about it as if they were one.
+RigidSystem::IslandFrame RigidSystem::island_frame(const std::vector<int>& members) const {
+    IslandFrame frame;
+    double mass = 0.0;
+    for (int k : members) {
+        const BodyConstants& body = constants_[tied_[k]];
+        frame.centre += body.mass * position_of(tied_[k]);
+        mass += body.mass;
+    }
+    frame.centre *= 1.0 / mass;
+    for (int k : members) {
+        const BodyConstants& body = constants_[tied_[k]];
+        const Vec3 r = position_of(tied_[k]) - frame.centre;
+        const double r2 = dot(r, r);
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j)
+                frame.inertia(i, j) += body.mass * ((i == j ? r2 : 0.0) - r[i] * r[j]) +
+                                       (body.particle ? 0.0 : live_.bodies[tied_[k]].inertia(i, j));
+    }
+    return frame;
 }
 
 /// What made a run leave the finite numbers, as far as the joints show a few steps before: the option that cures it.

@@ -70,7 +70,11 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         std::vector<char> dynamic;
         std::vector<SurfaceMaterial> materials;
         std::vector<IndexPair> joint_pairs;
-        for (const JointBlock& block : joints_.blocks()) joint_pairs.push_back({block.first, block.second});
+        std::vector<char> yielding;
+        for (const JointBlock& block : joints_.blocks()) {
+            joint_pairs.push_back({block.first, block.second});
+            yielding.push_back(joints_.has_spring(block));
+        }
         for (const RigidBodySpec& spec : scene.bodies) {
             dynamic.push_back(spec.motion == Motion::dynamic);
             materials.push_back(spec.material);
@@ -85,7 +89,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             Detection(scene.colliders, dynamic, scene.no_contact), materials, slot_,
             ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
                            method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
-            joint_pairs);
+            joint_pairs, yielding);
     }
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;

@@ -161,6 +161,11 @@ private:
     void find_tensions();
     void find_islands();
     void keep_angular_momentum();
+    struct IslandFrame {
+        Vec3 centre;
+        Mat3 inertia;
+    };
+    IslandFrame island_frame(const std::vector<int>& members) const;
     void take_stages(const RigidScene& scene);
     void step();
     void velocity_stage();
@@ -225,6 +230,13 @@ private:
     int busiest_block() const noexcept;
     void solve_mixed(bool touching);
     bool pivot_rows();
+    // rigid_parting.cpp: overlapping bodies are parted by positions
+    void part_bodies();
+    bool part_island(int island, double share);
+    bool hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks);
+    void keep_spin_energy(int body);
+    bool keep_momenta(const std::vector<int>& members);
+
     void integrate_body(int body);
     void integrate_all();
     void analyse_block();
@@ -294,6 +306,12 @@ private:
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
+    LargeArray<BodyState> unparted_;                        // per body, before overlaps are parted
+    std::vector<std::vector<int>> parted_, parted_blocks_;  // per island: tied bodies, blocks of joints
+    std::vector<double> overstep_;                          // per row of joints, before
+    std::vector<std::size_t> overstep_at_;                  // per block
+    MixedSystem holding_;
+    PivotSolver holding_pivot_;
     double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;

@@ -23,9 +23,10 @@ struct Health {
 ///   void observe(Recorder&, int64 sample)  recorder.sample(sample), looking ahead if velocities need it
 ///   Health health() const                  non-finite or runaway values
 ///   void save(), void restore()            keep and take back everything advance() changes, for a replay
-///   int64 block() const                    steps between two checks
-/// The check costs nothing inside a step: a block that ends unfit is replayed step by step to find the step. Long
-/// steps look at the clock themselves (Watch); a block they leave unfinished is taken back.
+///   int64 block() const                    steps between two checks, at most
+/// The check costs nothing inside a step: a block that ends unfit is replayed step by step to find the step. Blocks
+/// begin with one step, and grow as long as they are short. Long steps look at the clock themselves (Watch); a block
+/// they leave unfinished is taken back: no more than a few hundredths of a second of whole steps.
 template <class System>
 void run_loop(System& system, Recorder& recorder, std::int64_t steps, double time_limit, RunReport& report) {
     Watch watch(time_limit);
@@ -55,6 +56,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
         system.restore();
         recorder.restore();
         for (std::int64_t step = done + 1; step <= end; ++step) {
+            Watch::look();
             system.advance(1);
             health = system.health();
             if (health.status != Status::completed) {
@@ -65,6 +67,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
             done = step;
         }
     };
+    std::int64_t length = 1;
     while (done < steps && health.status == Status::completed) {
         if (watch.over()) {
             stop(done);
@@ -73,8 +76,9 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
         system.save();
         recorder.save();
         const std::int64_t from = done;
+        const double began = watch.elapsed();
         try {
-            run_block(std::min(done + system.block(), steps));
+            run_block(std::min(done + length, steps));
         } catch (const Stopped&) {
             system.restore();
             recorder.restore();
@@ -82,6 +86,9 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
             stop(done);
             break;
         }
+        const double took = watch.elapsed() - began;
+        if (took > Watch::patience) length = std::max<std::int64_t>(1, length / 2);
+        else if (2.0 * took < Watch::patience) length = std::min(2 * length, system.block());
     }
     if (health.status != Status::completed) {
         report.status = health.status;

@@ -26,6 +26,8 @@ struct Stopped {};
 /// nothing. A look costs tens of nanoseconds: solvers look once per round or sweep.
 class Watch {
 public:
+    static constexpr double patience = 0.02;  // s: work that takes longer is not done without a look
+
     explicit Watch(double time_limit) noexcept : limit_(time_limit) { current_ = this; }
     ~Watch() { current_ = nullptr; }
     Watch(const Watch&) = delete;
