@@ -15,6 +15,7 @@ from spook_tracker.engine import (
     ConstraintForce,
     Final,
     Hinge,
+    MaximumAbsolute,
     Method,
     MethodError,
     Motor,
@@ -24,6 +25,7 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     SceneError,
+    Sphere,
     Trace,
     Velocity,
     Wire,
@@ -146,6 +148,25 @@ def test_sweeps_and_contacts_come_to_the_same_a_step_late(compliance: float) -> 
 
         assert result.completed
         np.testing.assert_allclose(np.diff(result["v"][25:, 2]) / H, falls, rtol=1e-5)
+
+
+def test_a_weight_in_a_wall_is_parted_from_it_and_its_wire_pulls_as_before() -> None:
+    """Positions that part overlaps leave rows alone that hold no place: friction is no lock."""
+    ball = RigidBody(name="one", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 0.0))
+    wall = RigidBody(name="wall", motion="static", shape=Box((1.0, 9.0, 9.0)), position=(0.59, 0.0, 0.0))
+    given = hung(1.0, 1.0)
+    scene = replace(given, bodies=(ball, given.bodies[1], wall))
+    observe = {
+        "x": Final(quantity=Position("one")),
+        "v": MaximumAbsolute(quantity=Velocity()),
+        "pull": Final(quantity=ConstraintForce("wire")),
+    }
+    result = simulate(scene, time_step=H, steps=100, observe=observe)
+
+    assert result.completed
+    assert float(result["x"][0]) == pytest.approx(-0.01, abs=1e-4)
+    assert float(result["v"].max()) < 0.05
+    assert float(result["pull"]) == pytest.approx(10.0, rel=0.01)
 
 
 def winch(**changes: Any) -> Scene:

@@ -223,7 +223,7 @@ void JointSet::overstep(int index, std::span<const BodyState> bodies, double* ou
     const JointBlock& block = blocks_[index];
     const Joint& joint = joints_[block.joint];
     std::fill_n(out, block.size, 0.0);
-    if (states[block.joint].broken) return;
+    if (states[block.joint].broken || gives_way(joint.constants.kind)) return;
     if (!block.axial) {
         violation(block.joint, bodies, out);
         if (joint.general >= 0 && generals_[joint.general].one_sided) *out = std::max(0.0, *out);

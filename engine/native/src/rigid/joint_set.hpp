@@ -101,7 +101,7 @@ public:
     bool always_holds(const JointBlock& block) const noexcept {
         const Joint& joint = joints_[block.joint];
         const bool one_sided = joint.general >= 0 && generals_[joint.general].one_sided;
-        return !block.axial && !one_sided && !states[block.joint].broken;
+        return !block.axial && !one_sided && !gives_way(joint.constants.kind) && !states[block.joint].broken;
     }
     bool has_spring(const JointBlock& block) const noexcept {
         return block.axial && axials_[joints_[block.joint].axial].has_spring;

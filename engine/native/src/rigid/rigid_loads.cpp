@@ -79,7 +79,7 @@ void RigidSystem::find_loads(double time) {
 }
 
 /// Where an end of a spring is, and how fast.
-RigidSystem::Held RigidSystem::held(const End& end) const noexcept {
+RigidSystem::SpringEnd RigidSystem::spring_end(const End& end) const noexcept {
     if (end.body < 0) return {end.point, {}, {}};
     const BodyState& s = live_.bodies[end.body];
     const Vec3 centre = position_of(end.body);
@@ -89,7 +89,7 @@ RigidSystem::Held RigidSystem::held(const End& end) const noexcept {
 }
 
 void RigidSystem::pull_aside(const SpringForce& spring) noexcept {
-    const Held first = held(spring.ends[0]), second = held(spring.ends[1]);
+    const SpringEnd first = spring_end(spring.ends[0]), second = spring_end(spring.ends[1]);
     const Vec3 pull = spook::pull(spring, second.place - first.place, second.velocity - first.velocity);
     const auto act = [&](int body, Vec3 force, Vec3 arm) {
         if (body < 0 || !constants_[body].moves()) return;

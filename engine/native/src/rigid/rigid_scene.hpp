@@ -111,14 +111,19 @@ constexpr int row_count(JointKind kind) noexcept {
     return rows > 0 ? rows : 1;
 }
 
+/// Friction and springs: rows that hold no place.
+constexpr bool gives_way(JointKind kind) noexcept {
+    return kind == JointKind::eye || kind == JointKind::tyre;
+}
+
 inline bool can_break(const JointSpec& joint) noexcept {
     return std::isfinite(joint.strength) || std::isfinite(joint.torque_strength);
 }
 
 /// Whether some row of the joint has a finite bound.
 inline bool can_let_go(const JointSpec& joint) noexcept {
-    return joint.one_sided || joint.kind == JointKind::eye || joint.kind == JointKind::tyre ||
-           can_break(joint) || (joint.has_motor && std::isfinite(joint.motor_force)) ||
+    return joint.one_sided || gives_way(joint.kind) || can_break(joint) ||
+           (joint.has_motor && std::isfinite(joint.motor_force)) ||
            (joint.has_spring && std::isfinite(joint.spring_force)) ||
            (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }

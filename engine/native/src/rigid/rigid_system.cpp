@@ -73,7 +73,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         std::vector<char> yielding;
         for (const JointBlock& block : joints_.blocks()) {
             joint_pairs.push_back({block.first, block.second});
-            yielding.push_back(joints_.has_spring(block));
+            yielding.push_back(joints_.has_spring(block) || gives_way(joints_.kind(block.joint)));
         }
         for (const RigidBodySpec& spec : scene.bodies) {
             dynamic.push_back(spec.motion == Motion::dynamic);
@@ -265,7 +265,7 @@ double RigidSystem::potential_energy() const noexcept {
     for (const SpringForce& spring : springs_)
         sum += energy(spring, place(spring.ends[1]) - place(spring.ends[0]));
     for (const SpringForce& spring : turning_springs_)
-        sum += energy(spring, held(spring.ends[1]).place - held(spring.ends[0]).place);
+        sum += energy(spring, spring_end(spring.ends[1]).place - spring_end(spring.ends[0]).place);
     return sum + joints_.spring_energy(live_.bodies);
 }
 

@@ -151,10 +151,10 @@ private:
     void take_loads(const RigidScene& scene);
     void follow_time();
     void find_loads(double time);
-    struct Held {
+    struct SpringEnd {
         Vec3 place, velocity, arm;  // the arm in world axes
     };
-    Held held(const End& end) const noexcept;
+    SpringEnd spring_end(const End& end) const noexcept;
     void pull_aside(const SpringForce& spring) noexcept;
     void add_fluid(const Fluid& fluid, int body, Vec3& force, Vec3& torque) const noexcept;
     void stiffen();
