@@ -39,6 +39,7 @@ nightly: install
 test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
+	@$(BIN)/python -m compileall -q engine tracker scalar_tests migrations tests  # once, not in each of its processes
 	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 check: develop

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 
 from spook_tracker.scalar_tests.case import ScalarTest
@@ -72,6 +73,19 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "governor": "multibody.governor",
 }
 
-CATALOGUE: dict[str, ScalarTest] = {
-    name: import_module(f"{__package__}.{module}").TEST for name, module in QUESTIONS.items()
-}
+
+class Catalogue(Mapping[str, ScalarTest]):
+    """The table; a test is imported when it is asked for, so that a few are had without what all the others need."""
+
+    def __getitem__(self, name: str) -> ScalarTest:
+        test: ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
+        return test
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(QUESTIONS)
+
+    def __len__(self) -> int:
+        return len(QUESTIONS)
+
+
+CATALOGUE = Catalogue()

@@ -11,6 +11,8 @@ from sqlalchemy import delete, select, text, update
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
+from spook_tracker.tracker.document.json_form import decode
+from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.document.schema import document_schema
 from spook_tracker.tracker.store import border, models
 from spook_tracker.tracker.store.database import open_database
@@ -145,6 +147,32 @@ def test_text_of_other_tools_is_made_storable(written, read):
     content = encoded(run(ci_address="here")).replace(b"here", written)
 
     assert border.decoded(content).ci_address == read
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        {"counters": {"a\0b": 1}},
+        {"counters": {"steps": 2**63}},
+        {"failure": "a\0b"},
+        {"failure": "x" * 70_000},
+        {"value": "nan", "outcome": "value"},
+    ],
+)
+def test_what_is_wrong_deep_inside_a_file_is_found_on_the_quick_way_too(spoiled):
+    content = changed(lambda d: d["samples"][0].update(spoiled))
+
+    def told(way):
+        try:
+            return way()
+        except (DocumentError, msgspec.ValidationError) as error:
+            return str(error)
+
+    quick = told(lambda: border.decoded(content))
+    thorough = told(lambda: border.checked(decode(content, RunDocument)))
+
+    assert quick == thorough or str(quick).endswith(str(thorough))
+    assert quick != told(lambda: decode(content, RunDocument))
 
 
 def test_a_file_too_large_is_refused_before_it_is_read_whole(tmp_path, monkeypatch):

@@ -72,6 +72,8 @@ def plain(thing: Any) -> Any:
 
 
 def _read(kind: type, told: Any) -> Any:
+    if type(told) is float and kind is Number and told == told:  # nearly all: a document has thousands
+        return float.__new__(Number, told)
     if kind is Number and (told in SPECIAL if isinstance(told, str) else type(told) in (int, float)):
         try:
             return Number(told)

@@ -15,7 +15,11 @@ import re
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
+from functools import lru_cache
 
+import msgspec
+
+from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
@@ -32,8 +36,7 @@ LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that 
 IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
+class Judged(msgspec.Struct, frozen=True, kw_only=True):
     """A night with its verdict. `against` is the night it was compared with."""
 
     night: Point
@@ -81,7 +84,12 @@ def night_of(run: Run) -> date:
 
 def is_release(run: Run) -> bool:
     """Whether the engine's version is one that was released, not one in between."""
-    return RELEASE.fullmatch(run.engine.version) is not None and not run.engine.dirty
+    return not run.engine.dirty and _released(run.engine.version)
+
+
+@lru_cache(maxsize=4096)
+def _released(version: str) -> bool:
+    return RELEASE.fullmatch(version) is not None
 
 
 def blame(bad: Run, good: Run | None) -> str:
@@ -93,6 +101,7 @@ def blame(bad: Run, good: Run | None) -> str:
     return f"first bad commit {commit_of(bad)}, last good {commit_of(good)}"
 
 
+@no_collection()
 def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepted] = ()) -> dict[str, Told]:
     """Every series with the verdict of each of its nights, by key."""
     return {
@@ -117,15 +126,19 @@ def judge_history(
         found |= zip(places, told, strict=True)
         if (start := places[0]) > 0 and found[start].verdict.word == "new":
             why = Verdict(word="not_comparable", sentence=_why_not(history[start - 1], history[start]))
-            found[start] = replace(found[start], verdict=why)
+            found[start] = msgspec.structs.replace(found[start], verdict=why)
     return [found[place] for place in range(len(history))]
 
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
     lanes: dict[Hashable, list[int]] = {}
+    before: Hashable = None
+    here: list[int] = []
     for place, night in enumerate(history):
-        lanes.setdefault(lane(night), []).append(place)
+        if (name := lane(night)) != before:  # nights of one lane mostly stand together
+            here, before = lanes.setdefault(name, []), name
+        here.append(place)
     return list(lanes.values())
 
 
@@ -307,8 +320,6 @@ def replace_tolerance(definition: SeriesDefinition, factor: float) -> SeriesDefi
     """The definition with so many times its tolerances."""
     if factor == 1.0:
         return definition
-    import msgspec
-
     return msgspec.structs.replace(
         definition,
         tolerance=factor * definition.tolerance,

@@ -13,10 +13,12 @@ import importlib
 import sys
 from collections.abc import Mapping
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.scalar_tests.catalogue import Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
 
 STANDARD = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
@@ -29,9 +31,12 @@ class CatalogueError(TrackerError):
 
 def find(names: str) -> Mapping[str, ScalarTest]:
     """The tests of the catalogues named, in that order. A test that two of them have is refused."""
+    asked_for = [part.strip() for part in names.split(",")]
+    if len(asked_for) == 1:
+        return _one(asked_for[0])
     found: dict[str, ScalarTest] = {}
     owner: dict[str, str] = {}
-    for name in [part.strip() for part in names.split(",")]:
+    for name in asked_for:
         for test, asked in _one(name).items():
             if test in found:
                 raise CatalogueError(f"{owner[test]} and {name} both have a test {test!r}; rename one")
@@ -42,6 +47,9 @@ def find(names: str) -> Mapping[str, ScalarTest]:
 def _one(name: str) -> Mapping[str, ScalarTest]:
     try:
         found = _loaded(STANDARD if name == "standard" else name)
+        if isinstance(found, Catalogue) and find_spec("scipy") is not None:
+            return found  # ours: none of its tests is imported before it is asked for
+        fit = isinstance(found, Mapping) and all(isinstance(test, ScalarTest) for test in found.values())
     except (ImportError, AttributeError) as error:
         if isinstance(error, ModuleNotFoundError) and error.name == "scipy":
             raise CatalogueError(
@@ -49,9 +57,10 @@ def _one(name: str) -> Mapping[str, ScalarTest]:
                 "or name tests of your own with --catalogue or in tracker.toml"
             ) from None
         raise CatalogueError(f"there is no catalogue {name!r} ({error}); name one as module:NAME") from None
-    if not isinstance(found, Mapping) or not all(isinstance(test, ScalarTest) for test in found.values()):
+    if not fit:
         raise CatalogueError(f"{name!r} is no catalogue: a mapping from name to ScalarTest")
-    return found
+    catalogue: Mapping[str, ScalarTest] = found
+    return catalogue
 
 
 def _loaded(name: str) -> Any:

@@ -107,7 +107,7 @@ def select(catalogue: Mapping[str, ScalarTest], names: Iterable[str]) -> dict[st
             near = difflib.get_close_matches(name, catalogue, n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "`tracker list` shows them all"
             raise RunError(f"there is no test named {name!r}; {hint}")
-    return {name: test for name, test in catalogue.items() if not wanted or name in wanted}
+    return {name: catalogue[name] for name in catalogue if not wanted or name in wanted}
 
 
 class Interrupted(KeyboardInterrupt):

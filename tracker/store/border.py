@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from spook_tracker.tracker.document.errors import DocumentError
-from spook_tracker.tracker.document.json_form import boxed, builtins, convert, decode
+from spook_tracker.tracker.document.json_form import Number, boxed, builtins, convert, decode
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.rows import moment
 
@@ -52,6 +52,22 @@ def _cleaned(part: Any, place: str) -> Any:
     return part
 
 
+def _is_clean(part: Any) -> bool:
+    """Whether a part that was read into its types is already as `_cleaned` would leave it.
+
+    Types are right then, and a number of JSON is finite or a `Number`: texts and whole numbers remain.
+    """
+    if isinstance(part, str):
+        return len(part) <= MAX_TEXT and clean_text(part) == part
+    if isinstance(part, tuple):
+        return (bool(part) and type(part[0]) is Number) or all(map(_is_clean, part))
+    if isinstance(part, msgspec.Struct):
+        return all(_is_clean(getattr(part, name)) for name in part.__struct_fields__)
+    if isinstance(part, dict):
+        return all(map(_is_clean, part)) and all(map(_is_clean, part.values()))
+    return not isinstance(part, int) or abs(part) <= MAX_INTEGER
+
+
 def checked(run: RunDocument) -> RunDocument:
     """The document as it can be stored. DocumentError, naming the place, if it is not valid."""
     try:
@@ -71,7 +87,8 @@ def decoded(data: bytes, origin: str = "the document") -> RunDocument:
     if len(data) > MAX_BYTES:
         raise DocumentError(f"{origin}: {len(data)} bytes; a run document has at most {MAX_BYTES}")
     try:
-        return checked(decode(_without_surrogates(data), RunDocument))
+        run = decode(_without_surrogates(data), RunDocument)
+        return _sensible(run) if _is_clean(run) else checked(run)
     except (msgspec.ValidationError, DocumentError) as error:
         raise DocumentError(f"{origin} is not a valid run document: {error!s:.300}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

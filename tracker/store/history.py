@@ -7,13 +7,13 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from spook_tracker.tracker.document import run_document as document
+from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
 from spook_tracker.tracker.document.run_document import (
     Point,
@@ -136,7 +136,7 @@ class History:
         makes reading long histories several times faster.
         """
         where = "" if keys is None else f"s.series_id IN {listed(self._ids_of(keys))}"
-        with _no_collection():
+        with no_collection():
             return self._gathered(where, evidence)
 
     def _gathered(self, where: str, evidence: bool) -> dict[str, SeriesHistory]:
@@ -333,18 +333,6 @@ class History:
         return tuple(
             rows.unpacked(body, kind) for (body,) in self._reader.rows(query, run=self.run(run_id).key)
         )
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """No garbage collection while millions of long-lived objects are made: it would halve the speed."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def _utc(time: str) -> str:

@@ -22,7 +22,7 @@ from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.record import record_checked
 
 NAME = re.compile(r"\d{4,}-\d\d\.jsonl\.xz")
 WINDOW = 1 << 26  # bytes: a month of nights, each with the one before it in sight
@@ -66,7 +66,7 @@ def import_months(session: Session, paths: Iterable[Path]) -> tuple[int, int]:
         for line in _lines(path):
             if _peek(line, path).id in known:
                 present += 1
-            elif record(session, decoded(line, str(path))):
+            elif record_checked(session, decoded(line, str(path))):
                 stored += 1
             else:
                 present += 1

@@ -25,7 +25,11 @@ def record(session: Session, run: RunDocument) -> bool:
 
     DocumentError if the document is not valid, DatabaseError if it cannot be written; either way nothing is.
     """
-    run = checked(run)
+    return record_checked(session, checked(run))
+
+
+def record_checked(session: Session, run: RunDocument) -> bool:
+    """The same for a document that tracker/store/border.py has given out."""
     with in_words(session):
         for attempt in range(ATTEMPTS):
             try:

@@ -18,7 +18,7 @@ from spook_tracker.tracker.document.json_form import readable
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.record import record_checked
 from spook_tracker.tracker.store.versions import RunInfo
 
 
@@ -82,7 +82,7 @@ def import_files(session: Session, paths: Iterable[Path]) -> Imported:
     present: list[str] = []
     for file in files:
         run = read_document(file)
-        (stored if record(session, run) else present).append(run.id)
+        (stored if record_checked(session, run) else present).append(run.id)
     return Imported(tuple(stored), tuple(present))
 
 

@@ -17,13 +17,11 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
-    day,
     named,
     number,
     page_of,
     quantity,
     short_hash,
-    version,
 )
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, known, side_of
@@ -145,8 +143,7 @@ def page_files(told: Comparisons, book: Book, accepted: Sequence[Accepted]) -> b
 
 def choice(night: Night) -> dict[str, str]:
     """How a version is called in the list and in the address."""
-    words = (version(night.engine), short_hash(night.engine), day(night.started))
-    return {"id": night.id, "label": " · ".join(filter(None, words)), "hash": short_hash(night.engine)}
+    return {"id": night.id, "label": night.label, "hash": short_hash(night.engine)}
 
 
 def worst_first(changes: Sequence[Change]) -> list[Change]:

@@ -74,7 +74,7 @@ def view(chart: Chart, *, table: bool = True) -> View:
             at = labels.get(line.x[i]) or number(line.x[i], 6)
             rows.append((clean(line.name), at, number(line.y[i], 6)))
     return View(
-        chart.name, chart.title, chart.thesis, shown.note, picture(chart), figure(chart), columns, rows, every,
+        chart.name, chart.title, chart.thesis, shown.note, picture(chart, shown), figure(chart, shown), columns, rows, every,
         sum(not line.quiet for line in chart.lines) > 5,
     )  # fmt: skip
 
@@ -225,8 +225,7 @@ def _at_night(night: Night, value: float, unit: str, outcome: str) -> str:
     """What a point of a trend says."""
     shown = quantity(value, unit, 7) if math.isfinite(value) else ""
     word = WORDS.get(outcome, outcome)
-    head = " · ".join(filter(None, (version(night.engine), short_hash(night.engine), day(night.started))))
-    return f"{head}\n{shown + ' · ' if shown else ''}{word}"
+    return f"{night.label}\n{shown + ' · ' if shown else ''}{word}"
 
 
 def figure_chart(data: FigureData, prefix: str = "") -> Chart:

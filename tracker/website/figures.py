@@ -43,9 +43,9 @@ def plain(text: str) -> str:
     return clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
-def figure(chart: Chart) -> dict[str, Any]:
-    """Traces and layout of a chart, colours as slots in `meta`."""
-    chart = flattened(drawable(chart))
+def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
+    """Traces and layout of a chart, colours as slots in `meta`; `shown` is what can be drawn of it, where known."""
+    chart = flattened(shown or drawable(chart))
     x_ends, y_ends = chart.ends()
     layout: dict[str, Any] = {
         "xaxis": _axis(chart.x_label, chart.x_scale, x_ends),

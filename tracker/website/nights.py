@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 from spook_tracker.tracker.document.run_document import (
@@ -21,7 +22,7 @@ from spook_tracker.tracker.document.run_document import (
     TestCard,
     Trajectory,
 )
-from spook_tracker.tracker.document.wording import version
+from spook_tracker.tracker.document.wording import day, short_hash, version
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import histories, lines
 from spook_tracker.tracker.judge.series_history import Told, judge_all
@@ -48,6 +49,12 @@ class Night:
     engine: EngineVersion
     machine: Machine
     asked: Any = None  # tracker.document.run_document.Asked; None: not known
+
+    @cached_property
+    def label(self) -> str:
+        """Version, commit and day in a line."""
+        words = (version(self.engine), short_hash(self.engine), day(self.started))
+        return " · ".join(filter(None, words))
 
 
 @dataclass

@@ -17,6 +17,7 @@ from typing import Any
 
 import msgspec
 
+from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.json_form import plain
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -85,6 +86,7 @@ class Report:
         return self.written + self.skipped
 
 
+@no_collection()
 def publish(
     history: Records,
     out: Path,

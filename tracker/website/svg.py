@@ -64,9 +64,9 @@ class Picture:
     names: list[tuple[str, str]] = field(default_factory=list)  # height and name of a line
 
 
-def picture(chart: Chart) -> Picture:
-    """The chart as a picture."""
-    chart = flattened(drawable(chart))
+def picture(chart: Chart, shown: Chart | None = None) -> Picture:
+    """The chart as a picture; `shown` is what can be drawn of it, where that is known."""
+    chart = flattened(shown or drawable(chart))
     (x_low, x_high), (y_low, y_high) = chart.ends()
     legend, rows = ([], 0) if chart.direct else _legend(chart.lines)
     top = TOP + 18.0 * rows

@@ -34,9 +34,18 @@ def said(name: Class) -> str:
     return CLASSES[name][1]
 
 
+def _compiled_before() -> jinja2.BytecodeCache | None:
+    """Templates compiled once for all publications, in a folder of the user's own; None where there is no such place."""
+    try:
+        return jinja2.FileSystemBytecodeCache()
+    except (OSError, RuntimeError):
+        return None
+
+
 def environment(folder: Path | None = None) -> jinja2.Environment:
     """The templates under site/templates with our filters."""
     made = jinja2.Environment(
+        bytecode_cache=_compiled_before(),
         loader=jinja2.FileSystemLoader(folder or resource("site") / "templates"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
