@@ -85,7 +85,16 @@ BROKEN: dict[str, Simulate] = {
     "deaf to options": deaf,
     **{
         f"{name} 3 % too small": off_by(0.97, name)
-        for name in ("friction", "restitution", "strength", "gravity", "stiffness", "force", "speed")
+        for name in (
+            "friction",
+            "restitution",
+            "strength",
+            "gravity",
+            "stiffness",
+            "force",
+            "speed",
+            "cornering",
+        )
     },
     "bodies 3 % too large": off_by(1.03, "radius", "size"),
     "lopsided": lopsided,
