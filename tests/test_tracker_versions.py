@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -141,3 +142,18 @@ def test_of_several_runs_of_a_version_the_last_clean_one_is_meant():
     runs = runs_of(commit(A), commit(A), commit(A, dirty=True))
 
     assert found(runs, A) == runs[1]
+
+
+def test_words_are_of_one_engine():
+    peers = [commit(A, name="zeta"), commit(B, name="alpha"), commit(C, name="zeta")]
+
+    assert found(runs_of(*peers), "previous").engine.git_hash == A
+    assert found(runs_of(commit(C), *peers[:2]), "latest").engine.git_hash == C
+    with pytest.raises(UnknownName, match="only one run"):
+        found(runs_of(commit(C), *peers[:2]), "previous")
+
+
+def test_an_imported_engine_is_not_the_one_a_word_means_while_another_was_measured():
+    ours, theirs = runs_of(commit(A, name="ours"), commit(B, name="theirs"))
+
+    assert found([ours, replace(theirs, trigger="import")], "latest").engine.git_hash == A

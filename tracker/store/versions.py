@@ -5,7 +5,8 @@ an engine version               1.2.0 or 1.2.1.dev3+g1a2b3c4: its newest run
 a commit                        its hash or the start of it (4 characters or more), a tag, a branch
 a run                           its id or the start of it (4 characters or more)
 
-of the engine "spook" wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another engine.
+of the engine "spook" wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another engine. The
+words are of "spook" if it has any run, else of the engine measured last.
 """
 
 from __future__ import annotations
@@ -67,7 +68,10 @@ def resolve(runs: Sequence[RunInfo], name: str, commit_of: Callable[[str], str |
     else:
         first = [run for run in runs if run.engine.name == ENGINE]
         others = [run for run in runs if run.engine.name != ENGINE]
-        found = _among(first, name, commit_of) or _among(others, name, commit_of)
+        if name in WORDS:  # of one engine: nothing is previous to another's run
+            found = _by_word(first or _of_newest(others), name)
+        else:
+            found = _among(first, name, commit_of) or _among(others, name, commit_of)
     if found is None:
         raise _unknown(runs, name)
     return found
@@ -91,6 +95,12 @@ def _among(runs: list[RunInfo], name: str, commit_of: Callable[[str], str | None
     commit = commit_of(name)
     of_commit = [run for run in runs if commit and run.engine.git_hash == commit]
     return _newest(of_commit) if of_commit else None
+
+
+def _of_newest(runs: list[RunInfo]) -> list[RunInfo]:
+    """The runs of the engine that was measured last; imported runs only count where there is nothing else."""
+    newest = max(runs, key=lambda run: (run.trigger != "import", run.started_at))
+    return [run for run in runs if run.engine.name == newest.engine.name]
 
 
 def _by_word(runs: list[RunInfo], word: str) -> RunInfo | None:
