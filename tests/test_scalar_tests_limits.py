@@ -14,6 +14,7 @@ import pytest
 from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import (
+    capstan,
     double_pendulum,
     floating_box,
     gears,
@@ -325,6 +326,24 @@ def test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say() -> None:
     assert limits["drum_error"] == pytest.approx((wires.TIME_STEP * spin) ** 2 / 6.0 * share, rel=0.01)
     limits = {m.name: m.limit for m in measurement("gears", "plain").metrics}
     assert limits["ratio_error"] == pytest.approx(gears.standing(), rel=0.01)
+
+
+def test_a_winch_is_faster_by_what_the_turning_of_its_drum_leaves_out() -> None:
+    """The drum turns by asin(h ω) a step; starting from rest with the steady torque the same in its share of the mass."""
+    h, c = capstan.TIME_STEP, capstan
+    limits = {m.name: m.limit for m in measurement("capstan", "winch").metrics}
+    lifted = math.asin(h * c.SPEED) / (h * c.SPEED) - 1.0
+    # velocities of one step: u for the wire, ω for the drum, u = r asin(h ω)/h; energy gives the rest
+    spin = slowly = 0.0
+    inertia, mass, r = c.MOMENT, c.LOAD, c.DRUM
+    for _ in range(60):
+        spin += h * (mass * c.GRAVITY * r - c.TORQUE) / (mass * r * r + inertia)
+        slowly = r * spin
+    share = inertia / r**2 / (mass + inertia / r**2)
+    sunk = share * (math.asin(h * slowly / r) / (h * slowly / r) - 1.0)
+
+    assert lifted <= limits["speed_error"] <= 1.1 * lifted
+    assert sunk <= limits["sinking_error"] <= 1.1 * sunk
 
 
 def test_the_torques_of_a_driven_arm_are_two_steps_late_at_most() -> None:

@@ -6,6 +6,7 @@
 #include "collision/sweep.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
@@ -16,7 +17,9 @@ constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
 std::uint64_t pair_of(IndexPair pair) noexcept {
     return (static_cast<std::uint64_t>(pair.first) << 24) | static_cast<std::uint64_t>(pair.second);
 }
+bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
+constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
 constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
 
 }  // namespace
@@ -106,7 +109,9 @@ void ContactStage::find_open() {
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
     open_.clear();
+    unsigned seen = 0;
     for (const IndexPair& pair : detection_.near(poses_, search_)) {
+        if (++seen % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
         const double reach = search_[first.body] + search_[second.body];
@@ -133,6 +138,7 @@ void ContactStage::find_open() {
             if (!scratch_.empty() || solids) open_.push_back(open);
             continue;
         }
+        std::stable_sort(scratch_.begin(), scratch_.end(), by_key);
         for (const Contact& contact : scratch_) {
             if (!reachable(contact)) continue;
             add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
@@ -363,8 +369,9 @@ void ContactStage::find_events() {
 
 /// Sorts the points by key and finds each one's predecessor in the step before.
 void ContactStage::order_points() {
-    std::stable_sort(points_.begin(), points_.end(),
-                     [](const Point& a, const Point& b) { return a.contact.key < b.contact.key; });
+    const auto in_order = [](const Point& a, const Point& b) { return by_key(a.contact, b.contact); };
+    if (!std::is_sorted(points_.begin(), points_.end(), in_order))  // closed ones come so
+        std::stable_sort(points_.begin(), points_.end(), in_order);
     std::size_t old = 0;
     for (Point& point : points_) {
         while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;

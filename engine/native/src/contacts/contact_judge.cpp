@@ -21,48 +21,58 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
 
 namespace {
 
-/// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds.
-double bounded_residual(const RowBlock& block, int i, double own, const std::vector<Vec6>& velocity) {
-    const double w = row_residual(block, i, velocity),
-                 z = block.multiplier[i];  // z − w/own would round w away
+/// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds. At most
+/// |w|, so no more is asked where that is `enough`.
+double bounded_residual(const MixedSystem& system, const RowBlock& block, int i, double enough) {
+    const double w = row_residual(block, i, system.velocity), z = block.multiplier[i];
+    if (std::abs(w) <= enough && z >= block.lower[i] && z <= block.upper[i]) return 0.0;
+    const double own = own_inertia(system, block, i);
+    if (!(own > 0.0)) return 0.0;
+    // z − w/own would round w away
     return w > 0.0 ? std::min(w, own * (z - block.lower[i])) : std::min(-w, own * (block.upper[i] - z));
+}
+
+/// The same of a point's friction: at most its slip.
+double friction_residual(const MixedSystem& system, const RowBlock& block, const FrictionPoint& point,
+                         FrictionModel model, double enough) {
+    const int one = point.row, two = one + point.size - 1;  // of an interval both are its one row
+    const double nu = std::max(0.0, model == FrictionModel::box ? point.normal : block.multiplier[0]);
+    const double bound = point.coefficient * nu;
+    const double b1 = block.multiplier[one], b2 = one == two ? 0.0 : block.multiplier[two];
+    const double s1 = slip(block, point, one, system.velocity),
+                 s2 = one == two ? 0.0 : slip(block, point, two, system.velocity);
+    const bool disc = model == FrictionModel::cone;
+    const bool within = disc ? length(b1, b2) <= bound : std::abs(b1) <= bound && std::abs(b2) <= bound;
+    if (within && length(s1, s2) <= enough) return 0.0;
+    const double own = own_inertia(system, block, one) + own_inertia(system, block, two);
+    double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
+    bool sticks = true;
+    if (disc) {
+        const double reach = length(d1, d2);
+        sticks = reach <= bound;
+        if (!sticks) d1 *= bound / reach, d2 *= bound / reach;
+    } else {
+        sticks = std::abs(d1) <= bound && std::abs(d2) <= bound;
+        d1 = std::clamp(d1, -bound, bound), d2 = std::clamp(d2, -bound, bound);
+    }
+    return sticks ? length(s1, s2) : own * length(b1 - d1, b2 - d2);
 }
 
 }  // namespace
 
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
-                           FrictionModel model) {
-    RowsResidual worst;
+                           FrictionModel model, double enough) {
+    RowsResidual worst{enough, 0};
     std::size_t next = 0;
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         double residual = 0.0;
         const bool rubs = next < points.size() && points[next].block == static_cast<int>(k);
-        for (int i = 0; i < (rubs ? 1 : block.size); ++i) {
-            const double own = own_inertia(system, block, i);
-            if (own > 0.0) residual = std::max(residual, bounded_residual(block, i, own, system.velocity));
-        }
-        for (; next < points.size() && points[next].block == static_cast<int>(k); ++next) {
-            const FrictionPoint& point = points[next];
-            const int one = point.row, two = one + point.size - 1;  // of an interval both are its one row
-            const double own = own_inertia(system, block, one) + own_inertia(system, block, two);
-            const double nu = std::max(0.0, model == FrictionModel::box ? point.normal : block.multiplier[0]);
-            const double bound = point.coefficient * nu;
-            const double b1 = block.multiplier[one], b2 = one == two ? 0.0 : block.multiplier[two];
-            const double s1 = slip(block, point, one, system.velocity),
-                         s2 = one == two ? 0.0 : slip(block, point, two, system.velocity);
-            double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
-            bool sticks = true;
-            if (model == FrictionModel::cone) {
-                const double reach = length(d1, d2);
-                sticks = reach <= bound;
-                if (!sticks) d1 *= bound / reach, d2 *= bound / reach;
-            } else {
-                sticks = std::abs(d1) <= bound && std::abs(d2) <= bound;
-                d1 = std::clamp(d1, -bound, bound), d2 = std::clamp(d2, -bound, bound);
-            }
-            residual = std::max(residual, sticks ? length(s1, s2) : own * length(b1 - d1, b2 - d2));
-        }
+        for (int i = 0; i < (rubs ? 1 : block.size); ++i)
+            residual = std::max(residual, bounded_residual(system, block, i, worst.residual));
+        for (; next < points.size() && points[next].block == static_cast<int>(k); ++next)
+            residual =
+                std::max(residual, friction_residual(system, block, points[next], model, worst.residual));
         if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
     }
     return worst;

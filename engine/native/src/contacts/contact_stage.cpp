@@ -10,8 +10,9 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;  // of the larger body's radius: a depth that is rounding
-constexpr int late_rounds = 3;   // of solves that set others in motion towards a third
+constexpr double closed = 1e-9;     // of the larger body's radius: a depth that is rounding
+constexpr double rounding = 1e-15;  // of a place and of a size: four roundings
+constexpr int late_rounds = 3;      // of solves that set others in motion towards a third
 
 }  // namespace
 
@@ -149,9 +150,16 @@ double ContactStage::explained_depth(const Point& point) const noexcept {
     return point.pressed_before + closed * size(point.contact);
 }
 
+/// A gap no larger than the rounding of the places it was found at is none. Answered with a speed it would come back
+/// as another of its kind, step after step: what rests would never be found at rest.
+double ContactStage::gap(const Contact& contact) const noexcept {
+    const double gap = contact.point.gap;
+    return std::abs(gap) <= rounding * (norm(contact.point.position) + size(contact)) ? 0.0 : gap;
+}
+
 /// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
 double ContactStage::resting_right(Point& point) const {
-    const double h = options_.time_step, gap = point.contact.point.gap;
+    const double h = options_.time_step, gap = this->gap(point.contact);
     point.approach = relative(point, point.contact.point.normal, velocity_, false);
     point.push = relative(point, point.contact.point.normal, kick_, false);
     // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.

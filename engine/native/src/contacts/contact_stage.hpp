@@ -249,6 +249,7 @@ private:
     double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
     double size(const Contact& contact) const noexcept;
+    double gap(const Contact& contact) const noexcept;
     bool is_closed(const Contact& contact) const noexcept;
 
     Detection detection_;

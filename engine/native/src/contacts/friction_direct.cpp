@@ -340,7 +340,7 @@ bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& po
     for (const Vec6& part : missing)
         for (const double impulse : part)
             if (!(std::abs(impulse) <= pushes * largest)) return false;
-    return rows_residual(system, points, model).residual <= moves * speed;
+    return rows_residual(system, points, model, moves * speed).residual <= moves * speed;
 }
 
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,

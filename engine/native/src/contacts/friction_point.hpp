@@ -33,7 +33,8 @@ struct FrictionReport {
 };
 
 /// The row that is furthest from its law, and by how much: each multiplier against where a step of projection would
-/// put it, as a velocity [m/s]. For the box `FrictionPoint::normal` is the bound's.
+/// put it, as a velocity [m/s]. For the box `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not
+/// told apart: where all are, that is the answer, and looking is cheaper.
 struct RowsResidual {
     double residual = 0.0;
     int row = 0;  // index into MixedSystem::rows
@@ -42,7 +43,7 @@ struct RowsResidual {
 double own_inertia(const MixedSystem& system, const RowBlock& block, int i);
 
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
-                           FrictionModel model);
+                           FrictionModel model, double enough = 0.0);
 
 /// Slip velocity of row i, with what slip compliance gives way: D v + (gamma/h) beta.
 inline double slip(const RowBlock& block, const FrictionPoint& point, int i,

@@ -8,7 +8,7 @@
 //              l += I w: no joint and no contact feels it.
 //   energy     Where the kinetic energy E has grown, the velocities are drawn towards the rigid motion that has the
 //              island's momenta: they keep the momenta, and with share s left, E(s) = E_rigid + s² (E − E_rigid).
-//              A body of an island that leans on the ground carries its angular momentum round with it instead.
+//              In an island that leans on the ground each body's angular momentum is shortened instead.
 // Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
 #include <algorithm>
 #include <cmath>
@@ -139,9 +139,10 @@ void RigidSystem::keep_spin_energy(int body) {
     const BodyConstants& constants = constants_[body];
     const BodyState& before = unparted_[body];
     BodyState& s = live_.bodies[body];
-    if (constants.particle || !(twice_energy(constants, s) > twice_energy(constants, before))) return;
-    s.angular_momentum =
-        axes(constants, s) * transposed_times(axes(constants, before), before.angular_momentum);
+    const double most = twice_energy(constants, before), now = twice_energy(constants, s);
+    const double linear = constants.mass * dot(s.velocity, s.velocity);
+    if (constants.particle || !(now > most)) return;
+    s.angular_momentum *= std::sqrt((most - linear) / (now - linear));
     refresh(constants, s);
 }
 
