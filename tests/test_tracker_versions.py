@@ -13,6 +13,7 @@ from spook_tracker.tracker.judge.lane import lines
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 from tests.run_documents import engine, machine
 
+SHOWN = ("mujoco", "rapier", "zeta", "alpha")  # engines without gates of their own
 A, B, C = "1a" * 20, "2b" * 20, "3c" * 20
 
 
@@ -34,8 +35,8 @@ def runs_of(*versions) -> list[RunInfo]:
             ci_address="",
             key=number,
             started_at=datetime(2026, 11, 21, tzinfo=UTC) + timedelta(days=number),
-            gates=1,
-            gates_passed=1,
+            gates=int(version.name not in SHOWN),
+            gates_passed=int(version.name not in SHOWN),
         )
         for number, version in enumerate(versions, start=1)
     ]
@@ -113,9 +114,9 @@ def test_an_engine_that_is_only_shown_never_takes_our_place() -> None:
         commit(A, name="pebble"), commit("", name="mujoco"), commit(B, name="bullet")
     )
     runs = [
-        replace(ours, started="2026-11-21T01:00:00+00:00", gates=3),
-        replace(theirs, started="2026-11-22T01:00:00+00:00", gates=0),
-        replace(imported, started="2026-11-23T01:00:00+00:00", gates=5, trigger="import"),
+        replace(ours, gates=3),
+        replace(theirs, gates=0),
+        replace(imported, gates=5, trigger="import"),
     ]
 
     assert found(runs, "latest").engine.name == "pebble"
@@ -162,3 +163,18 @@ def test_of_several_runs_of_a_version_the_last_clean_one_is_meant():
     runs = runs_of(commit(A), commit(A), commit(A, dirty=True))
 
     assert found(runs, A) == runs[1]
+
+
+def test_words_are_of_one_engine():
+    peers = [commit(A, name="zeta"), commit(B, name="alpha"), commit(C, name="zeta")]
+
+    assert found(runs_of(*peers), "previous").engine.git_hash == A
+    assert found(runs_of(commit(C), *peers[:2]), "latest").engine.git_hash == C
+    with pytest.raises(UnknownName, match="only one run"):
+        found(runs_of(commit(C), *peers[:2]), "previous")
+
+
+def test_an_imported_engine_is_not_the_one_a_word_means_while_another_was_measured():
+    ours, theirs = runs_of(commit(A, name="ours"), commit(B, name="theirs"))
+
+    assert found([ours, replace(theirs, trigger="import")], "latest").engine.git_hash == A

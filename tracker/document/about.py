@@ -22,4 +22,5 @@ def about(runs: Sequence[Any]) -> str:
 
 def started(run: Any) -> datetime:
     """When a run began, for order; long ago where that cannot be read."""
-    return instant(run.started) or datetime.min.replace(tzinfo=UTC)
+    known: datetime | None = getattr(run, "started_at", None)
+    return known or instant(run.started) or datetime.min.replace(tzinfo=UTC)

@@ -5,7 +5,8 @@ an engine version               1.2.0 or 1.2.1.dev3+g1a2b3c4: its newest run
 a commit                        its hash or the start of it (4 characters or more), a tag, a branch
 a run                           its id or the start of it (4 characters or more)
 
-of the engine that the history is about, wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another one.
+of the engine that the history is about, wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another
+one. The words are of that engine alone.
 """
 
 from __future__ import annotations
@@ -67,8 +68,11 @@ def resolve(runs: Sequence[RunInfo], name: str, commit_of: Callable[[str], str |
     else:
         ours = about(runs)
         first = [run for run in runs if run.engine.name == ours]
-        others = [run for run in runs if run.engine.name != ours]
-        found = _among(first, name, commit_of) or _among(others, name, commit_of)
+        if name in WORDS:  # of one engine: nothing is previous to another's run
+            found = _by_word(first, name)
+        else:
+            others = [run for run in runs if run.engine.name != ours]
+            found = _among(first, name, commit_of) or _among(others, name, commit_of)
     if found is None:
         raise _unknown(runs, name)
     return found
