@@ -80,6 +80,7 @@ def compare(
     """Say what changed between two versions.
 
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green.
+    Previous to the latest is the run before it on its own branch.
     V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
     annotations are for pull requests, and empty when nothing became worse.
     """
@@ -185,7 +186,9 @@ def judge_command(
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))
 @click.argument("test")
 @click.argument("metric", required=False)
-@click.option("--last", default=10, show_default=True, help="Values to list of each series.")
+@click.option(
+    "--last", type=click.IntRange(min=1), default=10, show_default=True, help="Values to list of each series."
+)
 @engine_option
 @kind_options
 @json_option
