@@ -64,6 +64,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "seams": "seams",
     "grasp": "grasp",
     "hanging_cable": "hanging_cable",
+    "rope": "rope",
     "rocking_block": "rocking_block",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",

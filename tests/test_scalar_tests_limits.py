@@ -15,11 +15,13 @@ from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import (
     capstan,
+    cornering,
     double_pendulum,
     floating_box,
     gears,
     motor,
     robot_arm,
+    rope,
     sinking_sphere,
     slider_crank,
     wires,
@@ -436,3 +438,38 @@ def test_the_slider_cranks_torque_by_newton_and_euler() -> None:
         right = (s.ROD_MASS * x, s.ROD_MASS * y, inertia * turn, s.SLIDER * slide, 0.0, 0.0)
 
         assert np.linalg.solve(matrix, right)[5] == pytest.approx(float(s.torque(theta)), rel=1e-6)
+
+
+def test_a_turning_rope_is_longer_by_what_its_damped_rows_let_through() -> None:
+    """A steady circle: w h a step, r − l = r (1 − cos w h)(1 + 2θ)/2; the angular momentum stays, m r² w."""
+    h, w = rope.TIME_STEP, rope.SPIN
+    longer = 1.0 / (1.0 - (1.0 - math.cos(w * h)) * 2.5)
+    slower = longer**-2
+    pull, energy = slower**2 * longer - 1.0, slower - 1.0
+    limits = {m.name: m.limit for m in measurement("rope", "plain").metrics}
+
+    assert abs(pull) <= limits["pull_error"] <= 1.2 * abs(pull)
+    assert abs(energy) <= limits["energy_error"] <= 1.2 * abs(energy)
+
+
+def test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by() -> None:
+    """The bicycle model with every stiffness C V/(V + 1 mm/s), solved as two equations of balance."""
+    c = cornering
+    for configuration, front, rear in (("plain", c.SOFT, c.HARD), ("oversteer", c.HARD, c.SOFT)):
+        limits = {m.name: m.limit for m in measurement("cornering", configuration).metrics}
+        rates = []
+        for speed in (c.SPEED, c.SPEED + c.CREEP):
+            f, r, share = 2.0 * front, 2.0 * rear, c.SPEED / speed
+            # sideways speed v and yaw rate: forces −C (v ± x w)/V (+ C δ in front) balance m V w and have no moment
+            balance = np.array(
+                (
+                    ((f + r) / c.SPEED, (f * c.AHEAD - r * c.BACK) / c.SPEED + c.MASS * c.SPEED / share),
+                    (
+                        (f * c.AHEAD - r * c.BACK) / c.SPEED,
+                        (f * c.AHEAD**2 + r * c.BACK**2) / c.SPEED,
+                    ),
+                )
+            )
+            rates.append(float(np.linalg.solve(balance, c.STEER * f * np.array((1.0, c.AHEAD)))[1]))
+        assert rates[0] == pytest.approx(c.yaw(c.SPEED, front, rear), rel=1e-12)
+        assert abs(rates[1] / rates[0] - 1.0) <= limits["yaw_error"] <= 3.0 * abs(rates[1] / rates[0] - 1.0)
