@@ -190,6 +190,33 @@ def test_a_trend_lists_at_least_one_value(tmp_path: Path) -> None:
     assert tracker("trend", "t", "--last", "-5", "--db", stored(tmp_path, night(0, one(0.1))))[0] == 2
 
 
+def test_a_run_that_measured_nothing_is_not_green(tmp_path: Path) -> None:
+    url = stored(tmp_path, night(0, one(0.1)), replace(night(1, one(0.1)), samples=(), partial=True))
+
+    code, told = tracker("judge", "latest", "--db", url)
+
+    assert code == tracker("compare", "previous", "latest", "--db", url)[0] == 3
+    assert told.startswith("? nothing was measured")
+
+
+def test_a_file_of_accepted_levels_that_is_named_must_be_there(database: str, tmp_path: Path) -> None:
+    code, told = tracker("judge", MAIN, "--accepted", str(tmp_path / "acepted.toml"), "--db", database)
+
+    assert code == 2
+    assert "acepted.toml" in told
+
+
+def test_a_limit_that_moved_is_not_blamed_on_the_last_bits(tmp_path: Path) -> None:
+    lower = one(0.4, limit=0.2)
+    broken = [(lower[0][0], replace(lower[0][1], outcome="out_of_limit", passed=False))]
+    url = stored(tmp_path, night(0, one(0.4)), night(1, broken))
+
+    code, told = tracker("judge", "latest", "--db", url)
+
+    assert code == 1
+    assert "crossed its limit: the same value, at another limit" in told
+
+
 def stored(folder: Path, *runs: RunDocument) -> str:
     url = f"sqlite:///{folder}/t.db"
     with session_on(url) as session:

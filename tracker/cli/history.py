@@ -16,6 +16,7 @@ from spook_tracker.tracker.cli.filters import (
 )
 from spook_tracker.tracker.cli.options import (
     ACCEPTED,
+    NOT_COMPARABLE,
     RED,
     accepted_option,
     database_option,
@@ -159,7 +160,7 @@ def judge_command(
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
-    RUN is named as for compare. What is red ends with exit code 1.
+    RUN is named as for compare. What is red ends with exit code 1, a run that measured nothing with 3.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
@@ -181,6 +182,8 @@ def judge_command(
         say("\n".join([*finding_lines(findings), *(f"note: {note}" for note in notes)]))
     if any(finding.red for finding in findings):
         click.get_current_context().exit(RED)
+    if not findings:
+        click.get_current_context().exit(NOT_COMPARABLE)
 
 
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))
