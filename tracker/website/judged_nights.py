@@ -118,7 +118,7 @@ Marks = dict[str, tuple[tuple[float, float] | None, bool, str]]  # by key: usual
 
 
 def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
-    """What the history knows of every run, by its id, as tracker/judge/compare.py:known tells it of two."""
+    """What the history knows of every run, by its id, as tracker/judge/known.py tells it of two."""
     found: dict[str, Marks] = {}
     for key, series in told.items():
         timed = series.definition.kind == "time" and not is_read_off(series.definition)
