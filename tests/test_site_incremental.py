@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.website.publish import publish
@@ -25,6 +26,14 @@ def other_engine(number: int) -> RunDocument:
     return replace(run, engine=engine(number, "other"), **named)
 
 
+def corrected(place: int, value: float | None = None, **changes: object) -> list[RunDocument]:
+    """The nights with one of them taken out and put back, not as it was."""
+    run = NIGHTS[place]
+    if value is not None:
+        run = replace(run, samples=(replace(run.samples[0], value=Number(value)),))
+    return [*NIGHTS[:place], replace(run, **changes), *NIGHTS[place + 1 :]]
+
+
 def last_with(**changes: object) -> list[RunDocument]:
     return [*NIGHTS[:-1], replace(NIGHTS[-1], series=(replace(NIGHTS[-1].series[0], **changes),))]
 
@@ -38,6 +47,12 @@ def last_with(**changes: object) -> list[RunDocument]:
         pytest.param(NIGHTS, NIGHTS[:-1], (), id="the newest run removed"),
         pytest.param(WITHOUT_IT, NIGHTS, (), id="an older run imported late"),
         pytest.param(NIGHTS[2:], NIGHTS, (), id="the beginning imported late"),
+        pytest.param(
+            NIGHTS, corrected(4, id="another", engine=engine(40)), (), id="another run in its place"
+        ),
+        pytest.param(
+            NIGHTS, corrected(4, 0.31), (), id="a run removed and imported again with another value"
+        ),
         pytest.param(NIGHTS, [*NIGHTS, *map(other_engine, range(3))], (), id="another engine"),
         pytest.param(NIGHTS, last_with(test_version="v2"), (), id="the definition changed"),
         pytest.param(NIGHTS, last_with(description="other words"), (), id="the words changed"),
