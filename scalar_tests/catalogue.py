@@ -60,6 +60,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "suspension": "suspension",
     "cornering": "cornering",
     "rolling_coin": "rolling_coin",
+    "bowl": "bowl",
     "slider_crank": "slider_crank",
     "seams": "seams",
     "grasp": "grasp",

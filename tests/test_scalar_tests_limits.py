@@ -14,6 +14,7 @@ import pytest
 from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import (
+    bowl,
     capstan,
     cornering,
     double_pendulum,
@@ -473,3 +474,29 @@ def test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by() -> None:
             rates.append(float(np.linalg.solve(balance, c.STEER * f * np.array((1.0, c.AHEAD)))[1]))
         assert rates[0] == pytest.approx(c.yaw(c.SPEED, front, rear), rel=1e-12)
         assert abs(rates[1] / rates[0] - 1.0) <= limits["yaw_error"] <= 3.0 * abs(rates[1] / rates[0] - 1.0)
+
+
+def test_many_facets_make_a_round_bowl_and_few_of_them_slow_a_ball_down_at_corners() -> None:
+    times = np.linspace(0.0, 1.8, 7201)
+    shares = [
+        bowl.half_period(times, bowl.rolled(times, count)) * bowl.PACE / math.pi - 1.0
+        for count in (bowl.FACETS, 1001)
+    ]
+    limits = {m.name: m.limit for m in measurement("bowl", "plain").metrics}
+    smooth, period = limits["smooth_error"], limits["period_error"]
+
+    assert isinstance(smooth, float) and isinstance(period, float)
+    assert abs(shares[0]) <= smooth - period <= 1.1 * abs(shares[0])
+    assert shares[1] == pytest.approx(
+        bowl.facet(1001)[1] ** 2 / 16.0, rel=0.05
+    )  # of a swing that is not small
+    # At the first corner, after half a facet: v² = 2 a s, then the part (cos Δ + 2/5)/(7/5) of it.
+    width, angle = bowl.facet(5)
+    half = (bowl.BOWL * math.cos(0.5 * width) - bowl.BALL) * math.tan(0.5 * width)
+    pull = 5.0 / 7.0 * bowl.GRAVITY * math.sin(angle)
+    reached = math.sqrt(2.0 * half / pull)
+    fine = reached + np.linspace(0.0, 1e-3, 2)
+    x = bowl.rolled(fine, 5)
+    slows = (math.cos(width) + 0.4) / 1.4
+    after = -math.sqrt(2.0 * pull * half) * slows * math.cos(angle - width)
+    assert (x[1] - x[0]) / 1e-3 == pytest.approx(after, rel=5e-3)
