@@ -266,6 +266,7 @@ void RigidSystem::fill_rows() {
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;
+        if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
     }
 }
 
@@ -376,13 +377,15 @@ void RigidSystem::solve_mixed(bool touching) {
         judge_sweeps();
         sweeps_ += static_cast<std::uint64_t>(report.sweeps);
     } else {
-        const PivotReport report = pivot_.solve(mixed_);
-        finite = report.finite;
-        rounds_ += static_cast<std::uint64_t>(report.rounds);
+        finite = pivot_rows();
     }
     if (!finite) {
         live_.not_solved = tied_.front();
         return;
+    }
+    if (!following_.empty() && (touching || solver_ == RigidSolver::iterative)) {
+        following_.begin();
+        following_.follow(mixed_, joints_);  // for the next step: here bounds are a step late
     }
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         JointSet::State& state = joints_.states[blocks[k].joint];
