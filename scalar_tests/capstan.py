@@ -229,7 +229,7 @@ TEST = ScalarTest(
         "A wire about to slip: dT/dφ = µ T, so T₂ = T₁ e^(µφ); T₂/T₁ lies between e^(−µφ) and e^(µφ).",
         "Slipping: a = (M − e^(µφ) m) g/(M + e^(µφ) m).",
         "Winch: v = r ω and T = m g; with less torque, a = (m g r − τ)/(m r + I/r) downwards.",
-        "In the step: one row per bar keeps the wire from passing, with |T₂ − T₁| <= tanh(µφ/2) (T₁ + T₂).",
+        "In the step: one row per bar keeps the wire from passing, with |T₂ − T₁| ≤ tanh(µφ/2) (T₁ + T₂).",
     ),
     reference="L. Euler 1762, J. A. Eytelwein 1808; mechanics in closed form.",
     conclusion="Green: the wire holds what it must and slips where it must. Red: friction of wires is lost or made up.",

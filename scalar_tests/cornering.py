@@ -290,7 +290,7 @@ TEST = ScalarTest(
         "Bicycle model: m (v' + V r) = F_f + F_r, I r' = a F_f − b F_r, F = C × slip angle of the axle.",
         "Steady: r = V δ/(L + K V²), K = (m/L)(b/C_f − a/C_r); the front axle carries m V r b/L.",
         "K < 0 oversteers: from V² = −L/K on it does not run straight.",
-        "In the step a tyre is two velocity rows, s + (V/C h) λ = 0: a steady bend is exact, motion first order.",
+        "In the step a tyre is two velocity rows, s + V/(C h) λ = 0: a steady bend is exact, motion first order.",
     ),
     reference="P. Riekert and T. E. Schunck 1940: the bicycle model, in closed form.",
     conclusion="Green: tyres hold by slip, and moments about the vertical balance. Red: slip, load or heading is wrong.",

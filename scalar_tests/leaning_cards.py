@@ -162,7 +162,7 @@ TEST = ScalarTest(
     ),
     theory=(
         "Moments about a foot: H (ρ + ℓ cos θ) = W (ℓ/2) sin θ; H is the thrust at the top and the friction of the foot.",
-        f"They stand if and only if µ >= H/W, here {told(need(), 4)}.",
+        f"They stand if and only if µ ≥ H/W, here {told(need(), 4)}.",
     ),
     reference="Statics.",
     conclusion="Green: friction holds as much as it must and no more. Red: it creeps, or it does not know its load.",

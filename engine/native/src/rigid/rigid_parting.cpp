@@ -22,7 +22,7 @@ namespace {
 constexpr int most_rounds = 10;        // of Newton's method
 constexpr double held = 1e-13;         // of a joint's size: a violation that is rounding
 constexpr double nearly_held = 1e-11;  // and what may be left where rounding is worse
-constexpr double least_share = 0.1;    // of the displacement
+constexpr int most_halvings = 4;       // of the displacement
 constexpr double rounding = 4e-16;     // of the energy
 
 double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
@@ -61,8 +61,8 @@ void RigidSystem::part_bodies() {
     for (int island = 0; island < islands.count; ++island) {
         for (const int k : parted_blocks_[island])
             joints_.overstep(k, live_.bodies, overstep_.data() + overstep_at_[k]);
-        for (double share = 1.0; share > least_share; share *= 0.5) {
-            if (part_island(island, share)) break;
+        for (int halving = 0; halving < most_halvings; ++halving) {
+            if (part_island(island, std::ldexp(1.0, -halving))) break;
             for (const int k : parted_[island]) live_.bodies[tied_[k]] = unparted_[tied_[k]];
         }
     }

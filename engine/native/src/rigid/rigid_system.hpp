@@ -213,6 +213,7 @@ private:
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual);
+    void judge_sweeps();
     void solve_block();
     void solve_locked();
     void deliver_locked();
