@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -19,6 +19,7 @@ help:
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make campaign  random heaps from clean starts: does their energy ever rise?"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
+	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
@@ -83,6 +84,10 @@ campaign: develop
 
 mutants: develop
 	$(BIN)/python bench/mutants.py --record bench/mutants.json
+
+# A few of them, chosen by the date: all have had their turn within a fortnight.
+mutants-tonight: develop
+	$(BIN)/python bench/mutants.py --tonight 4
 
 mutation: develop
 	$(BIN)/python bench/mutation.py

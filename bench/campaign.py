@@ -3,10 +3,11 @@
     python bench/campaign.py [--heaps 200] [--first 0] [--wide]
 
 A heap is 20 to 44 balls, boxes and capsules that fall on a plane and on each other for 1.2 s, with friction of 0 to .8,
-restitution of 0 or .3, time steps of 1/60 to 1/240 s and each solver in turn; masses of .5 to 2 kg, or, with `--wide`,
-1e-6 to 1e9 kg. A heap is its number: any one can be run again. Kept is a heap whose energy never rises by more than
-1e-9 of what it starts with, in no step over the time limit. Diverged and unsettled runs are outcomes that say so; they
-are counted apart, and their steps until then must keep their energy, too.
+restitution of 0 or .3, time steps of 1/60 to 1/240 s and each solver in turn; masses of .5 to 2 kg. With `--wide` they
+are 8 to 24 bodies of every shape there is, of 1e-6 to 1e9 kg, on a plane, a slab, a mesh or a height field. A heap is
+its number: any one can be run again. Kept is a heap whose energy never rises by more than 1e-9 of what it starts with,
+in no step over the time limit, and in which no body that is out of reach of all others feels anything but gravity.
+Diverged and unsettled runs are outcomes that say so; they are counted apart, and until then the same is asked of them.
 """
 
 from __future__ import annotations
@@ -21,14 +22,24 @@ import numpy as np
 from spook_tracker.engine import (
     Box,
     Capsule,
+    Compound,
+    Cone,
+    ConvexHull,
+    Cylinder,
     Energy,
+    HeightField,
     Material,
     Method,
+    Part,
     Plane,
+    Position,
     RigidBody,
     Scene,
+    Shape,
     SimulationFailed,
     Sphere,
+    TriangleMesh,
+    Velocity,
     start,
 )
 
@@ -37,6 +48,34 @@ RISE = 1e-9  # of the energy at the start
 STEP_LIMIT = 3.0  # s of one step
 SHAPES = (Sphere(0.25), Box((0.4, 0.3, 0.5)), Capsule(0.15, 0.4))
 SOLVERS = ("direct", "iterative", "hybrid")
+GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s²
+REACH = 0.5  # m: no body is larger
+WIDE_SHAPES: tuple[Shape, ...] = (
+    *SHAPES,
+    Cylinder(0.2, 0.5),
+    Cone(0.3, 0.5),
+    ConvexHull.placed(((0, 0, 0), (0.6, 0, 0), (0, 0.5, 0), (0, 0, 0.4), (0.3, 0.3, 0.3))).shape,
+    Compound((Part(shape=Box((0.6, 0.1, 0.1))), Part(shape=Sphere(0.15), position=(0.25, 0.0, 0.0)))),
+)
+HILLS = tuple(tuple(0.1 * np.sin(2.0 * i) * np.cos(3.0 * j) for j in range(9)) for i in range(9))
+TENTS = TriangleMesh(
+    tuple((float(x), float(y), 0.05 * ((x + y) % 2)) for x in range(9) for y in range(9)),
+    tuple(
+        face
+        for x in range(8)
+        for y in range(8)
+        for face in (
+            (9 * x + y, 9 * x + y + 9, 9 * x + y + 10),
+            (9 * x + y, 9 * x + y + 10, 9 * x + y + 1),
+        )
+    ),
+)
+GROUNDS: tuple[tuple[Shape, tuple[float, float, float]], ...] = (
+    (Plane(), (0.0, 0.0, -0.1)),
+    (Box((9.0, 9.0, 1.0)), (1.0, 1.0, -0.6)),
+    (TENTS, (-3.0, -3.0, -0.1)),
+    (HeightField((1.0, 1.0), HILLS), (-3.0, -3.0, -0.1)),
+)
 
 
 @dataclass(frozen=True)
@@ -49,10 +88,13 @@ class Ending:
     rise: float  # largest in a step, of the energy at the start
     step: int  # where
     words: str = ""
+    ghosts: int = 0  # steps of bodies that felt something out of reach
 
     @property
     def kept(self) -> bool:
-        return self.rise <= RISE and self.outcome in ("completed", "unsettled", "diverged")
+        return (
+            self.rise <= RISE and self.ghosts == 0 and self.outcome in ("completed", "unsettled", "diverged")
+        )
 
 
 def heap(number: int, wide: bool) -> tuple[Scene, int, Method]:
@@ -61,41 +103,58 @@ def heap(number: int, wide: bool) -> tuple[Scene, int, Method]:
     material = Material(
         friction=float(rng.choice((0.0, 0.1, 0.4, 0.8))), restitution=float(rng.choice((0.0, 0.3)))
     )
-    bodies = [
-        RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material)
-    ]
-    for k in range(int(rng.integers(20, 45))):
+    floor, place = GROUNDS[number // len(SOLVERS) % len(GROUNDS)] if wide else (Plane(), (0.0, 0.0, 0.0))
+    bodies = [RigidBody(name="ground", motion="static", shape=floor, position=place, material=material)]
+    for k in range(int(rng.integers(8, 25) if wide else rng.integers(20, 45))):
         dx, dy = rng.uniform(-0.05, 0.05, 2)
         turn = rng.normal(size=4)
+        mass = float(10.0 ** rng.uniform(-6.0, 9.0) if wide else rng.uniform(0.5, 2.0))
+        shape = (WIDE_SHAPES if wide else SHAPES)[int(rng.integers(len(WIDE_SHAPES if wide else SHAPES)))]
         bodies.append(
             RigidBody(
                 name=f"body {k}",
-                mass=float(10.0 ** rng.uniform(-6.0, 9.0) if wide else rng.uniform(0.5, 2.0)),
-                shape=SHAPES[int(rng.integers(len(SHAPES)))],
+                mass=mass,
+                shape=shape,
+                inertia=(0.01 * mass, 0.04 * mass, 0.04 * mass) if isinstance(shape, Compound) else None,
                 position=(0.9 * (k % 3) + dx, 0.9 * (k // 3 % 3) + dy, 0.6 + 0.9 * (k // 9)),
                 orientation=tuple(turn / np.linalg.norm(turn)),
                 material=material,
             )
         )
     method = Method(solver=SOLVERS[number % len(SOLVERS)], iterations=100)
-    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -9.81)), int(rng.choice((60, 120, 240))), method
+    return Scene(bodies=tuple(bodies), gravity=tuple(GRAVITY)), int(rng.choice((60, 120, 240))), method
+
+
+def felt(places: np.ndarray, before: np.ndarray, after: np.ndarray, time_step: float) -> int:
+    """How many bodies that nothing could reach in this step did more than fall; row 0 is the ground."""
+    way = time_step * (np.linalg.norm(before, axis=1) + time_step * 9.81) + REACH
+    apart = np.linalg.norm(places[:, None] - places[None, :], axis=2) - way[:, None] - way[None, :]
+    np.fill_diagonal(apart, np.inf)
+    alone = (apart[:, 1:].min(axis=1) > 0.0) & (places[:, 2] > way + 0.1)
+    expected = before + time_step * GRAVITY
+    moved = np.abs(after - expected).max(axis=1) > 1e-12 * (1.0 + np.abs(before).max(axis=1))
+    return int((alone & moved)[1:].sum())
 
 
 def fall(number: int, wide: bool = False) -> Ending:
     """One heap, watched step by step."""
     scene, rate, method = heap(number, wide)
-    energies, outcome, words = [], "", ""
+    energies, outcome, words, ghosts = [], "", "", 0
+    watch = {"energy": Energy(), "x": Position(), "v": Velocity()}
     try:
-        with start(scene, time_step=1.0 / rate, method=method, observe={"energy": Energy()}) as run:
+        with start(scene, time_step=1.0 / rate, method=method, observe=watch) as run:
             energies.append(float(run["energy"]))
             for _ in range(round(DURATION * rate)):
+                places, before = run["x"], run["v"]
                 run.step(time_limit=STEP_LIMIT)
                 energies.append(float(run["energy"]))
+                ghosts += felt(places, before, run["v"], 1.0 / rate)
             outcome = run.result().status
     except SimulationFailed as failed:
         outcome, words = failed.result.status, str(failed)
     rises = np.diff(energies) / abs(energies[0]) if len(energies) > 1 else np.zeros(1)
-    return Ending(number, str(method.solver), outcome, float(rises.max()), int(rises.argmax()) + 1, words)
+    worst = float("nan") if np.isnan(rises).any() else float(rises.max())
+    return Ending(number, str(method.solver), outcome, worst, int(rises.argmax()) + 1, words, ghosts)
 
 
 def main(arguments: list[str]) -> int:
@@ -104,7 +163,9 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--heaps", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--wide", action="store_true", help="masses of 1e-6 to 1e9 kg")
+    parser.add_argument(
+        "--wide", action="store_true", help="every shape and ground, masses of 1e-6 to 1e9 kg"
+    )
     asked = parser.parse_args(arguments)
     endings = []
     for number in range(asked.first, asked.first + asked.heaps):
@@ -113,7 +174,7 @@ def main(arguments: list[str]) -> int:
         if not ending.kept:
             print(
                 f"  heap {number}, {ending.solver}: {ending.outcome}, energy {ending.rise:+.1e} in step {ending.step}"
-                f"{': ' if ending.words else ''}{ending.words}",
+                f"{f', {ending.ghosts} ghost hits' if ending.ghosts else ''}{': ' if ending.words else ''}{ending.words}",
                 flush=True,
             )
     lost = [ending for ending in endings if not ending.kept]

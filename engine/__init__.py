@@ -114,6 +114,7 @@ from spook_tracker.engine.shapes import (
 )
 from spook_tracker.engine.simulation import simulate
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
+from spook_tracker.engine.tyres import Tyre
 
 __all__ = [
     "PLAIN",
@@ -186,6 +187,7 @@ __all__ = [
     "TimeFunction",
     "Trace",
     "TriangleMesh",
+    "Tyre",
     "Universal",
     "Velocity",
     "Violation",

@@ -60,6 +60,8 @@ class RigidProgram:
         springs: Columns,
         terms: Columns,
         wire_points: Columns,
+        eyes: Columns,
+        tyres: Columns,
         fields: Columns,
         fluids: Columns,
         floaters: Columns,

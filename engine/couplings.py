@@ -1,12 +1,13 @@
 """Constraints between more than two ends: linear relations between joint coordinates, and wires.
 
 Each is one row. A relation is what gears, racks, screws, belts and differentials have in common; a wire runs through
-points of bodies or of the world without friction, and may go slack.
+points of bodies or of the world, with or without friction, may be wound on drums and may go slack.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -74,6 +75,14 @@ class Wire:
     through the points between its ends without friction, which is the ideal pulley of no size. When it snaps taut
     the blow is plastic, or returns `restitution` of the speed. A length of None is the one at the start. A rope is a
     wire through two points. The force that is observed is its tension [N].
+
+    With `friction` µ, one number or one for each point between the ends, it rubs where it bends: the pulls before and
+    behind differ by at most e^(µφ), φ the angle of the bend and of `turns` whole turns more, as on a bollard. Then the
+    tension is that of its first part. Where surfaces touch, or the solver is iterative, friction follows the pull of
+    the step before.
+
+    `wound` are drums at its last end, each a hinge and a radius [m]: a radian of the hinge winds in the radius, less
+    than zero lets out. A motor of the hinge makes it a winch.
     """
 
     rows: ClassVar[int] = 1
@@ -86,6 +95,9 @@ class Wire:
     compliance: float = COMPLIANCE  # m/N
     damping: float | None = None  # s
     strength: float | None = None  # N, of its tension: it breaks under more; None never does
+    friction: float | tuple[float, ...] = 0.0
+    turns: float | tuple[float, ...] = 0.0
+    wound: tuple[tuple[str, float], ...] = ()  # hinge, m
 
     def __post_init__(self) -> None:
         check.name("wire", self.name)
@@ -118,12 +130,63 @@ class Wire:
         object.__setattr__(self, "restitution", restitution)
         if self.strength is not None:
             object.__setattr__(self, "strength", check.positive(owner, "strength", self.strength))
+        for field in ("friction", "turns"):
+            object.__setattr__(self, field, _per_eye(owner, field, getattr(self, field), len(clean) - 2))
+        if self.strength is not None and self.rubs:
+            raise SceneError(
+                f"{owner}: with friction it has no one tension to break at; leave one of both out"
+            )
+        object.__setattr__(self, "wound", _drums(owner, self.wound))
         _check_row(self, owner)
 
     @property
     def between(self) -> tuple[str, str]:
         """Its two ends."""
         return (self.through[0][0], self.through[-1][0])
+
+    @property
+    def eyes(self) -> tuple[tuple[int, float, float], ...]:
+        """The points it rubs on: place in `through`, friction, turns."""
+        given: Any = (self.friction, self.turns)
+        places = range(1, len(self.through) - 1)
+        count = len(places)
+        friction, turns = (value if isinstance(value, tuple) else (value,) * count for value in given)
+        rough = zip(places, friction, turns, strict=True)
+        return tuple((place, mu, turn) for place, mu, turn in rough if mu > 0.0)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether it has friction anywhere."""
+        return bool(self.eyes)
+
+
+def _per_eye(owner: str, field: str, value: Any, count: int) -> float | tuple[float, ...]:
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        clean = check.not_negative(owner, field, value)
+        if clean > 0.0 and count == 0:
+            raise SceneError(
+                f"{owner}: {field} acts where it bends, and it runs through no point between its ends"
+            )
+        return clean
+    if len(value) != count:
+        raise SceneError(
+            f"{owner}: {field} needs one number or {count}, one a point between, not {len(value)}"
+        )
+    return tuple(check.not_negative(owner, field, entry) for entry in value)
+
+
+def _drums(owner: str, given: Any) -> tuple[tuple[str, float], ...]:
+    try:
+        pairs = [(str(check.name("drum", hinge)), radius) for hinge, radius in given]
+    except (TypeError, ValueError):
+        raise SceneError(f"{owner}: wound must be pairs of a hinge and a radius, not {given!r}") from None
+    clean = tuple((hinge, check.number(owner, "radius", radius)) for hinge, radius in pairs)
+    for hinge, radius in clean:
+        if radius == 0.0:
+            raise SceneError(f"{owner}: the radius of drum {hinge!r} is 0, so it winds nothing; leave it out")
+    if len({hinge for hinge, _ in clean}) != len(clean):
+        raise SceneError(f"{owner}: a drum is named twice; add up its radii")
+    return clean
 
 
 def _check_row(row: Relation | Wire, owner: str) -> None:

@@ -12,6 +12,7 @@ from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.time_functions import TimeFunction
 
 End = str | Vector  # a body's name, or a fixed point of the world [m]
+ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def check_ends(owner: str, between: Any) -> tuple[End, End]:
@@ -26,11 +27,20 @@ def check_ends(owner: str, between: Any) -> tuple[End, End]:
     return (first, second)
 
 
+def check_anchors(owner: str, anchors: Any) -> tuple[Vector, Vector]:
+    """Two points in body axes [m]."""
+    if isinstance(anchors, str) or not hasattr(anchors, "__len__") or len(anchors) != 2:
+        raise SceneError(f"{owner}: anchors must be two points, not {anchors!r}")
+    first, second = (check.vector(owner, "anchors", anchor) for anchor in anchors)
+    return (first, second)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spring:
-    """A plain force −stiffness (|d| − rest_length) along d, between centres of mass; not a row.
+    """A plain force −stiffness (|d| − rest_length) along d, between two points; not a row.
 
-    With rest_length 0 the force is −stiffness d exactly, with no normalisation.
+    `anchors` are the points in body axes, from each centre of mass; a particle has only its centre, and a world point
+    is one already. With rest_length 0 the force is −stiffness d exactly, with no normalisation.
     """
 
     name: str
@@ -38,6 +48,7 @@ class Spring:
     stiffness: float  # N/m
     rest_length: float = 0.0  # m
     viscosity: float = 0.0  # N s/m, along the spring
+    anchors: tuple[Vector, Vector] = (ORIGIN, ORIGIN)  # m
 
     def __post_init__(self) -> None:
         check.name("spring", self.name)
@@ -45,6 +56,15 @@ class Spring:
         object.__setattr__(self, "between", check_ends(owner, self.between))
         for name in ("stiffness", "rest_length", "viscosity"):
             object.__setattr__(self, name, check.not_negative(owner, name, getattr(self, name)))
+        object.__setattr__(self, "anchors", check_anchors(owner, self.anchors))
+        for end, anchor in zip(self.between, self.anchors, strict=True):
+            if not isinstance(end, str) and any(anchor):
+                raise SceneError(f"{owner}: {end} is a point of the world already; leave its anchor at zero")
+
+    @property
+    def aside(self) -> bool:
+        """Whether it holds some body beside its centre, and so turns it."""
+        return any(any(anchor) for anchor in self.anchors)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

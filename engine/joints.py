@@ -20,11 +20,11 @@ from spook_tracker.engine import check
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import COMPLIANCE, Relation, Wire
 from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.forces import End, check_ends
+from spook_tracker.engine.forces import ORIGIN, End, check_anchors, check_ends
 from spook_tracker.engine.time_functions import TimeFunction, number_or_function
+from spook_tracker.engine.tyres import Tyre
 
 PerDegree = float | tuple[float, ...]
-ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def _per_degree(owner: str, field: str, value: object, count: int) -> PerDegree:
@@ -60,10 +60,7 @@ class Distance:
         object.__setattr__(self, "compliance", check.not_negative(owner, "compliance", self.compliance))
         if self.damping is not None:
             object.__setattr__(self, "damping", check.not_negative(owner, "damping", self.damping))
-        if not hasattr(self.anchors, "__len__") or len(self.anchors) != 2:
-            raise SceneError(f"{owner}: anchors must be two points, not {self.anchors!r}")
-        anchors = tuple(check.vector(owner, "anchors", anchor) for anchor in self.anchors)
-        object.__setattr__(self, "anchors", anchors)
+        object.__setattr__(self, "anchors", check_anchors(owner, self.anchors))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,17 +105,24 @@ class Limit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointSpring:
-    """Pulls a joint's free coordinate to `rest` as a compliant row of compliance 1/stiffness."""
+    """Pulls a joint's free coordinate to `rest` as a compliant row of compliance 1/stiffness.
+
+    With a `max_force` it is a drive for positions that gives way: never more than that [N or N m], its damping included.
+    """
 
     stiffness: float  # N/m or N m/rad
     rest: float | TimeFunction = 0.0  # m or rad
     damping: float | None = None  # s
+    max_force: float | None = None  # N or N m; None is unbounded
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stiffness", check.positive("joint spring", "stiffness", self.stiffness))
         object.__setattr__(self, "rest", number_or_function("joint spring", "rest", self.rest))
         if self.damping is not None:
             object.__setattr__(self, "damping", check.not_negative("joint spring", "damping", self.damping))
+        if self.max_force is not None:
+            bound = check.not_negative("joint spring", "max_force", self.max_force)
+            object.__setattr__(self, "max_force", bound)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,4 +283,4 @@ class Planar(GuidedJoint):
     kind: ClassVar[str] = "planar"
 
 
-Constraint = Distance | Lock | Ball | Hinge | Prismatic | Universal | GuidedJoint | Relation | Wire
+Constraint = Distance | Lock | Ball | Hinge | Prismatic | Universal | GuidedJoint | Relation | Wire | Tyre

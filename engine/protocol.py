@@ -20,7 +20,7 @@ from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.compiler import NOTHING
 from spook_tracker.engine.errors import EngineError, MethodError
-from spook_tracker.engine.forces import Force
+from spook_tracker.engine.forces import Force, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import (
@@ -144,6 +144,8 @@ def _of_scene(can: Capabilities, scene: Scene) -> Iterator[str]:
     for force in scene.forces:
         if type(force) not in can.forces:
             yield f"the force {_words(type(force))}"
+        if isinstance(force, Spring) and force.aside:
+            yield "a spring beside a body's centre"
 
 
 def _may_touch(scene: Scene) -> bool:
@@ -183,6 +185,8 @@ def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
         for name in ("motor", "limit", "spring"):
             if getattr(constraint, name) is not None and not getattr(can, f"{name}s"):
                 yield f"a {name} in a joint"
+        if constraint.spring is not None and constraint.spring.max_force is not None:
+            yield "a spring of bounded force in a joint"
 
 
 def _has_loop(scene: Scene) -> bool:

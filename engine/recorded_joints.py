@@ -27,6 +27,7 @@ from spook_tracker.engine.joints import (
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.rigid_program import normals
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.tyres import Tyre
 
 
 def turned(orientations: Array, vectors: Array) -> Array:
@@ -88,7 +89,7 @@ class _End:
 
 def violation(scene: Scene, constraint: Constraint, positions: Array, orientations: Array) -> Array:
     """(s,) m of a distance, (s, rows) m and rad of a joint."""
-    if isinstance(constraint, Relation | Wire):
+    if isinstance(constraint, Relation | Wire | Tyre):
         raise MethodError(f"observe: {constraint.kind} {constraint.name!r} is not found in a recording")
     if isinstance(constraint, Distance):
         ends = [

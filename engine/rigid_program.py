@@ -22,6 +22,7 @@ from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
+from spook_tracker.engine.joint_tables import couplings, drives, or_default
 from spook_tracker.engine.joints import (
     AxialJoint,
     Ball,
@@ -45,7 +46,8 @@ from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
 from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
 from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
-from spook_tracker.engine.time_functions import Ramp, Sinusoid, at_start
+from spook_tracker.engine.time_functions import Ramp, Sinusoid
+from spook_tracker.engine.tyres import Tyre
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
 _JOINTS: dict[type[Any], str] = {
@@ -60,6 +62,7 @@ _JOINTS: dict[type[Any], str] = {
     Planar: "planar",
     Relation: "relation",
     Wire: "wire",
+    Tyre: "tyre",
 }
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -109,8 +112,12 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
         elif isinstance(force, CentralGravity):
             fields.append({"strength": force.strength, "centre": force.centre})
         elif isinstance(force, Spring):
+            columns = ends(force.between, bodies)
+            for end, anchor, side in zip(force.between, force.anchors, ("first", "second"), strict=True):
+                if isinstance(end, str):
+                    columns[f"{side}_point"] = anchor
             springs.append(
-                ends(force.between, bodies)
+                columns
                 | {
                     "stiffness": force.stiffness,
                     "rest_length": force.rest_length,
@@ -128,8 +135,8 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
     return {
         "bodies": table([_body(body, push, step) for body, push in zip(scene.bodies, pushes, strict=True)]),
         "joints": table(joints),
-        **_drives(scene, step),
-        **_couplings(scene, bodies),
+        **drives(scene, step),
+        **couplings(scene, bodies),
         **_fluids(scene, hulls),
         **_in_time(scene, bodies),
         "springs": table(springs),
@@ -197,7 +204,7 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "friction": material.friction,
         "restitution": material.restitution,
         "compliance": material.compliance,
-        "damping": _or(material.damping, 4.5 * step),
+        "damping": or_default(material.damping, 4.5 * step),
         "slip_compliance": material.slip_compliance,
         "rolling_friction": material.rolling_friction,
         "torsional_friction": material.torsional_friction,
@@ -216,8 +223,8 @@ def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step
         "damping": _six(2.0 * step if constraint.damping is None else constraint.damping),
         "one_sided": False,
         "restitution": 0.0,
-        "strength": _or(getattr(constraint, "strength", None), math.inf),
-        "torque_strength": _or(getattr(constraint, "torque_strength", None), math.inf),
+        "strength": or_default(getattr(constraint, "strength", None), math.inf),
+        "torque_strength": or_default(getattr(constraint, "torque_strength", None), math.inf),
     }
     if isinstance(constraint, Relation | Wire):
         columns |= {"first_point": _ORIGIN, "second_point": _ORIGIN, "axes": _WORLD_AXES, "rest_length": 0.0}
@@ -233,61 +240,20 @@ def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step
             "axes": _WORLD_AXES,
             "rest_length": scene.length(constraint) if length is None else length,
         }
+    if isinstance(constraint, Tyre):
+        wheel = scene.body(constraint.between[1])
+        axes = (*constraint.axis, *constraint.normal, *_ORIGIN)
+        return columns | {
+            "first_point": constraint.at,
+            "second_point": wheel.position,
+            "axes": axes,
+            "rest_length": 0.0,
+        }
     at = constraint.at
     if at is None:
         end = constraint.between[1] if columns["second"] >= 0 else constraint.between[0]
         at = scene.body(end).position
     return columns | {"first_point": at, "second_point": at, "axes": _axes(constraint), "rest_length": 0.0}
-
-
-def _drives(scene: Scene, step: float) -> dict[str, Any]:
-    """Motors, limits and springs of the free coordinates, each with the index of its joint."""
-    motors, limits, springs = [], [], []
-    for index, joint in enumerate(scene.constraints):
-        if not isinstance(joint, AxialJoint):
-            continue
-        if (motor := joint.motor) is not None:
-            force = _or(motor.max_force, math.inf)
-            motors.append({"joint": index, "speed": at_start(motor.speed), "max_force": force})
-        if (limit := joint.limit) is not None:
-            limits.append(
-                {
-                    "joint": index,
-                    "lower": limit.lower,
-                    "upper": limit.upper,
-                    "compliance": limit.compliance,
-                    "damping": _or(limit.damping, 2.0 * step),
-                    "restitution": limit.restitution,
-                }
-            )
-        if (spring := joint.spring) is not None:
-            springs.append(
-                {
-                    "joint": index,
-                    "stiffness": spring.stiffness,
-                    "rest": at_start(spring.rest),
-                    "damping": _or(spring.damping, 2.0 * step),
-                }
-            )
-    return {"motors": table(motors), "limits": table(limits), "joint_springs": table(springs)}
-
-
-def _couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
-    """The joints of relations and the points of wires, each with the index of its constraint."""
-    index = {constraint.name: k for k, constraint in enumerate(scene.constraints)}
-    terms = [
-        {"relation": index[row.name], "joint": index[joint], "coefficient": factor}
-        for row in scene.constraints
-        if isinstance(row, Relation)
-        for joint, factor in row.terms
-    ]
-    points = [
-        {"wire": index[row.name], "body": bodies.get(end, -1), "point": point}
-        for row in scene.constraints
-        if isinstance(row, Wire)
-        for end, point in row.through
-    ]
-    return {"terms": table(terms), "wire_points": table(points)}
 
 
 def _fluids(scene: Scene, hulls: dict[Outlined, int]) -> dict[str, Any]:
@@ -354,10 +320,6 @@ def _in_time(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
         if isinstance(body, RigidBody) and body.pace is not None:
             add("pace", bodies[body.name], body.pace, body.velocity, body.angular_velocity)
     return {"drives": table(drives), "knots": table(knots)}
-
-
-def _or(value: float | None, default: float) -> float:
-    return default if value is None else value
 
 
 def _six(value: float | tuple[float, ...]) -> tuple[float, ...]:

@@ -13,7 +13,8 @@ from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.forces import CentralGravity, Fluid, Force, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Hinge, Joint
+from spook_tracker.engine.tyres import Tyre
 
 
 def _unique(kind: str, names: Iterable[str]) -> None:
@@ -53,7 +54,7 @@ class Scene:
             if not isinstance(body, Particle | RigidBody):
                 raise SceneError(f"bodies: {body!r} is neither a Particle nor a RigidBody")
         for constraint in self.constraints:
-            if not isinstance(constraint, Distance | Joint | Relation | Wire):
+            if not isinstance(constraint, Distance | Joint | Relation | Wire | Tyre):
                 raise SceneError(f"constraints: {constraint!r} is not a constraint")
         for force in self.forces:
             if not isinstance(force, Spring | CentralGravity | Load | Fluid):
@@ -68,7 +69,9 @@ class Scene:
             if isinstance(constraint, Relation):
                 self._check_relation(constraint, joints)
             elif isinstance(constraint, Wire):
-                self._check_wire(constraint, known)
+                self._check_wire(constraint, known, joints)
+            elif isinstance(constraint, Tyre):
+                self._check_tyre(constraint, known)
             else:
                 self._check_constraint(constraint, known)
         for force in self.forces:
@@ -85,8 +88,11 @@ class Scene:
                 )
 
     @staticmethod
-    def _check_wire(wire: Wire, known: Mapping[str, Body]) -> None:
+    def _check_wire(wire: Wire, known: Mapping[str, Body], joints: Mapping[str, Constraint]) -> None:
         owner = f"wire {wire.name!r}"
+        for name, _ in wire.wound:
+            if not isinstance(joints.get(name), Hinge):
+                raise SceneError(f"{owner}: there is no hinge named {name!r} to wind it")
         for end, point in wire.through:
             body = known.get(end)
             if body is None and end != WORLD:
@@ -96,8 +102,25 @@ class Scene:
                     f"{owner}: particle {end!r} has only its centre, {body.position}; run through that"
                 )
         bodies = [known[end] for end, _ in wire.through if end != WORLD]
-        if not any(isinstance(body, Particle) or body.motion == "dynamic" for body in bodies):
+        moves = any(isinstance(body, Particle) or body.motion == "dynamic" for body in bodies)
+        if not moves and not wire.wound:
             raise SceneError(f"{owner}: nothing it runs through can move, so it constrains nothing")
+
+    @staticmethod
+    def _check_tyre(tyre: Tyre, known: Mapping[str, Body]) -> None:
+        owner = f"tyre {tyre.name!r}"
+        for end in tyre.between:
+            if end not in known and end != WORLD:
+                raise SceneError(f"{owner}: there is no body named {end!r}")
+            if isinstance(known.get(end), Particle):
+                raise SceneError(f"{owner}: {end!r} is a particle; wheels and roads need rigid bodies")
+        wheel = known[tyre.between[1]]
+        if isinstance(wheel, RigidBody) and wheel.motion != "dynamic":
+            raise SceneError(f"{owner}: its wheel {wheel.name!r} cannot move, so it carries nothing")
+        if sum((x - p) * n for x, p, n in zip(wheel.position, tyre.at, tyre.normal, strict=True)) <= 0.0:
+            raise SceneError(
+                f"{owner}: the hub of {wheel.name!r} is not above its road; turn normal round or move it"
+            )
 
     def _check_constraint(self, constraint: Distance | Joint, known: dict[str, Body]) -> None:
         owner = f"constraint {constraint.name!r}"
@@ -136,8 +159,14 @@ class Scene:
                 raise SceneError(f"{owner}: there is no body named {end!r}")
         if isinstance(force, Load) and any(force.torque) and isinstance(known[force.body], Particle):
             raise SceneError(f"{owner}: {force.body!r} is a particle and cannot take a torque")
+        if isinstance(force, Spring):
+            for end, anchor in zip(force.between, force.anchors, strict=True):
+                if isinstance(end, str) and any(anchor) and isinstance(known[end], Particle):
+                    raise SceneError(
+                        f"{owner}: particle {end!r} has only its centre; leave its anchor at zero"
+                    )
         if isinstance(force, Spring) and force.rest_length > 0.0:
-            first, second = (known[end].position if isinstance(end, str) else end for end in force.between)
+            first, second = (self._anchor(force, k, known) for k in (0, 1))
             if first == second:
                 raise SceneError(f"{owner}: its ends coincide, so it has no direction; move one of them")
         if isinstance(force, Fluid) and not any(self.gravity):
@@ -188,7 +217,7 @@ class Scene:
         return self._anchor(constraint, end, {where: self.body(where)} if isinstance(where, str) else {})
 
     @staticmethod
-    def _anchor(constraint: Distance, end: int, known: Mapping[str, Body]) -> Vector:
+    def _anchor(constraint: Distance | Spring, end: int, known: Mapping[str, Body]) -> Vector:
         where = constraint.between[end]
         if not isinstance(where, str):
             return where

@@ -11,6 +11,7 @@ from spook_tracker.engine.forces import Fluid, Load, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.tyres import Tyre
 
 ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}  # of a composition, by name
 RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
@@ -49,6 +50,7 @@ def check_wide_rows(scene: Scene, method: Method) -> None:
             held = {end for name, _ in row.terms for end in joints[name].between if isinstance(end, str)}
         elif isinstance(row, Wire):
             held = {end for end, _ in row.through}
+            held |= {end for name, _ in row.wound for end in joints[name].between if isinstance(end, str)}
         else:
             continue
         if len(held - fixed - {WORLD}) <= 2:
@@ -117,6 +119,10 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
 def _bounded(joint: Constraint) -> str | None:
     if isinstance(joint, Wire) and joint.slack:
         return "a wire that may go slack"
+    if isinstance(joint, Wire) and joint.rubs:
+        return "a wire with friction"
+    if isinstance(joint, Tyre):
+        return "a tyre"
     if (getattr(joint, "strength", None) or getattr(joint, "torque_strength", None)) is not None:
         return "a strength at which it breaks"
     if not isinstance(joint, AxialJoint):
@@ -125,6 +131,8 @@ def _bounded(joint: Constraint) -> str | None:
         return "a limit"
     if joint.motor is not None and joint.motor.max_force is not None and math.isfinite(joint.motor.max_force):
         return "a motor of bounded force"
+    if joint.spring is not None and joint.spring.max_force is not None:
+        return "a spring of bounded force"
     return None
 
 

@@ -177,7 +177,7 @@ TEST = ScalarTest(
             name="distance",
             description="distance rolled in 2 s against ½ a t²",
             unit="m",
-            time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
+            time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240, 480, 960)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=1.0),
                 Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),

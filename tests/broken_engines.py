@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from spook_tracker.engine import PLAIN, Scene, simulate
+from spook_tracker.engine import PLAIN, Scene, Tyre, simulate
 from spook_tracker.scalar_tests.case import Simulate
 
 
@@ -46,10 +46,10 @@ def deaf(scene: Scene, **options: Any) -> Any:
 
 
 def soft(scene: Scene, **options: Any) -> Any:
-    """Gives every joint a compliance of its own."""
+    """Gives every joint a compliance of its own; a tyre has its stiffness."""
 
     def softened(row: Any) -> Any:
-        return replace(row, compliance=1e-6) if getattr(row, "compliance", None) is not None else row
+        return row if isinstance(row, Tyre) else replace(row, compliance=1e-6)
 
     return simulate(replace(scene, constraints=tuple(softened(row) for row in scene.constraints)), **options)
 
@@ -85,7 +85,16 @@ BROKEN: dict[str, Simulate] = {
     "deaf to options": deaf,
     **{
         f"{name} 3 % too small": off_by(0.97, name)
-        for name in ("friction", "restitution", "strength", "gravity", "stiffness", "force", "speed")
+        for name in (
+            "friction",
+            "restitution",
+            "strength",
+            "gravity",
+            "stiffness",
+            "force",
+            "speed",
+            "cornering",
+        )
     },
     "bodies 3 % too large": off_by(1.03, "radius", "size"),
     "lopsided": lopsided,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections import Counter
 from pathlib import Path
 
 import pytest
+import yaml
 
 from bench import mutants
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -43,10 +45,20 @@ def test_every_room_has_a_mutant_and_no_two_have_one_name() -> None:
 def test_a_few_each_night_are_all_of_them_in_time() -> None:
     first = datetime.date(2026, 11, 22)
     nights = -(-len(mutants.MUTANTS) // 4) + 1
+    assert nights <= 14, "a fortnight, as the Makefile says"
     seen = {m.name for n in range(nights) for m in mutants.tonights(4, first + datetime.timedelta(days=n))}
 
     assert len(mutants.tonights(4, first)) == 4
     assert seen == {mutant.name for mutant in mutants.MUTANTS}
+
+
+def test_every_night_puts_some_of_them_to_the_tests_without_holding_up_the_night() -> None:
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "nightly.yml").read_text())["jobs"]
+    (makefile,) = re.findall(r"^mutants-tonight:.*\n\t(.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+    assert "make mutants-tonight" in jobs["mutants"]["steps"][-1]["run"]
+    assert makefile.endswith("bench/mutants.py --tonight 4")
+    assert not any("mutants" in job.get("needs", ()) for job in jobs.values())
 
 
 def test_the_command_reads_its_options(

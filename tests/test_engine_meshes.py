@@ -208,7 +208,7 @@ def test_a_mesh_round_a_box_is_met_as_the_box_is(slider: str, seed: int) -> None
         return float(found["d"])
 
     low, high = 0.0, 3.0
-    for _ in range(40):  # where they touch
+    for _ in range(26):  # where they touch
         middle = 0.5 * (low + high)
         low, high = (middle, high) if depth(solid, middle) > 0.0 else (low, middle)
 
@@ -322,7 +322,7 @@ def test_dropped_on_hills_it_comes_to_rest_carried(slider: str) -> None:
     found = run(
         sheet(hills(2, 0.2), Material(friction=0.9)),
         moving,
-        steps=120,
+        steps=80,
         x=Final(quantity=Position("body")),
         d=Maximum(quantity=Penetration()),
     )

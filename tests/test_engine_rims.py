@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import tplquad
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
@@ -83,20 +83,19 @@ def run(*bodies: RigidBody, steps: int, gravity: Any = DOWN, time_step: float = 
 
 def farthest(shape: Shape, n: Any) -> Any:
     """Largest n · p over a shape in its own axes: its support function, written down anew."""
-    flat = np.hypot(n[..., 0], n[..., 1])
     match shape:
         case Sphere():
-            return shape.radius * np.linalg.norm(n, axis=-1)
+            return shape.radius * np.sqrt((n * n).sum(axis=-1))
         case Capsule():
-            return shape.radius * np.linalg.norm(n, axis=-1) + 0.5 * shape.length * np.abs(n[..., 2])
+            return shape.radius * np.sqrt((n * n).sum(axis=-1)) + 0.5 * shape.length * np.abs(n[..., 2])
         case Box():
             return np.abs(n) @ np.array(shape.size) / 2.0
         case ConvexHull():
             return np.max(n @ np.array(shape.corners).T, axis=-1)
         case Cylinder():
-            return shape.radius * flat + 0.5 * shape.length * np.abs(n[..., 2])
+            return shape.radius * np.hypot(n[..., 0], n[..., 1]) + 0.5 * shape.length * np.abs(n[..., 2])
         case Cone():
-            base = shape.radius * flat - 0.25 * shape.height * n[..., 2]
+            base = shape.radius * np.hypot(n[..., 0], n[..., 1]) - 0.25 * shape.height * n[..., 2]
             return np.maximum(base, 0.75 * shape.height * n[..., 2])
     raise AssertionError(shape)
 
@@ -110,6 +109,7 @@ def sphere_of_directions(count: int) -> Any:
 
 
 DIRECTIONS = sphere_of_directions(2000)
+CORNERS = np.array(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))  # of a simplex
 
 
 def gap(first: Shape, turn: Any, place: Any, second: Shape, other: Any) -> tuple[float, Any]:
@@ -125,26 +125,24 @@ def gap(first: Shape, turn: Any, place: Any, second: Shape, other: Any) -> tuple
             starts.append(DIRECTIONS[k])
         if len(starts) == 3:
             break
-    best, normal = -math.inf, None
-    for start in starts:
+
+    def climb(start: Any, width: float, precision: float) -> tuple[float, Any]:
         aside = np.linalg.svd(start[None])[2][1:]
 
-        def tilted(t: Any, start: Any = start, aside: Any = aside) -> float:
+        def tilted(t: Any) -> float:
             n = start + t @ aside
-            return -float(along(n / np.linalg.norm(n)))
+            return -float(along(n / math.sqrt(n @ n)))
 
-        t = np.zeros(2)
-        for width in (0.05, 1e-4):
-            simplex = t + width * np.array(((0, 0), (1, 0), (0, 1)))
-            t = minimize(
-                tilted,
-                t,
-                method="Nelder-Mead",
-                options={"xatol": 1e-12, "fatol": 1e-14, "initial_simplex": simplex},
-            ).x
-        if -tilted(t) > best:
-            best, normal = -tilted(t), start + t @ aside
-    return best, normal / np.linalg.norm(normal)
+        options = {"xatol": precision, "fatol": 1e-9, "initial_simplex": width * CORNERS}
+        found = minimize(tilted, np.zeros(2), method="Nelder-Mead", options=options)
+        normal = start + found.x @ aside
+        return -float(found.fun), normal / math.sqrt(normal @ normal)
+
+    rough = [climb(start, 0.05, 1e-3) for start in starts]
+    best = max(value for value, _ in rough)
+    # Whatever may still become the best is climbed to the end, from a small simplex again.
+    near = [climb(normal, 1e-3, 1e-7) for value, normal in rough if value > best - 5e-3]
+    return max(near, key=lambda found: found[0])
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
@@ -381,18 +379,18 @@ def test_nothing_flies_through_it(first: str, second: str, speed: float) -> None
 def test_a_cone_has_its_centre_of_mass_in_the_origin_and_its_moments() -> None:
     cone = Cone(0.4, 0.9)
 
+    # Gauss's points are exact for the polynomials in height and radius, equal steps for those in sine and cosine.
+    points, weights = np.polynomial.legendre.leggauss(6)
+    share, part = 0.5 * (points + 1.0), 0.5 * weights
+    z = cone.height * (share - 0.25)
+    rim = cone.radius * (0.75 - z / cone.height)
+    rho = rim[:, None, None] * share[:, None]
+    turn = np.arange(8) * math.pi / 4
+    cell = cone.height * (part * rim)[:, None, None] * part[:, None] * rho * np.full(8, math.pi / 4)
+
     def integral(moment: Any) -> float:
-        value, _ = tplquad(
-            lambda rho, turn, z: rho * moment(rho * math.cos(turn), rho * math.sin(turn), z),
-            -0.25 * cone.height,
-            0.75 * cone.height,
-            0.0,
-            2.0 * math.pi,
-            0.0,
-            lambda z, _turn: cone.radius * (0.75 - z / cone.height),
-            epsrel=1e-7,
-        )
-        return float(value)
+        at = moment(rho * np.cos(turn), rho * np.sin(turn), z[:, None, None])
+        return float((cell * at).sum())
 
     mass = integral(lambda x, y, z: 1.0)
 
@@ -403,8 +401,19 @@ def test_a_cone_has_its_centre_of_mass_in_the_origin_and_its_moments() -> None:
             integral(lambda x, y, z: x * x + z * z),
             integral(lambda x, y, z: x * x + y * y),
         ),
-        rel=1e-6,
+        rel=1e-12,
     )
+
+
+@functools.cache
+def cells() -> tuple[Any, Any, Any]:
+    """A cone of 0.3 m and 0.8 m in cells: across and along its axis from the centre of mass, volumes."""
+    parts = (30, 40, 240)
+    share, angle, along = np.meshgrid(*((np.arange(count) + 0.5) / count for count in parts), indexing="ij")
+    along = 0.8 * along - 0.2
+    rim = 0.3 * (0.75 - along / 0.8)
+    across = share * rim * np.cos(2 * math.pi * angle)
+    return across.ravel(), along.ravel(), (share * rim**2).ravel() * (2 * math.pi * 0.8 / math.prod(parts))
 
 
 @pytest.mark.parametrize("level", [-0.2, 0.1, 0.4, 0.7])
@@ -417,12 +426,8 @@ def test_water_lifts_what_a_grid_of_points_finds_under_it(level: float, lean: fl
     scene = Scene(bodies=(cone,), forces=(water,), gravity=DOWN)
     found = simulate(scene, time_step=1e-6, steps=1, observe={"v": Final(quantity=Velocity("body"))})
     lifted = (float(found["v"][2]) / 1e-6 + 10.0) * 2.0 / (1000.0 * 10.0)  # m³
-    parts = (40, 60, 400)
-    share, angle, along = np.meshgrid(*((np.arange(count) + 0.5) / count for count in parts), indexing="ij")
-    angle, along = 2 * math.pi * angle, 0.8 * along - 0.2
-    r = share * 0.3 * (0.75 - along / 0.8)
-    height = turn.apply(np.stack((r * np.cos(angle), r * np.sin(angle), along), axis=-1).reshape(-1, 3))[:, 2]
-    cell = (r * 0.3 * (0.75 - along / 0.8)).reshape(-1) * (2 * math.pi * 0.8 / math.prod(parts))
+    across, along, cell = cells()
+    height = math.cos(lean) * along - math.sin(lean) * across  # turned about y
 
     assert lifted == pytest.approx(float(cell[height < level].sum()), abs=4e-4)
 

@@ -14,11 +14,15 @@ import pytest
 from spook_tracker.engine import theory
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import (
+    bowl,
+    capstan,
+    cornering,
     double_pendulum,
     floating_box,
     gears,
     motor,
     robot_arm,
+    rope,
     sinking_sphere,
     slider_crank,
     wires,
@@ -327,6 +331,24 @@ def test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say() -> None:
     assert limits["ratio_error"] == pytest.approx(gears.standing(), rel=0.01)
 
 
+def test_a_winch_is_faster_by_what_the_turning_of_its_drum_leaves_out() -> None:
+    """The drum turns by asin(h ω) a step; starting from rest with the steady torque the same in its share of the mass."""
+    h, c = capstan.TIME_STEP, capstan
+    limits = {m.name: m.limit for m in measurement("capstan", "winch").metrics}
+    lifted = math.asin(h * c.SPEED) / (h * c.SPEED) - 1.0
+    # velocities of one step: u for the wire, ω for the drum, u = r asin(h ω)/h; energy gives the rest
+    spin = slowly = 0.0
+    inertia, mass, r = c.MOMENT, c.LOAD, c.DRUM
+    for _ in range(60):
+        spin += h * (mass * c.GRAVITY * r - c.TORQUE) / (mass * r * r + inertia)
+        slowly = r * spin
+    share = inertia / r**2 / (mass + inertia / r**2)
+    sunk = share * (math.asin(h * slowly / r) / (h * slowly / r) - 1.0)
+
+    assert lifted <= limits["speed_error"] <= 1.1 * lifted
+    assert sunk <= limits["sinking_error"] <= 1.1 * sunk
+
+
 def test_the_torques_of_a_driven_arm_are_two_steps_late_at_most() -> None:
     (gate,) = measurement("robot_arm", "driven").metrics
     assert gate.limit == pytest.approx(robot_arm.lag_bound(), rel=0.01)
@@ -417,3 +439,64 @@ def test_the_slider_cranks_torque_by_newton_and_euler() -> None:
         right = (s.ROD_MASS * x, s.ROD_MASS * y, inertia * turn, s.SLIDER * slide, 0.0, 0.0)
 
         assert np.linalg.solve(matrix, right)[5] == pytest.approx(float(s.torque(theta)), rel=1e-6)
+
+
+def test_a_turning_rope_is_longer_by_what_its_damped_rows_let_through() -> None:
+    """A steady circle: w h a step, r − l = r (1 − cos w h)(1 + 2θ)/2; the angular momentum stays, m r² w."""
+    h, w = rope.TIME_STEP, rope.SPIN
+    longer = 1.0 / (1.0 - (1.0 - math.cos(w * h)) * 2.5)
+    slower = longer**-2
+    pull, energy = slower**2 * longer - 1.0, slower - 1.0
+    limits = {m.name: m.limit for m in measurement("rope", "plain").metrics}
+
+    assert abs(pull) <= limits["pull_error"] <= 1.2 * abs(pull)
+    assert abs(energy) <= limits["energy_error"] <= 1.2 * abs(energy)
+
+
+def test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by() -> None:
+    """The bicycle model with every stiffness C V/(V + 1 mm/s), solved as two equations of balance."""
+    c = cornering
+    for configuration, front, rear in (("plain", c.SOFT, c.HARD), ("oversteer", c.HARD, c.SOFT)):
+        limits = {m.name: m.limit for m in measurement("cornering", configuration).metrics}
+        rates = []
+        for speed in (c.SPEED, c.SPEED + c.CREEP):
+            f, r, share = 2.0 * front, 2.0 * rear, c.SPEED / speed
+            # sideways speed v and yaw rate: forces −C (v ± x w)/V (+ C δ in front) balance m V w and have no moment
+            balance = np.array(
+                (
+                    ((f + r) / c.SPEED, (f * c.AHEAD - r * c.BACK) / c.SPEED + c.MASS * c.SPEED / share),
+                    (
+                        (f * c.AHEAD - r * c.BACK) / c.SPEED,
+                        (f * c.AHEAD**2 + r * c.BACK**2) / c.SPEED,
+                    ),
+                )
+            )
+            rates.append(float(np.linalg.solve(balance, c.STEER * f * np.array((1.0, c.AHEAD)))[1]))
+        assert rates[0] == pytest.approx(c.yaw(c.SPEED, front, rear), rel=1e-12)
+        assert abs(rates[1] / rates[0] - 1.0) <= limits["yaw_error"] <= 3.0 * abs(rates[1] / rates[0] - 1.0)
+
+
+def test_many_facets_make_a_round_bowl_and_few_of_them_slow_a_ball_down_at_corners() -> None:
+    times = np.linspace(0.0, 1.8, 7201)
+    shares = [
+        bowl.half_period(times, bowl.rolled(times, count)) * bowl.PACE / math.pi - 1.0
+        for count in (bowl.FACETS, 1001)
+    ]
+    limits = {m.name: m.limit for m in measurement("bowl", "plain").metrics}
+    smooth, period = limits["smooth_error"], limits["period_error"]
+
+    assert isinstance(smooth, float) and isinstance(period, float)
+    assert abs(shares[0]) <= smooth - period <= 1.1 * abs(shares[0])
+    assert shares[1] == pytest.approx(
+        bowl.facet(1001)[1] ** 2 / 16.0, rel=0.05
+    )  # of a swing that is not small
+    # At the first corner, after half a facet: v² = 2 a s, then the part (cos Δ + 2/5)/(7/5) of it.
+    width, angle = bowl.facet(5)
+    half = (bowl.BOWL * math.cos(0.5 * width) - bowl.BALL) * math.tan(0.5 * width)
+    pull = 5.0 / 7.0 * bowl.GRAVITY * math.sin(angle)
+    reached = math.sqrt(2.0 * half / pull)
+    fine = reached + np.linspace(0.0, 1e-3, 2)
+    x = bowl.rolled(fine, 5)
+    slows = (math.cos(width) + 0.4) / 1.4
+    after = -math.sqrt(2.0 * pull * half) * slows * math.cos(angle - width)
+    assert (x[1] - x[0]) / 1e-3 == pytest.approx(after, rel=5e-3)

@@ -121,7 +121,7 @@ def question(rng, number, texts):
     usual = usual if rng.random() < 0.6 else None
     key = definition.key
     history = Known(
-        usual={key: usual} if usual else {}, suspected=frozenset({key} if suspected and usual else ()),
+        usual={key: usual} if usual else {}, suspected=(key,) if suspected and usual else (),
         first_bad={key: ("good", "badc0de")} if now is not None else {},
     )  # fmt: skip
     document = compare(

@@ -57,7 +57,7 @@ def test_what_was_compared_before_is_not_compared_again(monkeypatch: pytest.Monk
 
     original = module.compare
     monkeypatch.setattr(module, "compare", counting)
-    second = made(history(6), first.pairs)
+    second = made(history(6), first.kept())
 
     newest = "run-spook-0005"
     assert all(newest in pair for pair in asked)

@@ -157,3 +157,69 @@ def test_an_annotation_from_outside_is_no_command_of_its_own(tmp_path: Path) -> 
 
     assert len(said.splitlines()) == 1
     assert "%250A" in said
+
+
+def test_previous_to_a_branch_is_what_it_was_built_on_as_for_the_judge(tmp_path: Path) -> None:
+    mended = [night(n, pairs(0.3 if n < 2 else 0.1)) for n in range(5)]
+    engine = replace(night(6, pairs(0.3)).engine, git_hash="b" * 40, parents=(mended[1].engine.git_hash,))
+    url = stored(tmp_path, *mended, replace(night(6, pairs(0.3)), engine=engine))
+
+    code, told = tracker("compare", "previous", "latest", "--db", url)
+
+    assert code == tracker("judge", "latest", "--db", url)[0] == 0, told
+    assert tracker("compare", mended[4].id, "latest", "--db", url)[0] == 1
+
+
+def test_days_in_the_terminal_are_those_of_utc(tmp_path: Path) -> None:
+    late = replace(night(0, one(0.1)), started="2026-03-01T23:30:00-05:00")
+
+    assert "2026-03-02" in tracker("trend", "t", "--db", stored(tmp_path, late))[1]
+
+
+def test_a_series_whose_runs_were_removed_is_not_called_green(tmp_path: Path) -> None:
+    url = stored(tmp_path, night(0, one(0.1)))
+    assert tracker("db", "remove", "latest", "--db", url)[0] == 0
+
+    code, told = tracker("trend", "t", "--db", url)
+
+    assert code == 2
+    assert "was not measured in any run that is left" in told
+
+
+def test_a_trend_lists_at_least_one_value(tmp_path: Path) -> None:
+    assert tracker("trend", "t", "--last", "-5", "--db", stored(tmp_path, night(0, one(0.1))))[0] == 2
+
+
+def test_a_run_that_measured_nothing_is_not_green(tmp_path: Path) -> None:
+    url = stored(tmp_path, night(0, one(0.1)), replace(night(1, one(0.1)), samples=(), partial=True))
+
+    code, told = tracker("judge", "latest", "--db", url)
+
+    assert code == tracker("compare", "previous", "latest", "--db", url)[0] == 3
+    assert told.startswith("? nothing was measured")
+
+
+def test_a_file_of_accepted_levels_that_is_named_must_be_there(database: str, tmp_path: Path) -> None:
+    code, told = tracker("judge", MAIN, "--accepted", str(tmp_path / "acepted.toml"), "--db", database)
+
+    assert code == 2
+    assert "acepted.toml" in told
+
+
+def test_a_limit_that_moved_is_not_blamed_on_the_last_bits(tmp_path: Path) -> None:
+    lower = one(0.4, limit=0.2)
+    broken = [(lower[0][0], replace(lower[0][1], outcome="out_of_limit", passed=False))]
+    url = stored(tmp_path, night(0, one(0.4)), night(1, broken))
+
+    code, told = tracker("judge", "latest", "--db", url)
+
+    assert code == 1
+    assert "crossed its limit: the same value, at another limit" in told
+
+
+def stored(folder: Path, *runs: RunDocument) -> str:
+    url = f"sqlite:///{folder}/t.db"
+    with session_on(url) as session:
+        for run in runs:
+            assert record(session, run)
+    return url

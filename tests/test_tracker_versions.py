@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from spook_tracker.tracker.document.errors import UnknownName
+from spook_tracker.tracker.judge.lane import lines
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 from tests.run_documents import engine, machine
 
+SHOWN = ("mujoco", "rapier", "zeta", "alpha")  # engines without gates of their own
 A, B, C = "1a" * 20, "2b" * 20, "3c" * 20
 
 
@@ -32,8 +35,8 @@ def runs_of(*versions) -> list[RunInfo]:
             ci_address="",
             key=number,
             started_at=datetime(2026, 11, 21, tzinfo=UTC) + timedelta(days=number),
-            gates=1,
-            gates_passed=1,
+            gates=int(version.name not in SHOWN),
+            gates_passed=int(version.name not in SHOWN),
         )
         for number, version in enumerate(versions, start=1)
     ]
@@ -105,6 +108,25 @@ def test_our_own_engine_is_meant_unless_another_is_named():
     assert found(runs, "0.3").engine.name == "rapier"
 
 
+def test_an_engine_that_is_only_shown_never_takes_our_place() -> None:
+    """Asked after the night, without gates: commands and website still tell of the engine that has them."""
+    ours, theirs, imported = runs_of(
+        commit(A, name="pebble"), commit("", name="mujoco"), commit(B, name="bullet")
+    )
+    runs = [
+        replace(ours, gates=3),
+        replace(theirs, gates=0),
+        replace(imported, gates=5, trigger="import"),
+    ]
+
+    assert found(runs, "latest").engine.name == "pebble"
+    assert [line[0].engine.name for line in lines(runs)] == ["pebble", "mujoco", "bullet"]
+    assert found(runs[1:], "latest").engine.name == "mujoco", "where nobody has gates, the newest"
+    assert found([replace(runs[1], gates=1), *runs[:1]], "latest").engine.name == "mujoco", (
+        "gating, and newer"
+    )
+
+
 def test_a_dirty_build_is_the_latest_until_something_else_has_run():
     runs = runs_of(commit(A), commit(A, dirty=True))
     assert found(runs, "latest").engine.dirty
@@ -141,3 +163,18 @@ def test_of_several_runs_of_a_version_the_last_clean_one_is_meant():
     runs = runs_of(commit(A), commit(A), commit(A, dirty=True))
 
     assert found(runs, A) == runs[1]
+
+
+def test_words_are_of_one_engine():
+    peers = [commit(A, name="zeta"), commit(B, name="alpha"), commit(C, name="zeta")]
+
+    assert found(runs_of(*peers), "previous").engine.git_hash == A
+    assert found(runs_of(commit(C), *peers[:2]), "latest").engine.git_hash == C
+    with pytest.raises(UnknownName, match="only one run"):
+        found(runs_of(commit(C), *peers[:2]), "previous")
+
+
+def test_an_imported_engine_is_not_the_one_a_word_means_while_another_was_measured():
+    ours, theirs = runs_of(commit(A, name="ours"), commit(B, name="theirs"))
+
+    assert found([ours, replace(theirs, trigger="import")], "latest").engine.git_hash == A

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
@@ -85,13 +86,30 @@ def fork_point(history: History, after: str) -> Any:
     return found
 
 
+def _earlier(history: History, before: str, after: str) -> Any:
+    """The run that `before` stands for beside `after`."""
+    from spook_tracker.tracker.judge.lane import line_of
+
+    if before == FORK_POINT:
+        return fork_point(history, after)
+    whose, _, word = after.rpartition("@")
+    if word == "latest" and before == (f"{whose}@previous" if whose else "previous"):
+        line = line_of(
+            history.runs(), history.resolve(after)
+        )  # as the run is judged: other branches are not before it
+        if len(line) > 1:
+            return line[-2]
+    return history.resolve(before)
+
+
+@no_collection()
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
     """What changed between two versions, each named as on the command line; `before` may be fork-point."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
     from spook_tracker.tracker.judge.work import with_work
 
     new = history.resolve(after)
-    old = fork_point(history, after) if before == FORK_POINT else history.resolve(before)
+    old = _earlier(history, before, after)
     earlier, later = (
         ComparedRun(
             side=side_of(run),
@@ -103,6 +121,7 @@ def compare(history: History, before: str, after: str, accepted: Sequence[Accept
     return compare_in(history, (old, earlier), (new, later), accepted)
 
 
+@no_collection()
 def judge(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """What became of a recorded run, against everything measured before it; red first."""
     from spook_tracker.tracker.judge.tonight import tonight
@@ -122,6 +141,7 @@ def idle_entries(
     return unused(accepted, names, night_of(history.resolve(run)), held)
 
 
+@no_collection()
 def trend(
     history: History,
     test: str,
@@ -157,6 +177,9 @@ def trend(
         found = found or histories(history, line, keys)
     if stem != test:
         found = {key: series for key, series in found.items() if key == test}
+    if not found:
+        whose = f"of an engine {engine!r}" if engine is not None else "in any run that is left"
+        raise UnknownName(f"{test!r} was not measured {whose}; `tracker db stats` shows what is recorded")
     if metric is not None:
         known = sorted({s.definition.metric for s in found.values()})
         found = {key: s for key, s in found.items() if s.definition.metric == metric}

@@ -129,7 +129,7 @@ function judge(definition, before, after, how) {
   if (!how.sameEnvironment) { return verdict("not_comparable", "measured in another float environment"); }
   if (before.outcome === "not_supported" || after.outcome === "not_supported") {
     if (before.outcome === after.outcome) { return verdict("same", "still not supported"); }
-    return verdict("not_comparable", after.outcome === "not_supported" ? `no longer supported: ${after.failure}` : "supported for the first time");
+    return verdict("not_comparable", after.outcome === "not_supported" ? "no longer supported" + (after.failure ? `: ${after.failure}` : "") : "supported for the first time");
   }
   before = honest(before);
   after = honest(after);
@@ -162,7 +162,7 @@ function judgeClass(before, after, decades, ulps) {
   const became = `${spaced(before.outcome)} became ${spaced(after.outcome)}`;
   if (now > old) {
     const crossed = after.outcome === "out_of_limit";
-    const far = ulps === null || ulps > LAST_BITS ? "" : ` by ${ulps} ULP: the last bits decide`;
+    const far = ulps === null || ulps > LAST_BITS ? "" : Number(ulps) === 0 ? ": the same value, at another limit" : ` by ${ulps} ULP: the last bits decide`;
     const what = crossed ? `crossed its limit${far}` : became;
     return verdict("regressed", what + (after.failure ? `: ${after.failure}` : ""), { name: crossed ? "limit crossed" : spaced(after.outcome), decades, ulps });
   }

@@ -16,6 +16,7 @@ from spook_tracker.tracker.cli.filters import (
 )
 from spook_tracker.tracker.cli.options import (
     ACCEPTED,
+    NOT_COMPARABLE,
     RED,
     accepted_option,
     database_option,
@@ -80,6 +81,7 @@ def compare(
     """Say what changed between two versions.
 
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green.
+    Previous to the latest is the run before it on its own branch.
     V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
     annotations are for pull requests, and empty when nothing became worse.
     """
@@ -158,7 +160,7 @@ def judge_command(
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
-    RUN is named as for compare. What is red ends with exit code 1.
+    RUN is named as for compare. What is red ends with exit code 1, a run that measured nothing with 3.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
@@ -180,12 +182,16 @@ def judge_command(
         say("\n".join([*finding_lines(findings), *(f"note: {note}" for note in notes)]))
     if any(finding.red for finding in findings):
         click.get_current_context().exit(RED)
+    if not findings:
+        click.get_current_context().exit(NOT_COMPARABLE)
 
 
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))
 @click.argument("test")
 @click.argument("metric", required=False)
-@click.option("--last", default=10, show_default=True, help="Values to list of each series.")
+@click.option(
+    "--last", type=click.IntRange(min=1), default=10, show_default=True, help="Values to list of each series."
+)
 @engine_option
 @kind_options
 @json_option

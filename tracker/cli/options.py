@@ -145,8 +145,17 @@ def accepted_option(command: Command) -> Command:
         "--accepted",
         metavar="FILE",
         type=click.Path(path_type=Path),
+        callback=_there_if_named,
         help=f"Accepted levels; default {ACCEPTED}.",
     )(command)
+
+
+def _there_if_named(context: click.Context, option: click.Parameter, file: Path | None) -> Path | None:
+    """A file that somebody names must be there; one that is there by default need not."""
+    named = context.get_parameter_source(str(option.name)) is click.core.ParameterSource.COMMANDLINE
+    if named and file is not None and not file.is_file():
+        raise click.BadParameter(f"there is no file {file}")
+    return file
 
 
 def example(*lines: str) -> str:

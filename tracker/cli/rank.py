@@ -35,6 +35,7 @@ def table_lines(history: Any, names: Sequence[str]) -> list[str]:
     """The table, and between two engines who is ahead where."""
     import spook_tracker.tracker.judge.rank as ranks
     from spook_tracker.tracker.cli.console import Column, clean, table, width
+    from spook_tracker.tracker.document.wording import day
 
     runs = {name: history.resolve(name if "@" in name else f"{name}@latest") for name in names}
     titles = _titles([run.engine for run in runs.values()])
@@ -45,7 +46,7 @@ def table_lines(history: Any, names: Sequence[str]) -> list[str]:
         again = f"tracker run --engine {','.join(names)} --sweep"
         return [f"no error against run time is recorded of {' or '.join(names)}; measure it: {again}"]
     heading = [
-        clean(f"{run.engine.name} {run.engine.version}, measured {run.started[:10]}") for run in runs.values()
+        clean(f"{run.engine.name} {run.engine.version}, measured {day(run.started)}") for run in runs.values()
     ]
     columns = (
         Column("scene", flexible=True),

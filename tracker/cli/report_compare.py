@@ -257,6 +257,8 @@ def summary(findings: Sequence[Finding]) -> str:
         news = f"{new} new tonight" if new else "none of them new tonight"
         worst = clean(f"the worst: {red[0].series}, {red[0].name}")
         return click.style(f"✗ {len(red)} worse than the history, {news}; {worst}", fg="red", bold=True)
+    if not findings:
+        return click.style("? nothing was measured that could be judged", fg="yellow", bold=True)
     held = len(findings) - words["new"] - words["not_comparable"]
     parts = [f"{held} series hold their level"] if held or not words else []
     if words["new"]:

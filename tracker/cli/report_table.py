@@ -16,6 +16,7 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
 )
+from spook_tracker.tracker.document.wording import clock
 from spook_tracker.tracker.judge.standing import HAVE_VALUES, against_limit, count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
@@ -143,7 +144,7 @@ def title(run: RunDocument) -> str:
     """Which engine, which commit, which machine."""
     engine = run.engine
     commit = engine.git_hash[:10] + (" with local changes" if engine.dirty else "")
-    facts = (f"{engine.name} {engine.version}", commit, run.machine.processor, f"{run.started[:16]}Z")
+    facts = (f"{engine.name} {engine.version}", commit, run.machine.processor, f"{clock(run.started)} UTC")
     return click.style(clean(" · ".join(filter(None, facts))), bold=True)
 
 

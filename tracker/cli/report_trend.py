@@ -9,6 +9,7 @@ import click
 from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of, is_noisy
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, STATES, spaced
@@ -36,7 +37,7 @@ def trend_lines(told: Told, last: int = 10) -> list[str]:
     lines += [f"  {clean(line)}" for line in changes(definition, judged)]
     rows = [
         (
-            j.night.run.started[:10],
+            day(j.night.run.started),
             j.night.run.engine.version,
             commit_of(j.night.run),
             number(j.night.value, 12) + unit,
@@ -61,7 +62,7 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
     if not is_noisy(definition):
         told = [j for j in judged if j.verdict.word not in ("identical", "same", "new") and not _repeats(j)]
         return [
-            f"{j.night.run.started[:10]} {commit_of(j.night.run)}: {j.verdict.name or j.verdict.word} "
+            f"{day(j.night.run.started)} {commit_of(j.night.run)}: {j.verdict.name or spaced(j.verdict.word)} "
             f"{j.verdict.sentence}"
             for j in told
         ]
@@ -71,7 +72,7 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
 
     values = [j.night.value for j in judged]
     return [
-        f"{judged[point.place].night.run.started[:10]} {commit_of(judged[point.place].night.run)}: "
+        f"{day(judged[point.place].night.run.started)} {commit_of(judged[point.place].night.run)}: "
         f"level {number(point.before)} → {number(point.after)} (p = {point.probability:.3f})"
         for point in change_points(values, name=definition.key)
     ]

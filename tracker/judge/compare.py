@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesD
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
+from spook_tracker.tracker.judge.known import Known, known
 from spook_tracker.tracker.judge.lane import (
     Records,
     asked_for,
@@ -27,9 +28,7 @@ from spook_tracker.tracker.judge.lane import (
     run_time_histories,
 )
 from spook_tracker.tracker.judge.series_history import (
-    Judged,
     Told,
-    commit_of,
     is_read_off,
     judge_all,
     red_class,
@@ -59,53 +58,6 @@ class ComparedRun:
     @property
     def night(self) -> date:
         return datetime.fromisoformat(self.side.started).astimezone(UTC).date()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Known:
-    """What the history knows about two runs: see `known`."""
-
-    usual: Mapping[str, Usual] = field(default_factory=dict)  # level and noise of times at the earlier run
-    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of made series of run time
-    suspected: frozenset[str] = frozenset()  # times whose slow night is not confirmed yet
-    first_bad: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # last good, first bad commit
-
-
-def known(told: Mapping[str, Told], before: str, after: str) -> Known:
-    """What judged histories know about two runs, by their ids.
-
-    A red series is blamed on the commit where it last became worse up to the later run.
-    """
-    usual: dict[str, Usual] = {}
-    values: dict[str, tuple[float, float]] = {}
-    first_bad: dict[str, tuple[str, str]] = {}
-    suspected = set()
-    for key, series in told.items():
-        old = new = None
-        for judged in reversed(series.nights):
-            if new is None and judged.night.run.id == after:
-                new = judged
-            if old is None and judged.night.run.id == before:
-                old = judged
-            if old is not None and new is not None:
-                break
-        if new is not None and new.red and new.worse_at is not None:
-            good = new.before_worse
-            first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
-        if series.definition.kind != "time" or old is None or old.usual is None:
-            continue
-        level, threshold = old.usual
-        usual[key] = (_time(old), threshold) if old.red else (level, threshold)
-        if new is not None:
-            confirmed = new.confirms and old.state == "suspected"  # by what both are slower than
-            values[key] = (level if confirmed else _time(old), _time(new))
-            if new.state == "suspected":
-                suspected.add(key)
-    return Known(usual=usual, values=values, suspected=frozenset(suspected), first_bad=first_bad)
-
-
-def _time(judged: Judged) -> float:
-    return judged.night.value if judged.time is None else judged.time
 
 
 def side_of(run: Any) -> Side:

@@ -7,11 +7,11 @@ are made here and nowhere else, so that whoever judges a history judges them, to
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import UTC, datetime
 from typing import Any, Protocol
 
 import msgspec
 
+from spook_tracker.tracker.document.about import about, started
 from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.document.run_document import (
     MapData,
@@ -21,7 +21,6 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     SeriesHistory,
 )
-from spook_tracker.tracker.document.wording import instant
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
 
@@ -95,14 +94,13 @@ def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
 
 
 def lines(runs: Sequence[Any]) -> list[list[Any]]:
-    """One line of runs per engine, up to its newest; first the engine of the newest run that was not imported.
+    """One line of runs per engine, up to its newest; first that of the engine which the history is about.
 
     Runs of other branches stand in no line: they are judged by themselves, against the commit they forked from.
     """
     if not runs:
         return []
-    own = [run for run in runs if run.trigger != "import"] or runs
-    first = max(own, key=_started).engine.name
+    first = about(runs)
     engines = sorted(dict.fromkeys(run.engine.name for run in runs), key=lambda name: name != first)
     return [_line([run for run in runs if run.engine.name == name]) for name in engines]
 
@@ -112,7 +110,7 @@ def _line(runs: Sequence[Any]) -> list[Any]:
 
     This is what `latest` and `previous` choose from on the command line.
     """
-    newest = max(runs, key=_started)
+    newest = max(runs, key=started)
     placed = [run for run in runs if _placed(run)]
     if not placed:
         return list(runs)
@@ -122,10 +120,6 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     if aside and len(other := line_of(placed, aside[-1])) > len(line):
         line = other  # a branch that was measured once is not what the history is about
     return line if _placed(newest) else [*line, newest]
-
-
-def _started(run: Any) -> datetime:
-    return instant(run.started) or datetime.min.replace(tzinfo=UTC)
 
 
 def _placed(run: Any) -> bool:

@@ -174,6 +174,9 @@ class _Walk:
             return Noisy(verdict=verdict, state="accepted", against=against)
         if not confirmed and self.crept:  # red already, and no better for this night
             return self._drifted(replace(verdict, word="regressed", name="drift"))
+        if not confirmed and (together := self._shift(self.suspects)) is not None:
+            self.suspects = []
+            return together
         if not confirmed:
             return Noisy(verdict=verdict, state="suspected", against=against)
         if self.red_since is None:
@@ -319,24 +322,26 @@ class _Walk:
         self.usual = [*self.usual, *places][-WINDOW:]
         self.level_since = [*self.level_since, *places][-BASE - max(SPANS) :]
 
-    def _shift(self) -> Noisy | None:
-        """Red if the last nights together lie above those of the level before them; they leave what is usual."""
+    def _shift(self, suspects: Sequence[int] = ()) -> Noisy | None:
+        """Red if the last nights together, suspects among them, lie above those of the level before them.
+
+        They leave what is usual.
+        """
         level, deviation = self._spread()
         if not 0.0 < level < math.inf:
             return None
-        last = self.level_since[-min(SPANS) :]
+        nights = [*self.level_since, *suspects]
+        last = nights[-min(SPANS) :]
         near = sum(worse_by(level, self.values[i], self.larger_is_better) for i in last) / len(last)
         if near < LEAST or near < deviation:
             return None  # most nights: nothing to count
         sign = -1.0 if self.larger_is_better else 1.0
-        values = [sign * self.values[i] for i in self.level_since]
-        found = shift(values)
+        found = shift([sign * self.values[i] for i in nights])
         if found is None:
             return None
-        nights = self.level_since[-found.span :]
-        self.level_since = self.level_since[: -found.span]
+        self.level_since, nights = nights[: -found.span], nights[-found.span :]
         self.usual = [i for i in self.usual if i not in nights] or self.level_since[-WINDOW:]
-        self.reached = self.reached[: -found.span]
+        self.reached = self.reached[: len(suspects) - found.span]
         if self._known(found.change) is not None:
             self.staying = nights
             return None

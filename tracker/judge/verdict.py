@@ -114,7 +114,7 @@ def _unasked(before: Sample, after: Sample) -> Verdict:
     if before.outcome == after.outcome:
         return Verdict(word="same", sentence="still not supported")
     if after.outcome == "not_supported":
-        return _incomparable(f"no longer supported: {after.failure}")
+        return _incomparable("no longer supported" + (f": {after.failure}" if after.failure else ""))
     return _incomparable("supported for the first time")
 
 
@@ -140,6 +140,8 @@ def _by_class(before: Sample, after: Sample, decades: float | None, ulps: int | 
     if new > old:
         crossed = after.outcome == "out_of_limit"
         far = "" if ulps is None or ulps > LAST_BITS else f" by {ulps} ULP: the last bits decide"
+        if ulps == 0:
+            far = ": the same value, at another limit"
         what = (
             f"crossed its limit{far}"
             if crossed

@@ -5,7 +5,8 @@ an engine version               1.2.0 or 1.2.1.dev3+g1a2b3c4: its newest run
 a commit                        its hash or the start of it (4 characters or more), a tag, a branch
 a run                           its id or the start of it (4 characters or more)
 
-of the engine "spook" wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another engine.
+of the engine that the history is about, wherever it has such a run; "mujoco@3.3.0" or "mujoco@latest" asks for another
+one. The words are of that engine alone.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from spook_tracker.tracker.document import run_document as document
+from spook_tracker.tracker.document.about import about
 from spook_tracker.tracker.document.errors import UnknownName
 
-ENGINE = "spook"  # meant where no engine is named
 SHORTEST = 4  # characters of a hash or an id
 WORDS = ("latest", "previous", "last-green")
 
@@ -65,9 +66,13 @@ def resolve(runs: Sequence[RunInfo], name: str, commit_of: Callable[[str], str |
     if at and engine in engines:
         found = _among([run for run in runs if run.engine.name == engine], rest, commit_of)
     else:
-        first = [run for run in runs if run.engine.name == ENGINE]
-        others = [run for run in runs if run.engine.name != ENGINE]
-        found = _among(first, name, commit_of) or _among(others, name, commit_of)
+        ours = about(runs)
+        first = [run for run in runs if run.engine.name == ours]
+        if name in WORDS:  # of one engine: nothing is previous to another's run
+            found = _by_word(first, name)
+        else:
+            others = [run for run in runs if run.engine.name != ours]
+            found = _among(first, name, commit_of) or _among(others, name, commit_of)
     if found is None:
         raise _unknown(runs, name)
     return found

@@ -1,6 +1,7 @@
 """Comparisons for the page: every ordered pair of the newest versions, judged by the command's own code.
 
-A comparison of two runs never changes, so those of the last publication are taken over. Texts are kept once in
+A comparison of two runs changes only with what the history knows of them, or with the words of today's tests: else
+that of the last publication is taken over. Texts are kept once in
 a list and named by their place: a few hundred comparisons fit into one page.
 """
 
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,12 +25,14 @@ from spook_tracker.tracker.document.wording import (
     short_hash,
 )
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.compare import ComparedRun, compare, known, side_of
+from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.known import judged_in, known_of
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
-from spook_tracker.tracker.judge.series_history import is_release
+from spook_tracker.tracker.judge.series_history import Judged, is_release
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
 from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.website.folder import digest
 from spook_tracker.tracker.website.judged_nights import accepted_fields, described
 from spook_tracker.tracker.website.nights import Book, Night, Records
 
@@ -44,7 +47,12 @@ class Comparisons:
 
     nights: list[Night]
     pairs: dict[str, Any]  # by `pair_name` to what the page shows
+    made_from: dict[str, str] = field(default_factory=dict)  # the same to what it depends on
     texts: list[str] = field(default_factory=list)
+
+    def kept(self) -> dict[str, Any]:
+        """Each with what it was made from, for the next publication."""
+        return {name: [self.made_from[name], pair] for name, pair in self.pairs.items()}
 
 
 def pair_name(before: Night, after: Night) -> str:
@@ -86,24 +94,43 @@ def comparisons(
             )
         return sides[night.id]
 
+    verdicts = judged_in(told, [night.id for night in nights])
+    words = json.dumps([titles, descriptions])
+    facts = {run: digest(words.encode(), *_facts(found)) for run, found in verdicts.items()}
     pairs: dict[str, Any] = {}
+    made_from: dict[str, str] = {}
     for before in nights:
         for after in nights:
             if before is after:
                 continue
             name = pair_name(before, after)
-            newest = after is book.tonight
-            if name not in stored or newest:
-                history_knows = known(told, before.id, after.id)
+            history_knows = known_of(told, verdicts[before.id], verdicts[after.id])
+            made_from[name] = digest(
+                facts[before.id].encode(),
+                facts[after.id].encode(),
+                repr(history_knows).encode("utf-8", "replace"),
+            )
+            then, kept = stored.get(name, ("", None))
+            if then == made_from[name]:
+                pairs[name] = kept
+            else:
                 document = compare(side(before), side(after), accepted, history_knows)
                 pairs[name] = _told(document, titles, descriptions)
-            else:
-                pairs[name] = stored[name]
-    return Comparisons(nights, pairs)
+    return Comparisons(nights, pairs, made_from)
+
+
+def _facts(night: Mapping[str, Judged]) -> list[bytes]:
+    """The values of a run, as far as histories hold them."""
+    return [
+        f"{key} {found.night.value!r} {found.night.sample.outcome} {found.night.test_version}".encode(
+            "utf-8", "replace"
+        )
+        for key, found in night.items()
+    ]
 
 
 def read_known(old: Path, made_from: str) -> dict[str, Any]:
-    """The comparisons of the last publication, if they were made by the same code."""
+    """The comparisons of the last publication, each with what it was made from, if they were made by the same code."""
     try:
         stored = json.loads((old / FILE).read_text(encoding="utf-8"))
         if stored["made_from"] == made_from and isinstance(stored["pairs"], dict):
@@ -115,7 +142,7 @@ def read_known(old: Path, made_from: str) -> dict[str, Any]:
 
 def stored(told: Comparisons, made_from: str) -> bytes:
     """The comparisons as a file of the website."""
-    whole = {"made_from": made_from, "pairs": told.pairs}
+    whole = {"made_from": made_from, "pairs": told.kept()}
     return json.dumps(whole, ensure_ascii=True, separators=(",", ":"), allow_nan=False).encode()
 
 

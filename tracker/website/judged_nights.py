@@ -7,6 +7,7 @@ block one row. A night that is over never changes, so its block is made once.
 from __future__ import annotations
 
 import json
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
@@ -118,7 +119,7 @@ Marks = dict[str, tuple[tuple[float, float] | None, bool, str]]  # by key: usual
 
 
 def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
-    """What the history knows of every run, by its id, as tracker/judge/compare.py:known tells it of two."""
+    """What the history knows of every run, by its id, as tracker/judge/known.py tells it of two."""
     found: dict[str, Marks] = {}
     for key, series in told.items():
         timed = series.definition.kind == "time" and not is_read_off(series.definition)
@@ -141,15 +142,33 @@ def file_stem(chapter: Chapter, book: Book) -> str:
     return "nights" if chapter is book else f"{slug(chapter.name)}-nights"
 
 
+def _values(chapter: Chapter) -> list[array[float]]:
+    """Every value of each night: a run may be taken out, and come back under its name with others."""
+    found = [array("d") for _ in chapter.nights]
+    for test in chapter.tests:
+        for trend in test.trends:
+            for place, value in zip(trend.nights, trend.values, strict=True):
+                found[place].append(value)
+    return found
+
+
 def files(history: Records, book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
     """The files of the page: path, what each is made from, and how."""
     for chapter in book.engines:
         told = {t.definition.key: t.told for test in chapter.tests for t in test.trends}
         marks = all_marks(told)
+        values = _values(chapter)
         for number in range(0, len(chapter.nights), BLOCK):
             nights = chapter.nights[number : number + BLOCK]
             facts = [
-                (night.id, night.started, night.trigger, repr(night.asked), marks.get(night.id))
+                (
+                    night.id,
+                    night.started,
+                    night.trigger,
+                    repr(night.asked),
+                    marks.get(night.id),
+                    values[night.index].tobytes(),
+                )
                 for night in nights
             ]
             name = f"{file_stem(chapter, book)}-{number // BLOCK}"

@@ -185,7 +185,7 @@ class Records(Protocol):
 
 
 def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
-    """The book of a history. The engine of the newest run that was not imported is the one it is about."""
+    """The book of a history. The engine it is about comes first."""
     runs = list(history.runs())
     if not runs:
         return Book([], [], [])

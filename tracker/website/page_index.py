@@ -130,7 +130,7 @@ def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:
 def summary(book: Book) -> str:
     """Tonight in two sentences."""
     fresh = [(test, t) for test in book.tests for t in test.gates() if t.nights[-1] == book.tonight.index]
-    seven = [trend for test, trend in fresh if test.card.seven]
+    seven = [trend for test, trend in fresh if test.card.seven and trend.state != "none"]
     kept = sum(trend.state != "fail" for trend in seven)
     parts = []
     if seven:

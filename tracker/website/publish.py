@@ -190,7 +190,8 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
     """Files of numbers."""
     if not told.nights:
         return
-    newest = _bytes_of({"nights": len(told.nights), "tonight": told.tonight})
+    every = [(night.id, night.started, night.engine.version, night.engine.git_hash) for night in told.nights]
+    newest = _bytes_of({"nights": every, "tonight": told.tonight})
     for test in told.tests:
         facts = digest(newest, _bytes_of(_facts(test))).encode()
         yield f"data/{slug(test.name)}.csv", facts, partial(data_files.newest_csv, told, [test])

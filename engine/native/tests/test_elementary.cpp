@@ -1,4 +1,4 @@
-// Sine, cosine, arc tangent and length against long double, over random, special and hard arguments.
+// Sine, cosine, arc and hyperbolic tangent and length against long double, over random, special and hard arguments.
 #include "linear/elementary.hpp"
 
 #include <bit>
@@ -112,6 +112,20 @@ void the_arc_tangent_of_zeros_and_infinities() {
     EXPECT(std::isnan(arc_tangent(std::nan(""), 1.0)) && std::isnan(arc_tangent(1.0, std::nan(""))));
 }
 
+void the_hyperbolic_tangent_is_within_4_ulp() {
+    Worst worst;
+    const auto see = [&](double x) {
+        const double found = hyperbolic_tangent(x);
+        worst.see(ulps(found, std::tanh(static_cast<long double>(x))), x);
+        EXPECT(hyperbolic_tangent(-x) == -found && std::abs(found) <= 1.0);
+    };
+    for (int i = 0; i < 100'000; ++i) see(uniform(0.0, 1.0)), see(uniform(0.0, 25.0));
+    for (int k = -60; k < 10; ++k) see(std::exp2(k)), see(std::nextafter(std::exp2(k), 0.0));
+    EXPECT(worst.within(4.0, "hyperbolic tangent"));
+    EXPECT(std::isnan(hyperbolic_tangent(std::nan(""))));
+    EXPECT(hyperbolic_tangent(infinite) == 1.0 && hyperbolic_tangent(0.0) == 0.0);
+}
+
 void a_length_has_a_relative_error_below_2_to_the_minus_52() {
     double worst = 0.0;
     for (int i = 0; i < 500'000; ++i) {
@@ -133,6 +147,7 @@ int main() {
     if constexpr (LDBL_MANT_DIG > DBL_MANT_DIG) {  // else there is no finer ruler here
         sine_and_cosine_are_within_0_9_ulp();
         the_arc_tangent_is_within_0_6_ulp();
+        the_hyperbolic_tangent_is_within_4_ulp();
     }
     if (failures == 0)
         std::printf("worst: sine %.3f, cosine %.3f ULP\n", sine_error.error, cosine_error.error);

@@ -99,10 +99,12 @@ void read_limits(const nb::dict& limits, RigidScene& scene) {
 void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
     Columns table(springs, "joint_springs");
     const Numbers joint = table.numbers("joint"), stiffness = table.numbers("stiffness"),
-                  rest = table.numbers("rest"), damping = table.numbers("damping");
+                  rest = table.numbers("rest"), damping = table.numbers("damping"),
+                  force = table.numbers("max_force");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& spec = scene.joints.at(joint.index(i));
         spec.has_spring = true;
+        spec.spring_force = force[i];
         spec.spring_stiffness = stiffness[i];
         spec.spring_rest = rest[i];
         spec.spring_damping = damping[i];
@@ -214,6 +216,38 @@ void read_wire_points(const nb::dict& points, RigidScene& scene) {
     table.expect_all_read();
 }
 
+void read_eyes(const nb::dict& eyes, RigidScene& scene) {
+    Columns table(eyes, "eyes");
+    const Numbers wire = table.numbers("wire"), point = table.numbers("point"),
+                  friction = table.numbers("friction"), turns = table.numbers("turns");
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        const JointSpec& over = scene.joints.at(wire.index(i));
+        JointSpec eye;
+        eye.kind = JointKind::eye;
+        eye.wire = wire.index(i);
+        eye.eye = point.index(i);
+        eye.points.assign(over.points.begin() + eye.eye, over.points.end());
+        eye.terms = over.terms;
+        eye.friction[0] = friction[i];
+        eye.turns = turns[i];
+        scene.joints.push_back(std::move(eye));
+    }
+    table.expect_all_read();
+}
+
+void read_tyres(const nb::dict& tyres, RigidScene& scene) {
+    Columns table(tyres, "tyres");
+    const Numbers joint = table.numbers("joint"), radius = table.numbers("radius"),
+                  stiffness = table.numbers("slip_stiffness", 2), friction = table.numbers("friction", 2);
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        JointSpec& tyre = scene.joints.at(joint.index(i));
+        tyre.radius = radius[i];
+        std::copy_n(stiffness.at(i), 2, tyre.slip_stiffness.begin());
+        std::copy_n(friction.at(i), 2, tyre.friction.begin());
+    }
+    table.expect_all_read();
+}
+
 void read_fluids(const nb::dict& fluids, RigidScene& scene) {
     Columns table(fluids, "fluids");
     const Numbers density = table.numbers("density"), level = table.numbers("level"),
@@ -284,11 +318,12 @@ RigidMethod to_method(const nb::dict& method) {
 
 void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, const nb::dict& motors,
           const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& springs,
-          const nb::dict& terms, const nb::dict& wire_points, const nb::dict& fields, const nb::dict& fluids,
-          const nb::dict& floaters, const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
-          const nb::dict& hull_corners, const nb::dict& hull_faces, const nb::dict& no_contact, bool contacts,
-          const Point& gravity, const nb::dict& method, bool loads_change,
-          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
+          const nb::dict& terms, const nb::dict& wire_points, const nb::dict& eyes, const nb::dict& tyres,
+          const nb::dict& fields, const nb::dict& fluids, const nb::dict& floaters, const nb::dict& drives,
+          const nb::dict& knots, const nb::dict& colliders, const nb::dict& hull_corners,
+          const nb::dict& hull_faces, const nb::dict& no_contact, bool contacts, const Point& gravity,
+          const nb::dict& method, bool loads_change, const std::vector<QuantityRequest>& quantities,
+          const std::vector<Observation>& observations) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
     scene.loads_change = loads_change;
@@ -303,6 +338,8 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     scene.fields = read_fields(fields);
     read_terms(terms, scene);
     read_wire_points(wire_points, scene);
+    read_eyes(eyes, scene);
+    read_tyres(tyres, scene);
     read_fluids(fluids, scene);
     read_drives(drives, knots, scene);
     Hulls hulls = read_hulls(hull_corners, hull_faces);
@@ -318,10 +355,11 @@ void bind_rigid(nb::module_& m) {
     bind_program<RigidSystem>(
         m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"),
         nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"), nb::arg("springs"),
-        nb::arg("terms"), nb::arg("wire_points"), nb::arg("fields"), nb::arg("fluids"), nb::arg("floaters"),
-        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("hull_corners"),
-        nb::arg("hull_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
-        nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
+        nb::arg("terms"), nb::arg("wire_points"), nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"),
+        nb::arg("fluids"), nb::arg("floaters"), nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"),
+        nb::arg("hull_corners"), nb::arg("hull_faces"), nb::arg("no_contact"), nb::arg("contacts"),
+        nb::arg("gravity"), nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"),
+        nb::arg("observations"),
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
         "hulls are numbered in the order they come;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits and\n"

@@ -94,6 +94,7 @@ void ConeNewton::connect() {
     if (bodies != bodies_ || pairs_ != needed_) {
         std::vector<BlockEdge> edges;
         for (const auto& [a, b] : needed_) edges.push_back({a, b});
+        bodies_ = -1;  // until the analysis is whole
         matrix_.analyse(bodies, edges);
         pairs_ = needed_;
         bodies_ = bodies;

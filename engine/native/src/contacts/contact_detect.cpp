@@ -6,6 +6,7 @@
 #include "collision/sweep.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
@@ -18,6 +19,7 @@ std::uint64_t pair_of(IndexPair pair) noexcept {
 }
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
+constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
 constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
 
 }  // namespace
@@ -107,7 +109,9 @@ void ContactStage::find_open() {
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
     open_.clear();
+    unsigned seen = 0;
     for (const IndexPair& pair : detection_.near(poses_, search_)) {
+        if (++seen % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
         const double reach = search_[first.body] + search_[second.body];

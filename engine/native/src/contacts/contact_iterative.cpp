@@ -76,6 +76,7 @@ bool ContactStage::is_settled(MixedSystem& system) {
     unsettled_by_ = 0.0;
     sweeps_.write(system);
     const RowsResidual contact = sweeps_.worst(), joint = rows_residual(system, {}, options_.friction);
+    residual_ = std::max(contact.residual, joint.residual);
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points_[contact.row].contact;
         blame(contact.residual, std::max(unknown_[pair.first], unknown_[pair.second]));
@@ -99,11 +100,9 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
             options_.iterations, options_.residual_tolerance, [this] { return find_more(); },
             turn == 0 ? 0.0 : focus * options_.unsettled_residual);
         counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-        if (report.converged || !report.finite || is_settled(system)) break;
+        if (!report.finite || is_settled(system) || report.converged) break;
     }
     counters_.unsettled += !report.converged;
-    residual_ = report.residual;
-    sweeps_.write(system);
 
     mark_held(system);  // by joints; of contacts those that push
     touches_.clear();

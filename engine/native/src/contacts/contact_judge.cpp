@@ -80,11 +80,12 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
 
 void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                          const FrictionReport& report) {
-    residual_ = report.residual;
+    residual_ = unsettled_by_ = 0.0;
     unsettled_body_ = -1;
-    unsettled_by_ = 0.0;
-    if (report.converged || !report.finite) return;
+    if (!report.finite || report.rounds + report.sweeps == 0) return;
     const RowsResidual worst = rows_residual(system, points, options_.friction);
+    residual_ = worst.residual;
+    if (report.converged && options_.solver == SolverKind::direct) return;
     const RowBlock& block = system.rows[worst.row];
     blame(worst.residual, std::max(block.first, block.second));
 }

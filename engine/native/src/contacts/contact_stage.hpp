@@ -166,7 +166,7 @@ public:
 
     ContactCounters counters() const noexcept { return counters_; }
     BlockLdlt::Counters factor_counters() const noexcept;
-    double residual() const noexcept { return residual_; }  // of the last solve, see FrictionReport
+    double residual() const noexcept { return residual_; }  // the last solve's rows_residual(), m/s
     /// A body whose rows the last solve left further from their law than `unsettled_residual`; −1 if there is none.
     int unsettled_body() const noexcept { return unsettled_body_; }
     double unsettled_by() const noexcept { return unsettled_by_; }  // m/s

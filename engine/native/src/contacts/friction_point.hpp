@@ -27,13 +27,16 @@ struct FrictionReport {
     int rounds = 0;  // solves of the whole system
     int pivots = 0;  // rows that changed state
     int sweeps = 0;
-    double residual = 0.0;  // of the friction law, relative (direct) or m/s (iterative)
+    double residual =
+        0.0;  // that the solve ended on: of the friction law, relative (direct), or a change, m/s (sweeps)
     bool converged = true;
     bool finite = true;
 };
 
 /// The row that is furthest from its law, and by how much: each multiplier against where a step of projection would
-/// put it, as a velocity [m/s]. For the box `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not
+/// put it, as a velocity [m/s]. This is *the* residual: what a result reports, and what an "unsettled" run is judged by,
+/// for every solver (`ContactSweeps::worst` measures it over its own contacts). Sweeps end on the largest change of a
+/// sweep instead, the same map seen row by row while it is being followed. For the box `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not
 /// told apart: where all are, that is the answer, and looking is cheaper.
 struct RowsResidual {
     double residual = 0.0;

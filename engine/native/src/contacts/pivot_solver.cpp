@@ -62,6 +62,7 @@ bool PivotSolver::analyse(const MixedSystem& system) {
         if (pattern[k].second >= 0)
             second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
     }
+    bodies_ = -1;  // until the analysis is whole
     matrix_.analyse(sizes, edges, is_constraint);
     ++analyses_;
     last_ = {};
@@ -346,11 +347,11 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         for (std::size_t b = 0; b < bounded_.size() && !stale; ++b)
             stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) !=
                     static_cast<bool>(factored_free_[b]);
-        if (stale && !factor(system)) {
-            report.finite = false;
+        if (stale) {
             factored_ = false;
-            break;
+            report.finite = factor(system);
         }
+        if (!report.finite) break;
         factored_ = same_matrix = true;
         const bool refined = round < refined_rounds;
         solve_free(system, refined);

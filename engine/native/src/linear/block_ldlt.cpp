@@ -5,7 +5,15 @@
 #include <map>
 #include <stdexcept>
 
+#include "linear/pieces.hpp"
+
 namespace spook {
+
+namespace {
+
+constexpr std::int64_t operations_a_piece = 50'000;  // of blocks: some milliseconds
+
+}  // namespace
 
 void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
                         std::span<const std::uint8_t> is_constraint, bool thin_constraints) {
@@ -59,6 +67,8 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     row_offset_.resize(ordering.column_rows.size());
     std::int64_t at = 0, target_count = 0;
     operations_per_factor_ = 0;
+    piece_ends_.clear();
+    std::int64_t piece = 0;
     for (int k = 0; k < count; ++k) {
         const int block = order_[k], n = size_[block];
         const std::int64_t first = ordering.column_start[k], last = ordering.column_start[k + 1],
@@ -79,7 +89,12 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
             at += n * size_[row];
         }
         target_count += d * (d + 1) / 2;
-        operations_per_factor_ += 1 + d + d * (d + 1) / 2;
+        const std::int64_t operations = 1 + d + d * (d + 1) / 2;
+        operations_per_factor_ += operations;
+        piece += operations;
+        if (piece < operations_a_piece && k + 1 < count) continue;
+        piece_ends_.push_back(k + 1);
+        piece = 0;
     }
     factor_.assign(at, 0.0);
 
@@ -93,7 +108,8 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
     }
     targets_.resize(target_count);
     std::int64_t next = 0;
-    for (int k = 0; k < count; ++k) {
+    for (int k = 0, end = 0; k < count; ++k) {
+        if (k == piece_ends_[end]) end_piece(), ++end;
         const std::int64_t last = ordering.column_start[k + 1];
         const auto aim = [&](std::int64_t block) {
             targets_[next++] = block;
@@ -273,11 +289,19 @@ kernel::Factor BlockLdlt::view() const noexcept {
 
 bool BlockLdlt::factor_with(double floor, double* x) {
     if (!raw_blocks_.empty()) raw_scales();
-    const std::int64_t replaced = kernel::kernels().factor(view(), uniform_size_, floor, x);
     ++counters_.factorisations;
     counters_.block_operations += static_cast<std::uint64_t>(operations_per_factor_);
-    if (replaced < 0) return false;
-    counters_.floored_pivots += static_cast<std::uint64_t>(replaced);
+    kernel::Factor piece = view();
+    for (std::size_t k = 0; k < piece_ends_.size(); ++k) {
+        if (k > 0) end_piece();
+        const std::int64_t from = k > 0 ? piece_ends_[k - 1] : 0;
+        piece.columns = columns_.data() + from;
+        piece.load_start = load_start_.data() + from;
+        piece.column_count = piece_ends_[k] - from;
+        const std::int64_t replaced = kernel::kernels().factor(piece, uniform_size_, floor, x);
+        if (replaced < 0) return false;
+        counters_.floored_pivots += static_cast<std::uint64_t>(replaced);
+    }
     return true;
 }
 

@@ -88,6 +88,7 @@ private:
     int unknowns_ = 0, uniform_size_ = 0;
     double shift_ = 0.0;
     std::int64_t operations_per_factor_ = 0;
+    std::vector<std::int64_t> piece_ends_;  // columns after which a factorisation may be ended
 
     std::vector<std::int64_t> diagonal_at_, coupling_at_;
     LargeArray<double> values_;

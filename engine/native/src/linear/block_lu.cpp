@@ -4,9 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "linear/pieces.hpp"
+
 namespace spook {
 
 namespace {
+
+constexpr std::int64_t operations_a_piece = 50'000;  // of blocks: some milliseconds
 
 /// C −= A B.
 inline void subtract_product(const double* a, const double* b, double* c) noexcept {
@@ -110,12 +114,15 @@ void BlockLu::clear() noexcept {
     std::fill(upper_.begin(), upper_.end(), 0.0);
 }
 
-bool BlockLu::factor() noexcept {
+bool BlockLu::factor() {
     const std::int64_t* target = targets_.data();
+    std::int64_t piece = 0;
     for (int k = 0; k < blocks(); ++k) {
         double* pivot = pivot_.data() + 36 * static_cast<std::size_t>(k);
         if (!invert(pivot)) return false;
         const std::int64_t begin = column_start_[k], end = column_start_[k + 1];
+        piece += (end - begin) * (end - begin + 1) + 1;
+        if (piece > operations_a_piece) piece = 0, end_piece();
         for (std::int64_t r = begin; r < end; ++r) multiply(lower(r), pivot);
         for (std::int64_t r = begin; r < end; ++r) {
             const double *low = lower(r), *up = upper(r);

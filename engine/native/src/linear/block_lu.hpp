@@ -30,7 +30,7 @@ public:
     }
 
     /// False when a pivot vanished or was not finite: nothing solve() gives may be used.
-    bool factor() noexcept;
+    bool factor();
     /// x ← A⁻¹ x, six numbers per block in the caller's order.
     void solve(double* x) const noexcept;
 

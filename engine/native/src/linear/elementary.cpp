@@ -185,4 +185,16 @@ double arc_tangent(double y, double x) noexcept {
     return std::copysign(angle.high + angle.low, y);
 }
 
+double hyperbolic_tangent(double x) noexcept {
+    double y = std::abs(x);
+    if (!(y < 20.0)) return std::isnan(x) ? x : std::copysign(1.0, x);  // 1 − 2e⁻⁴⁰
+    int halvings = 0;
+    while (y > 0.25) y *= 0.5, ++halvings;
+    double below = 13.0;  // Lambert's fraction, y/(1 + y²/(3 + y²/(5 + …
+    for (int odd = 11; odd > 0; odd -= 2) below = odd + y * y / below;
+    double t = y / below;
+    for (; halvings > 0; --halvings) t = 2.0 * t / (1.0 + t * t);
+    return std::copysign(t, x);
+}
+
 }  // namespace spook

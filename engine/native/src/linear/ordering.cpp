@@ -5,6 +5,8 @@
 #include <queue>
 #include <tuple>
 
+#include "linear/pieces.hpp"
+
 namespace spook {
 namespace {
 
@@ -12,6 +14,7 @@ namespace {
 constexpr std::int64_t kRawPenalty = 36;
 // A few rows may be dragged along a chain so that a joint can be eliminated while its body is still free.
 constexpr std::int64_t kDraggedRows = 6;
+constexpr std::size_t orders_a_piece = 64;  // blocks
 
 class Elimination {
 public:
@@ -53,6 +56,7 @@ public:
             queue_.pop();
             if (gone_[block] || stamp != stamp_[block]) continue;
             eliminate(block, result);
+            if (result.order.size() % orders_a_piece == 0) end_piece();
         }
         std::vector<int> position(count_);
         for (int k = 0; k < count_; ++k) position[result.order[k]] = k;

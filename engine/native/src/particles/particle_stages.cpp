@@ -89,6 +89,8 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
                                  rows ? "the method asks for a direct solver" : no_rows);
             case Stage::pivot:
                 return leave_out(rows ? "distances are bilateral: no row can let go" : no_rows);
+            case Stage::rub_wires: return leave_out("a wire brings rigid stages with it");
+            case Stage::roll_tyres: return leave_out("particles have no wheels");
             case Stage::correct_curvature:
                 return choose_if((method.corrections > 0 || composed) && rows,
                                  composed ? "Newton's method keeps the curvature of the rows to rounding"

@@ -2,9 +2,14 @@
 // the length of a wire that runs through points of bodies and may go slack.
 //
 //   relation   g = Σ c_k q_k                 q_k the free coordinate of joint k, turns counted, zero at the start
-//   wire       g = Σ |p_(i+1) − p_i| − L     p_i points of bodies or of the world; one-sided: it only pulls, λ <= 0
+//   wire       g = Σ |p_(i+1) − p_i| − L     p_i points of bodies or of the world; one-sided: it only pulls, λ <= 0;
+//              + Σ r_k q_k for the drums it is wound on
+//   eye        the wire behind a point of it goes through there at the rate of Σ |p_(i+1) − p_i| over what follows
+//              (and of its drums): kept at zero as far as friction reaches, see following_bounds.hpp
 #include <algorithm>
+#include <numbers>
 
+#include "linear/elementary.hpp"
 #include "rigid/joint_set.hpp"
 
 namespace spook {
@@ -31,6 +36,32 @@ JointSet::General JointSet::general_of(const RigidScene& scene, const JointSpec&
         general.points.push_back({end.body, end.point, end.point - centre});
     }
     return general;
+}
+
+/// An eye goes on where its wire stands in eyes_: those before it are further to the front.
+void JointSet::add_eye(const JointSpec& spec, General& general) {
+    EyeRow row;
+    row.block = static_cast<int>(blocks_.size());
+    row.wire = joints_[spec.wire].block;
+    for (const EyeRow& other : eyes_)
+        if (other.wire == row.wire) row.before.push_back(other.block);
+    general.eye = static_cast<int>(eyes_.size());
+    general.previous = generals_[joints_[spec.wire].general].points[spec.eye - 1];
+    general.friction = spec.friction[0];
+    general.turned = 2.0 * std::numbers::pi * spec.turns;
+    eyes_.push_back(std::move(row));
+}
+
+/// How hard the wire holds where it bends: tanh ½µφ, φ the angle of its bend and of its turns there.
+void JointSet::rub(const General& general, std::span<const BodyState> bodies) noexcept {
+    const auto place = [&](const General::Point& point) {
+        const BodyState& s = body(point.body, bodies);
+        return point.start + s.displacement + s.turn_less_one * point.arm;
+    };
+    const Vec3 at = place(general.points[0]);
+    const Vec3 from = at - place(general.previous), on = place(general.points[1]) - at;
+    const double bend = arc_tangent(norm(cross(from, on)), dot(from, on));
+    eyes_[general.eye].grip = hyperbolic_tangent(0.5 * general.friction * (bend + general.turned));
 }
 
 std::span<const int> JointSet::others(int block) const noexcept {
@@ -112,6 +143,13 @@ void JointSet::assemble_general(const Joint& joint, State& state, std::span<cons
     const Along row = along(general, bodies, gradient_.data());
     std::copy_n(gradient_.data(), 6, first);
     std::copy_n(gradient_.data() + 6, 6, second);
+    if (general.eye >= 0) {
+        rub(general, bodies);
+        right.right[0] = 0.0;
+        right.lower[0] = -state.bound[0];
+        right.upper[0] = state.bound[0];
+        return;
+    }
     if (general.one_sided) {
         right.right[0] = one_sided(-1.0, row.violation, row.rate, general.row, general.restitution, state);
         right.upper[0] = 0.0;

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "rigid/tyre_rows.hpp"
+
 namespace spook {
 
 namespace {
@@ -18,13 +20,19 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         joint.constants = constants_of(spec, start(spec.first), start(spec.second));
         joint.first = spec.first;
         joint.second = spec.second;
-        if (spec.kind == JointKind::relation || spec.kind == JointKind::wire) {
+        if (spec.kind == JointKind::relation || spec.kind == JointKind::wire || spec.kind == JointKind::eye) {
             General general = general_of(scene, spec);
+            if (spec.kind == JointKind::eye) add_eye(spec, general);
             joint.first = general.bodies.empty() ? -1 : general.bodies[0];
             joint.second = general.bodies.size() < 2 ? -1 : general.bodies[1];
             joint.general = static_cast<int>(generals_.size());
             gradient_.resize(std::max<std::size_t>({gradient_.size(), 12, 6 * general.bodies.size()}));
             generals_.push_back(std::move(general));
+        }
+        if (spec.kind == JointKind::tyre) {
+            joint.tyre = static_cast<int>(tyre_forms_.size());
+            tyre_forms_.push_back({spec.radius, spec.slip_stiffness, {}});
+            tyres_.push_back({static_cast<int>(blocks_.size()), spec.friction});
         }
         joint.breakable = can_break(spec);
         joint.strength = time_step * spec.strength;
@@ -66,6 +74,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             if (spec.has_spring) {
                 axial.spring_rest = spec.spring_rest;
                 axial.spring_stiffness = spec.spring_stiffness;
+                axial.spring_impulse = time_step * spec.spring_force;
                 axial.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
                 block.softness[block.size++] = axial.spring.softness;
             }
@@ -91,6 +100,8 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
         assemble_axial(joint, state, bodies, first, second, right);
     } else if (joint.general >= 0) {
         assemble_general(joint, state, bodies, first, second, right);
+    } else if (joint.tyre >= 0) {
+        assemble_tyre(joint, state, bodies, first, second, right);
     } else {
         JointRows rows{first, second, {}, {}};
         assemble_joint(joint.constants, body(joint.first, bodies), body(joint.second, bodies), rows,
@@ -145,8 +156,11 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
     if (!axial.has_spring) return;
     const double rest = axial.spring.violation_gain * (state.angle - axial.spring_rest);
     // A rest r(t) in the averaged law: G v₊ − r'₊ in place of G v₊, G v − r'₋ in place of G v.
-    next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) - rest + axial.rest_ahead
-                          : axial.spring.upsilon * row.rate - rest);
+    const int spring = next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) - rest +
+                                                   axial.rest_ahead
+                                             : axial.spring.upsilon * row.rate - rest);
+    right.lower[spring] = -axial.spring_impulse;
+    right.upper[spring] = axial.spring_impulse;
 }
 
 /// The right side of a row that only pushes `inwards`.
@@ -195,6 +209,13 @@ void JointSet::violation(int index, std::span<const BodyState> bodies, double* o
         *out = along(generals_[joint.general], bodies, nullptr).violation;
         return;
     }
+    if (joint.tyre >= 0) {
+        out[0] = stand(joint.constants, tyre_forms_[joint.tyre].radius, body(joint.first, bodies),
+                       body(joint.second, bodies))
+                     .height;
+        out[1] = out[2] = 0.0;
+        return;
+    }
     joint_violation(joint.constants, body(joint.first, bodies), body(joint.second, bodies), out);
 }
 
@@ -202,7 +223,7 @@ void JointSet::overstep(int index, std::span<const BodyState> bodies, double* ou
     const JointBlock& block = blocks_[index];
     const Joint& joint = joints_[block.joint];
     std::fill_n(out, block.size, 0.0);
-    if (states[block.joint].broken) return;
+    if (states[block.joint].broken || gives_way(joint.constants.kind)) return;
     if (!block.axial) {
         violation(block.joint, bodies, out);
         if (joint.general >= 0 && generals_[joint.general].one_sided) *out = std::max(0.0, *out);

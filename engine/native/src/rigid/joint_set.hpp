@@ -26,6 +26,19 @@ struct JointBlock {
 /// G v₊ + softness λ = right where lower < λ < upper; λ are impulses on the second body.
 struct BlockRight {
     std::array<double, 6> right, lower, upper;
+    const double* softness = nullptr;  // of rows whose softness changes from step to step
+};
+
+/// A row that rubs: the wire's, its own and those of the eyes before it, by block; tanh ½µφ.
+struct EyeRow {
+    int block = 0, wire = 0;
+    std::vector<int> before;
+    double grip = 0.0;
+};
+/// Three rows of a tyre, by block, and its friction along and across.
+struct TyreRows {
+    int block = 0;
+    std::array<double, 2> friction{};
 };
 
 class JointSet {
@@ -37,8 +50,9 @@ public:
         Vec3 first_reach,
             second_reach;  // from the centres to the point where forces are read, at the last step
         bool broken = false;
-        bool at_limit = false;  // the free coordinate's limit was closed in the last step
-        double angle = 0.0;     // unwrapped coordinate of a hinge that needs it
+        bool at_limit = false;          // the free coordinate's limit was closed in the last step
+        double angle = 0.0;             // unwrapped coordinate of a hinge that needs it
+        std::array<double, 2> bound{};  // N s: of an eye's row; of a tyre's rows along and across
     };
 
     JointSet(const RigidScene& scene, double time_step);
@@ -87,7 +101,7 @@ public:
     bool always_holds(const JointBlock& block) const noexcept {
         const Joint& joint = joints_[block.joint];
         const bool one_sided = joint.general >= 0 && generals_[joint.general].one_sided;
-        return !block.axial && !one_sided && !states[block.joint].broken;
+        return !block.axial && !one_sided && !gives_way(joint.constants.kind) && !states[block.joint].broken;
     }
     bool has_spring(const JointBlock& block) const noexcept {
         return block.axial && axials_[joints_[block.joint].axial].has_spring;
@@ -118,6 +132,10 @@ public:
     void set_rest(int joint, double rest);
     void set_moving_rest(int joint, double rest, double before, double ahead);
 
+    /// Rows whose bounds follow from what other rows carry; the grip of an eye is that of the last assemble().
+    std::span<const EyeRow> eyes() const noexcept { return eyes_; }
+    std::span<const TyreRows> tyres() const noexcept { return tyres_; }
+
     LargeArray<State> states;
 
 private:
@@ -125,7 +143,8 @@ private:
         JointConstants constants;
         int first = -1, second = -1, axial = -1;  // axial: index into axials_
         int block = 0;                            // of its own rows: index into blocks_
-        int general = -1;                         // of a relation or a wire: index into generals_
+        int general = -1;                         // of a relation, a wire or an eye: index into generals_
+        int tyre = -1;                            // index into tyre_forms_
         bool tracked = false, breakable = false;
         double strength = 0.0, torque_strength = 0.0;  // N s, N m s
         struct {
@@ -136,6 +155,7 @@ private:
         bool has_motor = false, has_limit = false, has_spring = false;
         double speed = 0.0, impulse = 0.0;
         double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0, spring_stiffness = 0.0;
+        double spring_impulse = 0.0;
         bool rest_moves = false;  // then, over the step before and this one, m/s or rad/s:
         double rest_before = 0.0, rest_ahead = 0.0;
         Regularisation limit, spring;
@@ -151,7 +171,15 @@ private:
         std::vector<int> bodies;  // that are not fixed, in the order of first mention
         double length = 0.0, restitution = 0.0;
         bool one_sided = false;
+        int eye = -1;                         // index into eyes_
+        Point previous{};                     // of an eye: where the wire comes from
+        double friction = 0.0, turned = 0.0;  // µ; rad beyond the bend
         Regularisation row;
+    };
+    struct TyreForm {
+        double radius = 0.0;
+        std::array<double, 2> slip_stiffness{};
+        std::array<double, 6> softness{};  // of the coming step
     };
     struct Along {
         double violation = 0.0, rate = 0.0;
@@ -165,6 +193,10 @@ private:
     double general_bias(const General& general, std::span<const BodyState> bodies) const noexcept;
     void assemble_general(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                           double* second, BlockRight& right) noexcept;
+    void rub(const General& general, std::span<const BodyState> bodies) noexcept;
+    void add_eye(const JointSpec& spec, General& general);
+    void assemble_tyre(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
+                       double* second, BlockRight& right) noexcept;
     double one_sided(double inwards, double violation, double rate, const Regularisation& row,
                      double restitution, State& state) const noexcept;
     double unwrapped(const Joint& joint, double angle, double near) const noexcept;
@@ -176,6 +208,9 @@ private:
     LargeArray<Joint> joints_;
     std::vector<Axial> axials_;
     std::vector<General> generals_;
+    std::vector<EyeRow> eyes_;
+    std::vector<TyreRows> tyres_;
+    std::vector<TyreForm> tyre_forms_;
     std::vector<double> gradient_;  // of one general row: six per body
     std::vector<int> followed_;
     LargeArray<JointBlock> blocks_;

@@ -1,4 +1,5 @@
-// Loads that change from step to step: functions of time, and the fluids bodies float in.
+// Loads that change from step to step: functions of time, springs that hold bodies beside their centres, and the
+// fluids bodies float in.
 //
 // A load is taken at the beginning of a step, where forces that depend on places are; the speed of a motor and the
 // rest of a spring where the step's velocities live: at its end, at mid-step with half_step_velocities; a kinematic
@@ -20,6 +21,9 @@ void RigidSystem::take_loads(const RigidScene& scene) {
         if (drive.kind == DriveKind::load) follows[drive.index] = 1;
     for (std::size_t i = 0; i < floaters_.size(); ++i)
         if (!floaters_[i].empty()) follows[i] = 1;
+    for (const SpringForce& spring : turning_springs_)
+        for (const End& end : spring.ends)
+            if (end.body >= 0) follows[end.body] = 1;
     for (int i = 0; i < bodies(); ++i)
         if (follows[i] && constants_[i].moves()) load_follows_.push_back(i);
     if (load_follows_.empty()) return;
@@ -50,7 +54,9 @@ void RigidSystem::follow_time() {
     }
     if (clock_ && !drives_.empty()) clock_->mark(Stage::follow_time);
     if (!load_follows_.empty()) find_loads(now);
-    if (clock_ && !fluids_.empty()) clock_->mark(Stage::apply_fluids);
+    if (!clock_) return;
+    if (!fluids_.empty()) clock_->mark(Stage::apply_fluids);
+    else if (!turning_springs_.empty()) clock_->mark(Stage::apply_springs);
 }
 
 void RigidSystem::find_loads(double time) {
@@ -64,11 +70,34 @@ void RigidSystem::find_loads(double time) {
         acceleration_[drive.index] += part * drive.linear;
         constants_[drive.index].torque += part * drive.angular;
     }
+    for (const SpringForce& spring : turning_springs_) pull_aside(spring);
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
     for (int i : load_follows_) {
         for (const Fluid& fluid : fluids_) add_fluid(fluid, i, acceleration_[i], constants_[i].torque);
         acceleration_[i] = gravity + (1.0 / constants_[i].mass) * acceleration_[i];
     }
+}
+
+/// Where an end of a spring is, and how fast.
+RigidSystem::SpringEnd RigidSystem::spring_end(const End& end) const noexcept {
+    if (end.body < 0) return {end.point, {}, {}};
+    const BodyState& s = live_.bodies[end.body];
+    const Vec3 centre = position_of(end.body);
+    if (is_zero(end.point)) return {centre, s.velocity, {}};
+    const Vec3 arm = axes(constants_[end.body], s) * end.point;
+    return {centre + arm, s.velocity + cross(s.angular_velocity, arm), arm};
+}
+
+void RigidSystem::pull_aside(const SpringForce& spring) noexcept {
+    const SpringEnd first = spring_end(spring.ends[0]), second = spring_end(spring.ends[1]);
+    const Vec3 pull = spook::pull(spring, second.place - first.place, second.velocity - first.velocity);
+    const auto act = [&](int body, Vec3 force, Vec3 arm) {
+        if (body < 0 || !constants_[body].moves()) return;
+        acceleration_[body] += force;
+        constants_[body].torque += cross(arm, force);
+    };
+    act(spring.ends[0].body, pull, first.arm);
+    act(spring.ends[1].body, -pull, second.arm);
 }
 
 /// Archimedes' force, −ρ V g at the centre of the submerged volume V, and the drag −½ ρ C A |u| u there, u the speed

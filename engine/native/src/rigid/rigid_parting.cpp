@@ -8,7 +8,7 @@
 //              l += I w: no joint and no contact feels it.
 //   energy     Where the kinetic energy E has grown, the velocities are drawn towards the rigid motion that has the
 //              island's momenta: they keep the momenta, and with share s left, E(s) = E_rigid + s² (E − E_rigid).
-//              A body of an island that leans on the ground carries its angular momentum round with it instead.
+//              In an island that leans on the ground each body's angular momentum is shortened instead.
 // Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ namespace {
 constexpr int most_rounds = 10;        // of Newton's method
 constexpr double held = 1e-13;         // of a joint's size: a violation that is rounding
 constexpr double nearly_held = 1e-11;  // and what may be left where rounding is worse
-constexpr double least_share = 0.1;    // of the displacement
+constexpr int most_halvings = 4;       // of the displacement
 constexpr double rounding = 4e-16;     // of the energy
 
 double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
@@ -61,8 +61,8 @@ void RigidSystem::part_bodies() {
     for (int island = 0; island < islands.count; ++island) {
         for (const int k : parted_blocks_[island])
             joints_.overstep(k, live_.bodies, overstep_.data() + overstep_at_[k]);
-        for (double share = 1.0; share > least_share; share *= 0.5) {
-            if (part_island(island, share)) break;
+        for (int halving = 0; halving < most_halvings; ++halving) {
+            if (part_island(island, std::ldexp(1.0, -halving))) break;
             for (const int k : parted_[island]) live_.bodies[tied_[k]] = unparted_[tied_[k]];
         }
     }
@@ -139,9 +139,10 @@ void RigidSystem::keep_spin_energy(int body) {
     const BodyConstants& constants = constants_[body];
     const BodyState& before = unparted_[body];
     BodyState& s = live_.bodies[body];
-    if (constants.particle || !(twice_energy(constants, s) > twice_energy(constants, before))) return;
-    s.angular_momentum =
-        axes(constants, s) * transposed_times(axes(constants, before), before.angular_momentum);
+    const double most = twice_energy(constants, before), now = twice_energy(constants, s);
+    const double linear = constants.mass * dot(s.velocity, s.velocity);
+    if (constants.particle || !(now > most)) return;
+    s.angular_momentum *= std::sqrt((most - linear) / (now - linear));
     refresh(constants, s);
 }
 

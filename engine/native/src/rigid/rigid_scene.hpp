@@ -17,7 +17,7 @@ namespace spook {
 
 SPOOK_NAMED_ENUM(Motion, dynamic, fixed, kinematic)
 SPOOK_NAMED_ENUM(JointKind, distance, lock, ball, hinge, prismatic, universal, point_on_line, cylindrical,
-                 planar, relation, wire)
+                 planar, relation, wire, eye, tyre)
 
 /// How a joint holds rotations: not; all three; the axis only; one axis normal to another.
 enum class Turning : unsigned char { free, held, swing, cross };
@@ -47,7 +47,9 @@ constexpr JointHolds holds_of(JointKind kind) noexcept {
         case JointKind::planar: return {0, 1, Turning::swing};
         case JointKind::distance:
         case JointKind::relation:
-        case JointKind::wire: return {0, 0, Turning::free};
+        case JointKind::wire:
+        case JointKind::eye:
+        case JointKind::tyre: return {0, 0, Turning::free};
     }
     return {0, 0, Turning::free};
 }
@@ -85,6 +87,12 @@ struct JointSpec {
     bool one_sided = false;           // wire: it may go slack
     double restitution = 0.0;         // wire: of the speed at which it snaps taut
 
+    int wire = -1, eye = 0;                  // eye: of which wire, and which of its points
+    double turns = 0.0;                      // eye: of the wire round it, beyond its bend there
+    std::array<double, 2> friction{};        // eye: µ; tyre: µ along and across
+    std::array<double, 2> slip_stiffness{};  // tyre: N per unit of slip along, N/rad of slip angle
+    double radius = 0.0;                     // tyre; its axes: spin axis, normal of the road
+
     double strength = std::numeric_limits<double>::infinity();  // N: it breaks under more; of a relation,
     double torque_strength =
         std::numeric_limits<double>::infinity();  // N m    what one of coefficient 1 feels
@@ -94,12 +102,18 @@ struct JointSpec {
     double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
     double limit_restitution = 0.0;
     double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
+    double spring_force = std::numeric_limits<double>::infinity();  // N, N m: the most it pulls
 };
 
-/// Distances, relations and wires have one row.
+/// Distances, relations, wires and their eyes have one row; a tyre's are its load, and the forces along and across.
 constexpr int row_count(JointKind kind) noexcept {
-    const int rows = holds_of(kind).rows();
+    const int rows = kind == JointKind::tyre ? 3 : holds_of(kind).rows();
     return rows > 0 ? rows : 1;
+}
+
+/// Friction and springs: rows that hold no place.
+constexpr bool gives_way(JointKind kind) noexcept {
+    return kind == JointKind::eye || kind == JointKind::tyre;
 }
 
 inline bool can_break(const JointSpec& joint) noexcept {
@@ -108,7 +122,9 @@ inline bool can_break(const JointSpec& joint) noexcept {
 
 /// Whether some row of the joint has a finite bound.
 inline bool can_let_go(const JointSpec& joint) noexcept {
-    return joint.one_sided || can_break(joint) || (joint.has_motor && std::isfinite(joint.motor_force)) ||
+    return joint.one_sided || gives_way(joint.kind) || can_break(joint) ||
+           (joint.has_motor && std::isfinite(joint.motor_force)) ||
+           (joint.has_spring && std::isfinite(joint.spring_force)) ||
            (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }
 

@@ -266,6 +266,7 @@ void RigidSystem::fill_rows() {
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;
+        if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
     }
 }
 
@@ -331,6 +332,16 @@ void RigidSystem::note_unsettled(int body, double residual) {
     first.residual = std::max(first.residual, residual);
 }
 
+/// Holds sweeps over joints alone to what contacts are held to.
+void RigidSystem::judge_sweeps() {
+    const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
+    residual_ = std::max(residual_, worst.residual);
+    double speed = 0.0;
+    for (const Vec6& v : mixed_.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
+    if (!(worst.residual > method_.unsettled_residual + 1e-6 * speed)) return;
+    note_unsettled(body_of(worst.row), worst.residual);
+}
+
 void RigidSystem::impact() {
     fill_momenta(false);
     fill_rows();
@@ -363,16 +374,18 @@ void RigidSystem::solve_mixed(bool touching) {
         const FrictionReport report =
             solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
         finite = report.finite;
-        residual_ = std::max(residual_, report.residual);
+        judge_sweeps();
         sweeps_ += static_cast<std::uint64_t>(report.sweeps);
     } else {
-        const PivotReport report = pivot_.solve(mixed_);
-        finite = report.finite;
-        rounds_ += static_cast<std::uint64_t>(report.rounds);
+        finite = pivot_rows();
     }
     if (!finite) {
         live_.not_solved = tied_.front();
         return;
+    }
+    if (!following_.empty() && (touching || solver_ == RigidSolver::iterative)) {
+        following_.begin();
+        following_.follow(mixed_, joints_);  // for the next step: here bounds are a step late
     }
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         JointSet::State& state = joints_.states[blocks[k].joint];

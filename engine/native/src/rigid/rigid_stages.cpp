@@ -58,6 +58,10 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                    : is.with_surface < 2
                                        ? "fewer than two bodies have a surface"
                                        : "every pair of surfaces is tied, excluded or cannot move";
+    const auto has = [&scene](JointKind kind) {
+        return std::any_of(scene.joints.begin(), scene.joints.end(),
+                           [kind](const JointSpec& joint) { return joint.kind == kind; });
+    };
     const std::string smooth = is.contacts ? "no two surfaces have friction" : no_contact;
     return choose_each([&](Stage stage) -> StageChoice {
         switch (stage) {
@@ -121,6 +125,14 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
             case Stage::roll:
                 return choose_if(is.rolling, "rolling or turning on the spot meets friction",
                                  is.contacts ? "no surface resists rolling or turning" : no_contact);
+            case Stage::rub_wires:
+                return choose_if(has(JointKind::eye),
+                                 "wires rub where they bend: bounds follow their pull until both agree",
+                                 "no wire has friction");
+            case Stage::roll_tyres:
+                return choose_if(has(JointKind::tyre),
+                                 "tyres slip: bounds follow their load until both agree",
+                                 "there are no tyres");
             case Stage::string_stiffness:
                 return choose_if(method.string_stiffness && is.joints,
                                  "the method treats the geometric stiffness of loaded joints implicitly",

@@ -8,7 +8,8 @@ namespace spook {
 
 namespace {
 
-constexpr std::size_t looking_from = 16;  // bodies: steps of fewer are too short to look at the clock in each
+constexpr std::size_t looking_from =
+    16;  // bodies: steps of fewer that cannot touch are too short for a look at the clock in each
 
 }  // namespace
 
@@ -36,7 +37,7 @@ void RigidSystem::apply_forces() {
 }
 
 void RigidSystem::step() {
-    if (constants_.size() >= looking_from) Watch::look();
+    if (contacts_ || constants_.size() >= looking_from) Watch::look();
     ++live_.step;
     if (clock_) clock_->start();
     if (!live_.velocity_ready) velocity_stage();

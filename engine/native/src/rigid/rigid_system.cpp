@@ -73,7 +73,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         std::vector<char> yielding;
         for (const JointBlock& block : joints_.blocks()) {
             joint_pairs.push_back({block.first, block.second});
-            yielding.push_back(joints_.has_spring(block));
+            yielding.push_back(joints_.has_spring(block) || gives_way(joints_.kind(block.joint)));
         }
         for (const RigidBodySpec& spec : scene.bodies) {
             dynamic.push_back(spec.motion == Motion::dynamic);
@@ -110,6 +110,8 @@ void RigidSystem::take_stages(const RigidScene& scene) {
             stages_.take(Stage::move_surfaces);
         stages_.take(Stage::roll);
     }
+    const bool wires = stages_.take(Stage::rub_wires), tyres = stages_.take(Stage::roll_tyres);
+    following_.take(joints_, wires, tyres);
     if (stages_.take(Stage::assemble_rows)) {
         const bool block = stages_.take(Stage::solve_block), iterative = stages_.take(Stage::solve_iterative);
         const bool pivot = stages_.take(Stage::pivot);
@@ -126,7 +128,9 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     stages_.take(Stage::follow_time);
     stages_.take(Stage::apply_fluids);
     if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
-    if (stages_.take(Stage::apply_springs)) springs_ = scene.springs;
+    if (stages_.take(Stage::apply_springs))
+        for (const SpringForce& spring : scene.springs)
+            (spring.turns() ? turning_springs_ : springs_).push_back(spring);
     stages_.take(Stage::string_stiffness);
     stages_.take(Stage::half_step);
     stages_.take(Stage::correct_curvature);
@@ -260,6 +264,8 @@ double RigidSystem::potential_energy() const noexcept {
     }
     for (const SpringForce& spring : springs_)
         sum += energy(spring, place(spring.ends[1]) - place(spring.ends[0]));
+    for (const SpringForce& spring : turning_springs_)
+        sum += energy(spring, spring_end(spring.ends[1]).place - spring_end(spring.ends[0]).place);
     return sum + joints_.spring_energy(live_.bodies);
 }
 
@@ -319,8 +325,9 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     std::int64_t moving = 0;
     for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;
-    report.counters["force_evaluations"] = substeps * (static_cast<std::int64_t>(springs_.size()) +
-                                                       static_cast<std::int64_t>(fields_.size()) * moving);
+    report.counters["force_evaluations"] =
+        substeps * (static_cast<std::int64_t>(springs_.size() + turning_springs_.size()) +
+                    static_cast<std::int64_t>(fields_.size()) * moving);
     report.residual = residual_;
     if (const Unsettled& left = live_.unsettled; left.body >= 0) {
         report.residual = std::max(report.residual, left.residual);

@@ -13,6 +13,7 @@
 #include "linear/block_ldlt.hpp"
 #include "linear/dense_rows.hpp"
 #include "linear/redundant_rows.hpp"
+#include "rigid/following_bounds.hpp"
 #include "rigid/joint_set.hpp"
 #include "rigid/joint_tree.hpp"
 #include "rigid/locked_tree.hpp"
@@ -150,6 +151,11 @@ private:
     void take_loads(const RigidScene& scene);
     void follow_time();
     void find_loads(double time);
+    struct SpringEnd {
+        Vec3 place, velocity, arm;  // the arm in world axes
+    };
+    SpringEnd spring_end(const End& end) const noexcept;
+    void pull_aside(const SpringForce& spring) noexcept;
     void add_fluid(const Fluid& fluid, int body, Vec3& force, Vec3& torque) const noexcept;
     void stiffen();
     void find_tensions();
@@ -207,6 +213,7 @@ private:
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual);
+    void judge_sweeps();
     void solve_block();
     void solve_locked();
     void deliver_locked();
@@ -223,6 +230,7 @@ private:
     int body_of(int row_block) const noexcept;
     int busiest_block() const noexcept;
     void solve_mixed(bool touching);
+    bool pivot_rows();
     // rigid_parting.cpp: overlapping bodies are parted by positions
     void part_bodies();
     bool part_island(int island, double share);
@@ -251,8 +259,8 @@ private:
     StageList stages_;
     LargeArray<BodyConstants> constants_;
     LargeArray<BodyState> start_;
-    std::vector<Vec3> acceleration_;  // gravity and loads
-    std::vector<SpringForce> springs_;
+    std::vector<Vec3> acceleration_;                      // gravity and loads
+    std::vector<SpringForce> springs_, turning_springs_;  // between centres; beside them
     std::vector<CentralField> fields_;
     std::vector<TimeDrive> drives_;
     std::vector<Fluid> fluids_;
@@ -294,6 +302,7 @@ private:
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_;
     PivotSolver pivot_;
+    FollowingBounds following_;
     std::optional<ContactStage> contacts_, fresh_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;

@@ -5,7 +5,8 @@
 
 namespace spook {
 
-/// One end of a spring or distance: a body by index, or (body < 0) a point of the world.
+/// One end of a spring or distance: a body by index, or (body < 0) a point of the world. A spring on a rigid body
+/// holds it at `point` of the body's axes, from its centre.
 struct End {
     int body = -1;
     Vec3 point;  // m
@@ -14,6 +15,11 @@ struct End {
 struct SpringForce {
     End ends[2];
     double stiffness = 0.0, rest_length = 0.0, viscosity = 0.0;  // N/m, m, N s/m
+    /// Whether it holds some body beside its centre, and so turns it.
+    bool turns() const noexcept {
+        return (ends[0].body >= 0 && !is_zero(ends[0].point)) ||
+               (ends[1].body >= 0 && !is_zero(ends[1].point));
+    }
 };
 
 struct CentralField {

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <ctime>
 
+#include "linear/pieces.hpp"
+
 namespace spook {
 
 /// Seconds of processor time this thread has had; 0 where the system has no such clock.
@@ -28,7 +30,10 @@ class Watch {
 public:
     static constexpr double patience = 0.02;  // s: work that takes longer is not done without a look
 
-    explicit Watch(double time_limit) noexcept : limit_(time_limit) { current_ = this; }
+    explicit Watch(double time_limit) noexcept : limit_(time_limit) {
+        current_ = this;
+        between_pieces = look;
+    }
     ~Watch() { current_ = nullptr; }
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;

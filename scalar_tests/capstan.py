@@ -1,0 +1,330 @@
+"""How hard does a wire hold on a drum that does not turn, and how much does a winch lift?"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    ConstraintForce,
+    Cylinder,
+    Energy,
+    Final,
+    Hinge,
+    Maximum,
+    MaximumAbsolute,
+    Method,
+    Motor,
+    Particle,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+    Velocity,
+    Wire,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+GRAVITY = 9.81  # m/s²
+FRICTION, TURNS = 0.3, 1.0  # µ; whole turns beyond the half one by which the wire bends
+WRAP = math.pi + 2.0 * math.pi * TURNS  # rad
+HOLDS = math.exp(FRICTION * WRAP)  # ratio of the pulls
+LIGHT, HEAVY = 1.0, 40.0  # kg: more than it holds
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 0.5  # s
+SLIPS = (HEAVY - HOLDS * LIGHT) * GRAVITY / (HEAVY + HOLDS * LIGHT)  # m/s²
+DRUM, MOMENT, LOAD = 0.2, 0.08, 10.0  # m, kg m², kg: of the winch
+SPEED, TORQUE = 2.0, 15.0  # rad/s, N m: less than holds the load
+SINKS = (LOAD * GRAVITY * DRUM - TORQUE) / (LOAD * DRUM + MOMENT / DRUM)  # m/s²
+
+
+def bollard(heavy: float = HEAVY, turns: float = TURNS) -> Scene:
+    """Two weights on a wire round a fixed bar."""
+    ends = {"light": (0.0, 0.0, -1.0), "heavy": (0.1, 0.0, -0.5)}
+    wire = Wire(
+        name="wire",
+        through=(
+            ("light", ends["light"]),
+            (WORLD, (0.0, 0.0, 5.0)),
+            (WORLD, (0.1, 0.0, 5.0)),
+            ("heavy", ends["heavy"]),
+        ),
+        friction=FRICTION,
+        turns=(turns, 0.0),
+        compliance=0.0,
+    )
+    weights = (
+        Particle(name="light", mass=LIGHT, position=ends["light"]),
+        Particle(name="heavy", mass=heavy, position=ends["heavy"]),
+    )
+    return Scene(bodies=weights, constraints=(wire,), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def winch(max_force: float | None = None) -> Scene:
+    """A load on a drum with a motor."""
+    top = (DRUM, 0.0, 5.0)
+    drum = RigidBody(
+        name="drum",
+        mass=4.0,
+        inertia=(MOMENT, MOMENT, MOMENT),
+        shape=Cylinder(DRUM, 0.3),
+        orientation=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0),
+        position=(0.0, 0.0, 5.0),
+    )
+    load = Particle(name="load", mass=LOAD, position=(DRUM, 0.0, 0.0))
+    axle = Hinge(
+        name="axle",
+        between=(WORLD, "drum"),
+        axis=(0.0, 1.0, 0.0),
+        compliance=0.0,
+        motor=Motor(speed=SPEED, max_force=max_force),
+    )
+    wire = Wire(
+        name="wire",
+        through=(("load", load.position), (WORLD, top)),
+        wound=(("axle", DRUM),),
+        compliance=0.0,
+    )
+    return Scene(bodies=(drum, load), constraints=(axle, wire), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+
+
+def slip(simulate: Simulate) -> dict[str, float]:
+    """The heavy weight slips down, and the two pulls."""
+    observe: dict[str, Observable] = {
+        "v": Trace(quantity=Velocity("heavy")),
+        "pull": Final(quantity=ConstraintForce("wire")),
+        "energy": Trace(quantity=Energy()),
+    }
+    result = simulate(bollard(), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    fallen = -np.diff(result["v"][:, 2]) / TIME_STEP
+    behind = HEAVY * (GRAVITY - fallen[-1])
+    held: dict[str, Observable] = {"v": MaximumAbsolute(quantity=Velocity())}
+    rests = simulate(bollard(0.99 * HOLDS * LIGHT), time_step=TIME_STEP, duration=DURATION, observe=held)
+    return {
+        "acceleration_error": float(np.abs(fallen / SLIPS - 1.0).max()),
+        "ratio_error": float(behind / float(result["pull"]) / HOLDS - 1.0),
+        "held_motion": float(rests["v"].max()),
+        "gain": max(0.0, float(np.diff(result["energy"]).max())),
+    }
+
+
+def lift(simulate: Simulate) -> dict[str, float]:
+    """The winch at its speed, and with less torque than holds the load."""
+    observe: dict[str, Observable] = {
+        "v": Final(quantity=Velocity("load")),
+        "pull": Final(quantity=ConstraintForce("wire")),
+    }
+    lifts = simulate(winch(), time_step=TIME_STEP, duration=1.0, observe=observe)
+    sinks = simulate(winch(TORQUE), time_step=TIME_STEP, duration=1.0, observe=observe)
+    return {
+        "speed_error": float(lifts["v"][2]) / (DRUM * SPEED) - 1.0,
+        "pull_error": float(lifts["pull"]) / (LOAD * GRAVITY) - 1.0,
+        "sinking_error": -float(sinks["v"][2]) / SINKS - 1.0,
+        "sinking_pull": float(sinks["pull"]) / (LOAD * (GRAVITY - SINKS)) - 1.0,
+    }
+
+
+def holds(simulate: Simulate, heavy: float) -> bool:
+    """Whether a weight of `heavy` [kg] is held."""
+    observe = {"v": Maximum(quantity=Velocity("light"))}
+    result = simulate(bollard(heavy), time_step=TIME_STEP, duration=0.1, observe=observe)
+    return result.completed and float(result["v"][2]) < 1e-9
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest weight that one kilogram holds."""
+    return break_point(
+        functools.partial(holds, simulate), 0.5 * HOLDS * LIGHT, 2.0 * HOLDS * LIGHT, resolution=1e-4
+    )
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Place of the heavy weight after half a second against ½ a t² [m]."""
+    observe = {"x": Final(quantity=Position("heavy"))}
+    result = simulate(bollard(), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return -0.5 - float(result["x"][2]) - 0.5 * SLIPS * DURATION**2
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(bollard(), time_step=time_step, duration=DURATION, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Pull behind over pull before while the wire slips, against the angle round the bar."""
+    turns = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
+    found = []
+    for turn in turns:
+        heavy = 1.2 * math.exp(FRICTION * (math.pi + 2.0 * math.pi * turn)) * LIGHT
+        observe: dict[str, Observable] = {
+            "v": Trace(quantity=Velocity("heavy")),
+            "pull": Final(quantity=ConstraintForce("wire")),
+        }
+        result = simulate(bollard(heavy, turn), time_step=TIME_STEP, duration=0.1, observe=observe)
+        fallen = -float(result["v"][-1, 2] - result["v"][-2, 2]) / TIME_STEP
+        found.append(heavy * (GRAVITY - fallen) / float(result["pull"]))
+    angle = np.linspace(1.0, 13.0, 61)
+    return Drawing(
+        curves=(
+            line("slipping wire", (math.pi + 2.0 * math.pi * turn for turn in turns), found, "points"),
+            line("e^(µφ)", angle, np.exp(FRICTION * angle), "reference"),
+        ),
+        x_label="angle round the bar [rad]",
+        y_label="ratio of the pulls",
+        y_scale="log",
+        note=f"One and a half turns with µ = {told(FRICTION)} hold {told(HOLDS, 4)} times the pull in front.",
+    )
+
+
+STEADY = (
+    "a steady force is exact in the velocities of the discrete step; the bound is found to 1e-11 of the pull"
+)
+LAST_SPIN = SINKS / DRUM  # rad/s, after a second
+SHARE = (MOMENT / DRUM**2) / (LOAD + MOMENT / DRUM**2)  # of the drum in what moves
+LIFTED = (TIME_STEP * SPEED) ** 2 / 6.0
+SUNK = SHARE * (TIME_STEP * LAST_SPIN) ** 2 / 6.0
+TURNS_FASTER = (
+    "the drum turns by φ a step with sin φ = h ω, so the load goes (h ω)²/6 faster than r ω, "
+    f"{told(LIFTED)} at 2 rad/s"
+)
+SINKS_FASTER = (
+    "the same at a t/r, in the share I/r² of the moving mass m + I/r² that turns: "
+    f"{told(SUNK)} at the end; the speed's error grows with t², the acceleration's is three times as large"
+)
+
+TEST = ScalarTest(
+    title="Capstan and winch",
+    question="Does a wire round a bar hold e^(µφ) times the pull in front, and does a winch lift what its torque can?",
+    why="Ships are moored and loads are lowered by a few turns of rope. The pull grows exponentially along the wrap: a friction "
+    "bound that is a step late, or taken from one side alone, lets go far too early or never.",
+    model="A wire runs one and a half times round a fixed bar without size, with a kilogram on one end and a heavier weight on "
+    "the other. A drum with a motor winds in a wire with a load.",
+    parameters=(
+        ("time step", "1/60 s"),
+        ("bar", "µ = 0.3, half a turn by the bend and a whole one more"),
+        ("weights", "1 kg and 40 kg"),
+        ("winch", "10 kg on a drum of 0.2 m and 0.08 kg m²; 2 rad/s, or at most 15 N m"),
+        ("gravity", "9.81 m/s²"),
+    ),
+    theory=(
+        "A wire about to slip: dT/dφ = µ T, so T₂ = T₁ e^(µφ); T₂/T₁ lies between e^(−µφ) and e^(µφ).",
+        "Slipping: a = (M − e^(µφ) m) g/(M + e^(µφ) m).",
+        "Winch: v = r ω and T = m g; with less torque, a = (m g r − τ)/(m r + I/r) downwards.",
+        "In the step: one row per bar keeps the wire from passing, with |T₂ − T₁| ≤ tanh(µφ/2) (T₁ + T₂).",
+    ),
+    reference="L. Euler 1762, J. A. Eytelwein 1808; mechanics in closed form.",
+    conclusion="Green: the wire holds what it must and slips where it must. Red: friction of wires is lost or made up.",
+    source="ours; wires are asked for in the thesis, section 5.4",
+    measurements=(
+        ask(
+            slip,
+            (
+                error("acceleration_error", "largest relative error of the acceleration", "1", 1e-9, STEADY),
+                error(
+                    "ratio_error",
+                    "relative error of the ratio of the pulls while it slips",
+                    "1",
+                    1e-9,
+                    STEADY,
+                    "companion",
+                ),
+                error(
+                    "held_motion",
+                    "largest speed of 99 % of what it holds",
+                    "m/s",
+                    1e-9,
+                    "nothing moves",
+                    "companion",
+                ),
+                error(
+                    "gain",
+                    "largest gain of energy in a step",
+                    "J",
+                    1e-9,
+                    "friction takes energy",
+                    "companion",
+                ),
+            ),
+            "round a bar",
+            TIME_STEP,
+        ),
+        ask(
+            lift,
+            (
+                error(
+                    "speed_error",
+                    "relative error of the speed of the load",
+                    "1",
+                    1.05 * LIFTED,
+                    TURNS_FASTER,
+                ),
+                error("pull_error", "relative error of the wire's pull", "1", 1e-9, STEADY, "companion"),
+                error(
+                    "sinking_error",
+                    "relative error of the speed after a second with too little torque",
+                    "1",
+                    1.05 * SUNK,
+                    SINKS_FASTER,
+                    "companion",
+                ),
+                error(
+                    "sinking_pull",
+                    "relative error of the pull then",
+                    "1",
+                    1.1 * 3.0 * SUNK * SINKS / (GRAVITY - SINKS),
+                    SINKS_FASTER + "; T = m (g − a)",
+                    "companion",
+                ),
+            ),
+            "winch",
+            TIME_STEP,
+            "winch",
+        ),
+    ),
+    example=lambda: Example(scene=winch(), time_step=TIME_STEP, duration=2.0),
+    stability=(
+        StabilityStudy(
+            name="holding",
+            title="Heaviest weight that a kilogram holds",
+            configuration="plain",
+            definition="nothing moves in a tenth of a second",
+            study=heaviest,
+            unit="kg",
+            expected=(0.9999 * HOLDS * LIGHT, 1.0001 * HOLDS * LIGHT),
+            expected_source="e^(0.3 · 3π) = 16.90 kg; the search ends within a part in ten thousand",
+        ),
+    ),
+    figures=(Figure(name="ratio", title="Pull behind over pull in front", draw=draw),),
+    ladders=(
+        Ladder(
+            name="slip",
+            description="way of the heavy weight in half a second against ½ a t²",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=1.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-2,
+            target_seconds=0.01,
+        ),
+    ),
+)

@@ -1,0 +1,350 @@
+"""Does a rope of a thousand links keep its momenta, pull as it must, and cost no more a link than a short one?"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    AngularMomentum,
+    Ball,
+    Box,
+    Capsule,
+    ConstraintForce,
+    Energy,
+    Final,
+    Hinge,
+    MaximumAbsolute,
+    Method,
+    Momentum,
+    Result,
+    RigidBody,
+    Scene,
+    Shape,
+    Sphere,
+    Trace,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+LENGTH, MASS, THICK = 10.0, 5.0, 0.004  # m, kg, m: of the whole rope, however many links it has
+LONG, SHORT = 1000, 125  # links
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 0.5  # s
+# Spun so slowly that T h²/(m l) = (w h N)²/8 stays below 0.15: from 0.3 on rigid links under tension run away.
+SPIN = 0.06  # rad/s
+GRAVITY = 9.81  # m/s²
+THROWN, TUMBLE = (2.0, 0.5, 4.0), (1.0, 3.0, 0.5)  # m/s, rad/s: the ragdoll
+FLIGHT = 0.5  # s
+
+
+def middle_pull() -> float:
+    """Tension [N] in the middle of a rope that turns about it as a whole: Σ m w² x over one half."""
+    return 0.5 * MASS * SPIN**2 * 0.25 * LENGTH
+
+
+@functools.cache
+def rope(count: int) -> Scene:
+    """Thin rods on ball joints in a straight line along x, which turns about its middle; nothing else acts."""
+    length, mass = LENGTH / count, MASS / count
+    across = mass * length**2 / 12.0
+    links = []
+    for k in range(count):
+        x = (k + 0.5) * length - 0.5 * LENGTH
+        links.append(
+            RigidBody(
+                name=f"link {k}",
+                mass=mass,
+                shape=Capsule(0.5 * THICK, length - THICK),
+                inertia=(across, across, 0.5 * mass * THICK**2),
+                position=(x, 0.0, 0.0),
+                orientation=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0),
+                velocity=(0.0, SPIN * x, 0.0),
+                angular_velocity=(0.0, 0.0, SPIN),
+            )
+        )
+    joints = [
+        Ball(
+            name=f"joint {k}",
+            between=(f"link {k - 1}", f"link {k}"),
+            at=(k * length - 0.5 * LENGTH, 0.0, 0.0),
+            compliance=0.0,
+        )
+        for k in range(1, count)
+    ]
+    return Scene(bodies=tuple(links), constraints=tuple(joints), contacts=False)
+
+
+BODIES: dict[str, tuple[Shape, float, tuple[float, float, float]]] = {  # kg, m
+    "pelvis": (Box((0.2, 0.3, 0.2)), 12.0, (0.0, 0.0, 0.0)),
+    "chest": (Box((0.2, 0.35, 0.4)), 25.0, (0.0, 0.0, 0.35)),
+    "head": (Sphere(0.12), 5.0, (0.0, 0.0, 0.72)),
+    **{
+        f"{side} {part}": (shape, mass, (0.0, sign * y, z))
+        for side, sign in (("left", 1.0), ("right", -1.0))
+        for part, shape, mass, y, z in (
+            ("arm", Capsule(0.05, 0.25), 2.5, 0.25, 0.35),
+            ("forearm", Capsule(0.04, 0.22), 1.5, 0.25, 0.03),
+            ("thigh", Capsule(0.08, 0.32), 9.0, 0.1, -0.3),
+            ("shin", Capsule(0.05, 0.35), 4.0, 0.1, -0.75),
+        )
+    },
+}
+BALLS = {
+    "waist": ("pelvis", "chest", (0.0, 0.0, 0.12)),
+    "neck": ("chest", "head", (0.0, 0.0, 0.58)),
+    **{
+        f"{side} {name}": (first, f"{side} {second}", (0.0, sign * y, z))
+        for side, sign in (("left", 1.0), ("right", -1.0))
+        for name, first, second, y, z in (
+            ("shoulder", "chest", "arm", 0.25, 0.52),
+            ("hip", "pelvis", "thigh", 0.1, -0.1),
+        )
+    },
+}
+HINGES = {
+    f"{side} {name}": (f"{side} {first}", f"{side} {second}", (0.0, sign * y, z))
+    for side, sign in (("left", 1.0), ("right", -1.0))
+    for name, first, second, y, z in (
+        ("elbow", "arm", "forearm", 0.25, 0.18),
+        ("knee", "thigh", "shin", 0.1, -0.52),
+    )
+}
+DOLL = math.fsum(mass for _, mass, _ in BODIES.values())  # kg
+
+
+def ragdoll() -> Scene:
+    """A body of eleven parts, thrown and tumbling as a whole."""
+    parts = []
+    for name, (shape, mass, place) in BODIES.items():
+        turned = np.cross(TUMBLE, place) + THROWN
+        parts.append(
+            RigidBody(
+                name=name,
+                mass=mass,
+                shape=shape,
+                position=place,
+                velocity=(float(turned[0]), float(turned[1]), float(turned[2])),
+                angular_velocity=TUMBLE,
+            )
+        )
+    balls = [
+        Ball(name=name, between=(first, second), at=at, compliance=0.0)
+        for name, (first, second, at) in BALLS.items()
+    ]
+    hinges = [
+        Hinge(name=name, between=(first, second), at=at, axis=(0.0, 1.0, 0.0), compliance=0.0)
+        for name, (first, second, at) in HINGES.items()
+    ]
+    return Scene(
+        bodies=tuple(parts),
+        constraints=(*balls, *hinges),
+        gravity=(0.0, 0.0, -GRAVITY),
+        contacts=False,
+    )
+
+
+def spin(simulate: Simulate) -> dict[str, float]:
+    """Half a second of the long rope."""
+    observe: dict[str, Observable] = {
+        "p": MaximumAbsolute(quantity=Momentum()),
+        "L": Trace(quantity=AngularMomentum()),
+        "E": Trace(quantity=Energy()),
+        "pull": Final(quantity=ConstraintForce(f"joint {LONG // 2}")),
+    }
+    long = simulate(rope(LONG), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    turning, energy = long["L"][:, 2], long["E"]
+    whole = MASS * LENGTH**2 / 12.0 * SPIN
+    return {
+        "pull_error": float(np.linalg.norm(long["pull"][:3])) / middle_pull() - 1.0,
+        "momentum_error": float(long["p"].max()) / (0.25 * MASS * SPIN * LENGTH),
+        "turning_error": float(np.abs(turning / turning[0] - 1.0).max()),
+        "energy_error": float(np.abs(energy / (0.5 * whole * SPIN) - 1.0).max()),
+    }
+
+
+def cost(simulate: Simulate) -> dict[str, float]:
+    """Exact work a link of the long rope over that of the short one."""
+    work = []
+    for count in (LONG, SHORT):
+        result = simulate(rope(count), time_step=TIME_STEP, steps=3)
+        work.append(result.counters.get("block_operations", math.nan) / count)
+    return {"cost_error": work[0] / work[1] - 1.0}
+
+
+def throw(simulate: Simulate) -> dict[str, float]:
+    """The ragdoll in flight."""
+    observe: dict[str, Observable] = {
+        "p": Trace(quantity=Momentum()),
+        "L": Trace(quantity=AngularMomentum()),
+    }
+    asked = ragdoll()
+    result = simulate(asked, time_step=TIME_STEP, duration=FLIGHT, observe=observe)
+    p, turning, time = result["p"], result["L"], result.sample_times["p"]
+    expected = p[0] + np.outer(time, (0.0, 0.0, -DOLL * GRAVITY))
+    # About the origin gravity turns it by −(Σ m x) × g: with v before x, Σ m x is p h ahead of a step.
+    h = TIME_STEP
+    places = np.array([sum(mass * place[k] for _, mass, place in BODIES.values()) for k in range(3)])
+    sums = places + h * np.vstack((np.zeros(3), np.cumsum(p[1:], axis=0)))
+    turned = turning[0] + h * np.vstack(
+        (np.zeros(3), np.cumsum(np.cross(sums[:-1], (0.0, 0.0, -GRAVITY)), axis=0))
+    )
+    return {
+        "momentum_error": float(np.abs(p - expected).max() / np.abs(p).max()),
+        "turning_error": float(np.abs(turning - turned).max() / np.abs(turning).max()),
+    }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest relative error of the energy of the ragdoll in half a second."""
+    observe = {"E": MaximumAbsolute(quantity=Energy(), from_start=True)}
+    asked = ragdoll()
+    result = simulate(asked, time_step=time_step, duration=FLIGHT, method=method, observe=observe)
+    return float(result["E"]) / (0.5 * DOLL * float(np.dot(THROWN, THROWN)))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same flight with nothing observed."""
+    return simulate(ragdoll(), time_step=time_step, duration=FLIGHT, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Work a step and link against the number of links."""
+    counts, works = [16, 32, 64, 125, 250, 500], []
+    for count in counts:
+        result = simulate(rope(count), time_step=TIME_STEP, steps=3)
+        works.append(result.counters.get("block_operations", 0) / (3.0 * count))
+    return Drawing(
+        curves=(line("work per link", counts, works, "points"),),
+        x_label="links",
+        y_label="block operations a step and link",
+        x_scale="log",
+        note=f"A link costs what it costs, however many there are: {told(works[-1], 3)} with {counts[-1]}.",
+    )
+
+
+# A steady circle on rows with damping τ = 2h is longer by (w h)²/2 (1 + 2τ/h)/2: every link stretches by that part, the spin
+# falls by twice and the energy with it, the pull by four less one.
+STRETCH = 1.25 * (SPIN * TIME_STEP) ** 2
+TURNS = (
+    f"rows are taken where a step starts: every link is {told(STRETCH)} of its length too long, (1 + 2θ)/4 (w h)² with θ = 2, so "
+    "the spin falls by twice that, the pull by three times"
+)
+ROUNDING = "equal and opposite, about the same point: rounding of a thousand sums"
+
+TEST = ScalarTest(
+    title="Rope and ragdoll",
+    question="Does a rope of a thousand links keep its momenta, pull as it must, and cost no more a link than a short one?",
+    why="Cranes and tethers are long chains. A solver that fills in costs N³ and a tolerance that adds up along the chain "
+    "loses its ends; a ragdoll shows the same where limbs branch.",
+    model="A straight rope of thin rods on ball joints turns about its middle in empty space. A body of eleven parts on ball "
+    "joints and hinges is thrown.",
+    parameters=(
+        ("time step", "1/60 s"),
+        ("rope", "10 m, 5 kg, 1000 links; 125 for the cost; 0.06 rad/s"),
+        ("ragdoll", f"{DOLL:g} kg, 3 m/s ahead and up, tumbling"),
+        ("gravity", "none; 9.81 m/s² for the ragdoll"),
+    ),
+    theory=(
+        "The rope turns as one: tension in the middle (m/2) w² (L/4).",
+        "Momentum stays, or grows with m g t; about the origin gravity turns by Σ m x × g, summed with the step's places.",
+        "Rows of a chain have no fill, one elimination a link: work grows with N.",
+    ),
+    reference="Closed forms; counts of block operations, the same on every machine.",
+    conclusion="Green: chains are held in one go, link by link. Red: momenta leak, the pull is wrong, or cost grows faster.",
+    source="ours; chains are asked for in the thesis, sections 1.2 and 5.4",
+    measurements=(
+        ask(
+            spin,
+            (
+                error("pull_error", "relative error of the tension in the middle", "1", 3.3 * STRETCH, TURNS),
+                error(
+                    "momentum_error",
+                    "largest momentum over that of one half",
+                    "1",
+                    1e-9,
+                    ROUNDING,
+                    "companion",
+                ),
+                error(
+                    "turning_error",
+                    "largest relative change of the angular momentum",
+                    "1",
+                    1e-9,
+                    ROUNDING,
+                    "companion",
+                ),
+                error(
+                    "energy_error",
+                    "largest relative change of the energy",
+                    "1",
+                    2.2 * STRETCH,
+                    TURNS,
+                    "companion",
+                ),
+            ),
+            "a thousand links",
+            TIME_STEP,
+        ),
+        ask(
+            cost,
+            (
+                error(
+                    "cost_error",
+                    "work a link over that of 125 links, minus one",
+                    "1",
+                    1.0 / SHORT,
+                    "a link costs the same; the ends have one joint less, less than a link's work in 125",
+                ),
+            ),
+            "cost per link",
+            TIME_STEP,
+            "cost",
+        ),
+        ask(
+            throw,
+            (
+                error("momentum_error", "relative error of the momentum", "1", 1e-12, ROUNDING),
+                error(
+                    "turning_error",
+                    "relative error of the angular momentum",
+                    "1",
+                    1e-12,
+                    ROUNDING,
+                    "companion",
+                ),
+            ),
+            "ragdoll",
+            TIME_STEP,
+            "ragdoll",
+        ),
+    ),
+    example=lambda: Example(scene=ragdoll(), time_step=TIME_STEP, duration=1.0),
+    figures=(Figure(name="cost", title="Work per link", draw=draw),),
+    ladders=(
+        Ladder(
+            name="energy",
+            description="largest relative error of the ragdoll's energy in half a second",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=1.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-2,
+            target_seconds=0.05,
+        ),
+    ),
+)

@@ -1,0 +1,235 @@
+"""Does a vehicle on its springs bounce and pitch at the frequencies of mechanics?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    Box,
+    Final,
+    MaximumAbsolute,
+    Method,
+    Orientation,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Spring,
+    Trace,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+GRAVITY = 9.81  # m/s²
+MASS, PITCHING = 1000.0, 1500.0  # kg, kg m² about y
+FRONT, REAR, TRACK = 1.2, 1.5, 1.5  # m: axles before and behind the centre; between left and right
+FRONT_SPRING = 25_000.0  # N/m, each of two
+REAR_SPRING = FRONT_SPRING * FRONT / REAR  # then bouncing does not pitch
+LENGTH = 0.6  # m, of the springs under load
+BOUNCE = math.sqrt(2.0 * (FRONT_SPRING + REAR_SPRING) / MASS)  # rad/s
+PITCH = math.sqrt(2.0 * (FRONT_SPRING * FRONT**2 + REAR_SPRING * REAR**2) / PITCHING)
+HEAVE, TILT = 0.01, 1e-3  # m, rad: how far it is let go from rest
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 2.0  # s
+CORNERS = {
+    "front left": (FRONT, 1.0, FRONT_SPRING),
+    "front right": (FRONT, -1.0, FRONT_SPRING),
+    "rear left": (-REAR, 1.0, REAR_SPRING),
+    "rear right": (-REAR, -1.0, REAR_SPRING),
+}
+
+
+def scene(heave: float = 0.0, tilt: float = 0.0) -> Scene:
+    """A chassis on four upright springs at the height of its centre, let go `heave` [m] too high and turned by `tilt`."""
+    chassis = RigidBody(
+        name="chassis",
+        mass=MASS,
+        inertia=(400.0, PITCHING, 1700.0),
+        shape=Box((3.6, 1.2, 0.5)),
+        position=(0.0, 0.0, LENGTH + heave),
+        orientation=(math.cos(0.5 * tilt), 0.0, math.sin(0.5 * tilt), 0.0),
+    )
+    springs = []
+    for name, (x, side, stiffness) in CORNERS.items():
+        carried = 0.5 * MASS * GRAVITY * (REAR if x > 0.0 else FRONT) / (FRONT + REAR)  # N
+        springs.append(
+            Spring(
+                name=name,
+                between=((x, 0.5 * side * TRACK, 0.0), "chassis"),
+                anchors=((0.0, 0.0, 0.0), (x, 0.5 * side * TRACK, 0.0)),
+                stiffness=stiffness,
+                rest_length=LENGTH + carried / stiffness,
+            )
+        )
+    return Scene(bodies=(chassis,), forces=tuple(springs), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+
+
+def phase(values: np.ndarray) -> float:
+    """Turn per sample [rad] of a swing about zero: x₊ + x₋ = 2 x cos φ, by least squares."""
+    inner = values[1:-1]
+    cosine = 0.5 * float(inner @ (values[2:] + values[:-2])) / float(inner @ inner)
+    return math.acos(cosine)
+
+
+def swings(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+    """Frequencies [rad/s] of bounce and pitch."""
+    observe: dict[str, Observable] = {
+        "x": Trace(quantity=Position("chassis")),
+        "q": Trace(quantity=Orientation("chassis")),
+    }
+    up = simulate(scene(heave=HEAVE), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    turn = simulate(scene(tilt=TILT), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return {
+        "bounce": phase(up["x"][:, 2] - LENGTH) / time_step,
+        "pitch": phase(2.0 * turn["q"][:, 2]) / time_step,
+    }
+
+
+def discrete(frequency: float, time_step: float) -> float:
+    """What the symplectic step makes of a spring's frequency [rad/s]: cos(φ) = 1 − (h ω)²/2."""
+    return math.acos(1.0 - 0.5 * (time_step * frequency) ** 2) / time_step
+
+
+def measure(simulate: Simulate) -> dict[str, float]:
+    """Frequencies, and whether what is let go at rest stays there."""
+    found = swings(simulate, TIME_STEP)
+    observe: dict[str, Observable] = {
+        "x": MaximumAbsolute(quantity=Position("chassis"), from_start=True),
+        "q": Final(quantity=Orientation("chassis")),
+    }
+    rest = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    both = simulate(scene(heave=HEAVE), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    return {
+        "bounce_error": found["bounce"] / discrete(BOUNCE, TIME_STEP) - 1.0,
+        "pitch_error": found["pitch"] / discrete(PITCH, TIME_STEP) - 1.0,
+        "continuous_error": found["bounce"] / BOUNCE - 1.0,
+        "sunk": float(np.abs(rest["x"]).max()),
+        "coupled": float(np.abs(both["q"][1:]).max()),
+    }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Relative error of the bounce against √(Σk/m)."""
+    return swings(simulate, time_step, method)["bounce"] / BOUNCE - 1.0
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """Its bounce with nothing observed."""
+    return simulate(scene(heave=HEAVE), time_step=time_step, duration=DURATION, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Height and nose of the chassis, let go from rest."""
+    observe: dict[str, Observable] = {
+        "x": Trace(quantity=Position("chassis")),
+        "q": Trace(quantity=Orientation("chassis")),
+    }
+    result = simulate(scene(HEAVE, 5.0 * TILT), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    time = result.sample_times["x"]
+    smooth = np.linspace(0.0, DURATION, 201)
+    return Drawing(
+        curves=(
+            line("bounce [cm]", time, 100.0 * (result["x"][:, 2] - LENGTH), "points"),
+            line("√(Σk/m)", smooth, 100.0 * HEAVE * np.cos(BOUNCE * smooth), "reference"),
+            line("pitch [mrad]", time, 2000.0 * result["q"][:, 2] / 5.0, "points"),
+            line("√(Σk x²/I)", smooth, np.cos(PITCH * smooth), "reference"),
+        ),
+        x_label="time [s]",
+        y_label="cm, and fifths of mrad",
+        note=f"It bounces at {told(BOUNCE / (2.0 * math.pi), 3)} Hz and pitches at {told(PITCH / (2.0 * math.pi), 3)} Hz.",
+    )
+
+
+SLOW = (TIME_STEP * BOUNCE) ** 2 / 24.0
+TEST = ScalarTest(
+    title="Suspension",
+    question="Does a vehicle on its springs bounce and pitch at the frequencies of mechanics?",
+    why="Ride comfort is these two frequencies. They come out wrong when springs pull at a body's centre instead of at its "
+    "corners, or when their turning moment is lost.",
+    model="A rigid chassis on four upright springs that hold it at its corners, at the height of its centre, lifted or turned "
+    "a little and let go.",
+    parameters=(
+        ("time step", "1/60 s"),
+        ("chassis", "1000 kg, 1500 kg m² about its axles' direction"),
+        ("axles", "1.2 m before and 1.5 m behind the centre"),
+        ("springs", "25 kN/m in front, 20 kN/m behind, each of two"),
+        ("let go", "1 cm too high, or turned by 1 mrad"),
+        ("gravity", "9.81 m/s²"),
+    ),
+    theory=(
+        "With k_f a = k_r b it bounces without pitching: ω² = Σk/m, and pitches at ω² = Σk x²/I.",
+        "Loaded springs at the height of the centre add nothing to first order: their ends move along them.",
+        "Springs as plain forces: cos(φ) = 1 − (h ω)²/2 a step, so ω is too high by (h ω)²/24.",
+    ),
+    reference="Closed forms, continuous and of the discrete method.",
+    conclusion="Green: springs hold bodies where they are tied to them. Red: their moments are lost or their forces are.",
+    source="ours; vehicles are asked for in the thesis, section 5.4",
+    measurements=(
+        ask(
+            measure,
+            (
+                error(
+                    "bounce_error",
+                    "relative error of the bounce against the discrete method's",
+                    "1",
+                    1e-9,
+                    "upright springs are linear in the height: rounding remains",
+                ),
+                error(
+                    "pitch_error",
+                    "relative error of the pitch against the discrete method's",
+                    "1",
+                    4.0 * TILT**2,
+                    "a spring's end goes along a circle: parts of order tilt², with the ratio x/length of 2.5 at most",
+                ),
+                error(
+                    "continuous_error",
+                    "relative error of the bounce against √(Σk/m)",
+                    "1",
+                    1.01 * SLOW,
+                    f"(h ω)²/24 = {told(SLOW)}, and (h ω)⁴/600 more",
+                    "companion",
+                ),
+                error("sunk", "how far it moves when let go at rest", "m", 1e-11, role="companion"),
+                error(
+                    "coupled",
+                    "largest part of its turn after it was lifted",
+                    "1",
+                    1e-11,
+                    "k_f a = k_r b",
+                    "companion",
+                ),
+            ),
+            "bounce and pitch",
+            TIME_STEP,
+        ),
+    ),
+    example=lambda: Example(scene=scene(0.1, 0.05), time_step=TIME_STEP, duration=DURATION),
+    figures=(Figure(name="swings", title="Bounce and pitch", draw=draw),),
+    ladders=(
+        Ladder(
+            name="bounce",
+            description="relative error of the bounce's frequency against √(Σk/m)",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
+            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.01,
+        ),
+    ),
+)

@@ -1,0 +1,159 @@
+"""A time limit and the keyboard end a run inside its steps, however long one of them takes."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    Box,
+    Lock,
+    Material,
+    Method,
+    Plane,
+    RigidBody,
+    Scene,
+    Sphere,
+    TriangleMesh,
+    compile,
+)
+from tests.contact_scenes import DOWN, TIME_STEP
+
+LIMIT = 0.2  # s
+LATE = 0.1  # s of processor time: what is left of it cannot be told from a busy machine
+ROUGH = Material(friction=0.5)
+Made = tuple[Scene, Method]
+
+
+def ground() -> RigidBody:
+    return RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=ROUGH)
+
+
+def wedged(count: int, method: Method) -> Made:
+    """Spheres that overlap their neighbours: hundreds of rounds."""
+    rng = np.random.default_rng(1)
+    balls = tuple(
+        RigidBody(
+            name=f"ball {k}",
+            mass=1.0,
+            shape=Sphere(0.25),
+            position=tuple(
+                0.45 * np.array([k % 10, k // 10 % 10, k // 100 + 0.45]) + rng.uniform(-0.02, 0.02, 3)
+            ),
+            material=ROUGH,
+        )
+        for k in range(count)
+    )
+    return Scene(bodies=(ground(), *balls), gravity=DOWN), method
+
+
+def sheet(side: int) -> Made:
+    """Plates locked to all their neighbours, rigidly: each loop has rows to spare."""
+    plates, locks = [], []
+    for i in range(side):
+        for j in range(side):
+            plates.append(
+                RigidBody(name=f"{i} {j}", mass=1.0, shape=Box((0.9, 0.9, 0.1)), position=(i, j, 0))
+            )
+            for a, b in ((i - 1, j), (i, j - 1)):
+                if min(a, b) >= 0:
+                    name = f"{a} {b} to {i} {j}"
+                    locks.append(Lock(name=name, between=(f"{a} {b}", f"{i} {j}"), compliance=0.0))
+    held = plates[0]
+    plates[0] = RigidBody(name=held.name, motion="static", shape=held.shape, position=held.position)
+    return Scene(bodies=tuple(plates), constraints=tuple(locks), gravity=DOWN, contacts=False), Method()
+
+
+def landscape(side: int) -> Made:
+    """A plate on the tops of a mesh: every step asks thousands of triangles."""
+    x, y = np.meshgrid(np.linspace(-4, 4, side), np.linspace(-4, 4, side))
+    corners = np.stack([x, y, 0.02 * np.sin(9 * x) * np.cos(7 * y)], axis=-1).reshape(-1, 3)
+    triangles = []
+    for i in range(side - 1):
+        for j in range(side - 1):
+            k = side * i + j
+            triangles += [(k, k + 1, k + side), (k + 1, k + side + 1, k + side)]
+    mesh = TriangleMesh(tuple(map(tuple, corners)), tuple(triangles))
+    land = RigidBody(name="land", motion="static", shape=mesh, position=(0, 0, 0), material=ROUGH)
+    plates = tuple(
+        RigidBody(
+            name=f"plate {k}",
+            mass=1.0,
+            shape=Box((7, 7, 0.5)),
+            position=(0, 0, 0.3 + 0.52 * k),
+            material=ROUGH,
+        )
+        for k in range(3)
+    )
+    return Scene(bodies=(land, *plates), gravity=DOWN), Method()
+
+
+SCENES: dict[str, Callable[[], Made]] = {
+    "exact friction": lambda: wedged(600, Method()),
+    "pivoting": lambda: wedged(600, Method(solver="hybrid")),
+    "a million sweeps": lambda: wedged(
+        300, Method(solver="iterative", iterations=10**6, residual_tolerance=0.0)
+    ),
+    "box friction": lambda: wedged(400, Method(friction="box")),
+    "rows to spare": lambda: sheet(30),
+    "a mesh": lambda: landscape(60),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_time_limit_holds_inside_a_step(name: str) -> None:
+    """One step of these takes .1 s to minutes. What was done before the limit is what so many steps give."""
+    scene, method = SCENES[name]()
+    program = compile(scene, time_step=TIME_STEP, method=method)
+    result = program.run(10**6, time_limit=LIMIT)
+
+    assert result.status == "timed_out"
+    assert result.cpu_seconds < LIMIT + LATE
+    assert result.failed_step == result.steps + 1
+    assert program.run(min(result.steps, 2)).steps == min(result.steps, 2)
+
+
+def test_steps_done_before_the_limit_are_kept() -> None:
+    """Ten steps of some hundredths of a second: a block of many would lose them all."""
+    scene, method = wedged(300, Method(solver="iterative", iterations=400, residual_tolerance=0.0))
+    program = compile(scene, time_step=TIME_STEP, method=method)
+    result = program.run(10**6, time_limit=0.5)
+    steps = result.steps
+
+    assert steps >= 1
+    assert program.run(steps).state_hash == result.state_hash
+
+
+PROGRAM = """
+import sys
+from spook_tracker.engine import compile
+from tests.test_engine_time_limits import SCENES, TIME_STEP
+scene, method = SCENES[sys.argv[1]]()
+program = compile(scene, time_step=TIME_STEP, method=method)
+print("running", flush=True)
+program.run(10**6, time_limit=60.0)
+"""
+
+
+def test_the_keyboard_interrupts_a_step() -> None:
+    child = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "a million sweeps"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "running\n"
+    time.sleep(0.3)
+    child.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    _, words = child.communicate(timeout=30.0)
+
+    assert "KeyboardInterrupt" in words
+    assert time.monotonic() - began < 10.0  # not the minute it would run

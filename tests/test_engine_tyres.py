@@ -1,0 +1,330 @@
+"""Tyres against their own law: load, slip along and across, the ellipse of sliding; springs beside bodies' centres."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    AngularMomentum,
+    AngularVelocity,
+    ConstraintForce,
+    Energy,
+    Final,
+    Hinge,
+    JointSpring,
+    MaximumAbsolute,
+    Method,
+    MethodError,
+    Momentum,
+    Particle,
+    Position,
+    RigidBody,
+    Scene,
+    SceneError,
+    Spring,
+    Trace,
+    Tyre,
+    Velocity,
+    explain,
+    simulate,
+    start,
+)
+from spook_tracker.engine.protocol import Capabilities, unsupported
+from spook_tracker.engine.theory import one_row_matrix
+
+H = 1.0 / 240.0
+GRAVITY = 10.0
+MASS, SPIN, RADIUS = 300.0, 1.0, 0.3  # kg, kg m², m
+STIFFNESS, ALONG, ACROSS = 2e5, 6e4, 5e4  # N/m, N, N/rad
+SUNK = MASS * GRAVITY / STIFFNESS
+Y = (0.0, 1.0, 0.0)
+
+
+def tyre(**changes: Any) -> Tyre:
+    given: dict[str, Any] = {
+        "between": (WORLD, "wheel"),
+        "axis": Y,
+        "radius": RADIUS,
+        "stiffness": STIFFNESS,
+        "longitudinal": ALONG,
+        "cornering": ACROSS,
+        "friction": 0.8,
+    }
+    return Tyre(name="tyre", **(given | changes))
+
+
+def wheel(
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    spin: float = 0.0,
+    height: float = RADIUS - SUNK,
+    gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY),
+    moment: float = SPIN,
+    **changes: Any,
+) -> Scene:
+    """A wheel that cannot tip over, at rest in its tyre if nothing else is said."""
+    body = RigidBody(
+        name="wheel",
+        mass=MASS,
+        inertia=(1e15, moment, 1e15),
+        position=(0.0, 0.0, height),
+        velocity=velocity,
+        angular_velocity=(0.0, spin, 0.0),
+    )
+    return Scene(bodies=(body,), constraints=(tyre(**changes),), gravity=gravity)
+
+
+def test_a_wheel_set_down_without_spin_slides_then_rolls() -> None:
+    """Like a bowling ball: v = v₀ − µ g t while it slides, in the end v₀ m r²/(m r² + I) and r w = v."""
+    observe = {"v": Trace(quantity=Velocity("wheel")), "w": Trace(quantity=AngularVelocity("wheel"))}
+    result = simulate(wheel((10.0, 0.0, 0.0)), time_step=H, steps=60, observe=observe)
+    rolls = 10.0 * MASS * RADIUS**2 / (MASS * RADIUS**2 + SPIN)
+
+    np.testing.assert_allclose(result["v"][:8, 0], 10.0 - 8.0 * H * np.arange(8), rtol=1e-12)
+    assert float(result["v"][-1, 0]) == pytest.approx(rolls, rel=1e-9)
+    assert RADIUS * float(result["w"][-1, 1]) == pytest.approx(rolls, rel=1e-9)
+
+
+@pytest.mark.parametrize("speed", [3.0, -20.0])
+def test_slip_across_dies_out_by_the_slip_angle(speed: float) -> None:
+    """m v_y' = −C v_y/V, implicit: v_y shrinks by 1/(1 + h C/(m V)) a step; the wheel rolls on, either way."""
+    scene = wheel((speed, 0.05, 0.0), spin=speed / RADIUS)
+    result = simulate(scene, time_step=H, steps=30, observe={"v": Trace(quantity=Velocity("wheel"))})
+    shrinks = 1.0 / (1.0 + H * ACROSS / (MASS * (abs(speed) + 1e-3)))
+
+    np.testing.assert_allclose(result["v"][:, 1], 0.05 * shrinks ** np.arange(31), rtol=1e-9)
+    np.testing.assert_allclose(result["v"][:, 0], speed, rtol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.2, 2.5])
+def test_a_sliding_wheel_is_held_by_the_ellipse(angle: float) -> None:
+    """Locked (it has all inertia there is), at 20 m/s: (F_x/µ_x)² + (F_y/µ_y)² = N², F_x/µ_x : F_y/µ_y of the slips."""
+    v = 20.0 * np.array((math.cos(angle), math.sin(angle), 0.0))
+    scene = wheel(tuple(map(float, v)), moment=1e15, friction=(0.9, 0.5))
+    observe = {"F": Final(quantity=ConstraintForce("tyre")), "v": Final(quantity=Velocity("wheel"))}
+    result = simulate(scene, time_step=H, steps=3, observe=observe)
+    fx, fy, load = result["F"][:3]
+    slips = np.array((ALONG / 0.9, ACROSS / 0.5)) * result["v"][:2]
+
+    assert float(load) == pytest.approx(MASS * GRAVITY, rel=1e-9)
+    assert math.hypot(fx / 0.9, fy / 0.5) == pytest.approx(float(load), rel=1e-9)
+    np.testing.assert_allclose(
+        np.array((fx / 0.9, fy / 0.5)) / load, -slips / np.linalg.norm(slips), atol=1e-8
+    )
+
+
+def test_its_load_is_a_spring_that_only_pushes() -> None:
+    """Half as deep as at rest it is the discrete one-row spring while pressed; thrown up it flies freely."""
+    times, stretch = np.arange(25), 0.5 * SUNK
+    matrix = np.array(one_row_matrix(MASS, 1.0 / STIFFNESS, 2.0 * H, H))
+    state = np.array((stretch, 0.0))
+    expected = []
+    for _ in times:
+        expected.append(state[0])
+        state = matrix @ state
+    observe = {"x": Trace(quantity=Position("wheel"))}
+    swings = simulate(wheel(height=RADIUS - SUNK + stretch), time_step=H, steps=24, observe=observe)
+    flies = simulate(wheel(height=RADIUS + 1.0), time_step=H, steps=24, observe=observe)
+
+    np.testing.assert_allclose(swings["x"][:, 2] - RADIUS + SUNK, expected, rtol=0, atol=1e-12)
+    falls = RADIUS + 1.0 - 0.5 * GRAVITY * H**2 * times * (times + 1)
+    np.testing.assert_allclose(flies["x"][:, 2], falls, rtol=1e-13)
+
+
+@pytest.mark.parametrize(("slope", "holds"), [(0.79, True), (0.81, False)])
+@pytest.mark.parametrize("across", [True, False])
+def test_a_parked_wheel_holds_up_to_its_friction(slope: float, holds: bool, across: bool) -> None:
+    side = (0.0, 1.0) if across else (1.0, 0.0)
+    gravity = (slope * GRAVITY * side[0], slope * GRAVITY * side[1], -GRAVITY)
+    observe = {"x": Final(quantity=Position("wheel"))}
+    result = simulate(wheel(gravity=gravity, moment=1e15), time_step=H, steps=120, observe=observe)
+
+    moved = math.hypot(*result["x"][:2])
+    # below it creeps by V F/C, V a millimetre a second and more by its own creep; above it slides with g (s − µ)
+    assert moved < 2e-4 if holds else moved == pytest.approx(0.5 * 0.1 * 0.25, rel=0.05)
+
+
+def test_a_road_that_moves_takes_the_wheel_along() -> None:
+    road = RigidBody(name="road", motion="kinematic", position=(0.0, 0.0, 0.0), velocity=(5.0, 0.0, 0.0))
+    scene = wheel((2.0, 0.0, 0.0))
+    observe = {"v": Final(quantity=Velocity("wheel")), "w": Final(quantity=AngularVelocity("wheel"))}
+    moving = Scene(
+        bodies=(road, *scene.bodies),
+        constraints=(tyre(between=("road", "wheel")),),
+        gravity=scene.gravity,
+    )
+    result = simulate(moving, time_step=H, steps=240, observe=observe)
+
+    # m v + I w/r is what slip cannot change: m v₀ = m v + (I/r²)(v − 5) with r w = v − 5
+    share = SPIN / RADIUS**2
+    assert float(result["v"][0]) == pytest.approx((MASS * 2.0 + share * 5.0) / (MASS + share), rel=1e-9)
+    assert RADIUS * float(result["w"][1]) == pytest.approx(float(result["v"][0]) - 5.0, rel=1e-9)
+
+
+def test_a_wheel_held_in_pieces_keeps_its_bits() -> None:
+    scene = wheel((10.0, 1.0, 0.0), friction=(0.9, 0.5))
+    whole = simulate(scene, time_step=H, steps=30)
+    with start(scene, time_step=H) as run:
+        run.step(7)
+        kept = run.save()
+        run.step(11)
+        run.restore(kept)
+        run.step(23)
+
+        assert run.result().state_hash == whole.state_hash
+
+
+def test_it_is_left_out_where_there_is_none_and_named_where_an_engine_lacks_it() -> None:
+    rolling = {c.stage: c.kept for c in explain(wheel(), time_step=H)}
+    spring = JointSpring(stiffness=1.0, max_force=1.0)
+    hinge = Hinge(name="axle", between=(WORLD, "wheel"), axis=Y, spring=spring)
+    other = replace(wheel(), constraints=(hinge,))
+    choice = {c.stage: c for c in explain(other, time_step=H)}["roll_tyres"]
+    beside = Spring(name="s", between=(Y, "wheel"), stiffness=1.0, anchors=((0, 0, 0), (0, 0, 1)))
+    can = Capabilities(joints=frozenset({Hinge}), forces=frozenset({Spring}), springs=True)
+
+    assert rolling["roll_tyres"] and not rolling["rub_wires"]
+    assert (choice.kept, choice.reason) == (False, "there are no tyres")
+    assert unsupported(can, wheel(), {})[0] == "the joint tyre"
+    assert unsupported(can, other, {}) == ("a spring of bounded force in a joint",)
+    assert unsupported(can, replace(wheel(), constraints=(), forces=(beside,)), {}) == (
+        "a spring beside a body's centre",
+    )
+
+
+HOSTILE: dict[str, tuple[dict[str, Any], str]] = {
+    "no wheel": ({"between": ("wheel", WORLD)}, "turn them round"),
+    "itself": ({"between": ("wheel", "wheel")}, "cannot roll on itself"),
+    "one end": ({"between": "wheel"}, "a road and a wheel"),
+    "flat": ({"axis": (0.0, 0.0, 1.0)}, "lies flat"),
+    "no axis": ({"axis": (0.0, 0.0, 0.0)}, "zero vector"),
+    "no radius": ({"radius": 0.0}, "radius must be positive"),
+    "rigid across": ({"cornering": math.inf}, "cornering must be finite"),
+    "three frictions": ({"friction": (1.0, 1.0, 1.0)}, "one number or two"),
+    "less than none": ({"friction": (0.5, -1.0)}, "not be negative"),
+    "text": ({"damping": "soft"}, "damping must be a number"),
+    "stranger": ({"between": (WORLD, "ghost")}, "no body named 'ghost'"),
+    "below": ({"normal": (0.0, 0.0, -1.0)}, "not above its road"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_input_is_refused_with_one_sentence(name: str) -> None:
+    changes, words = HOSTILE[name]
+    with pytest.raises(SceneError, match=words) as caught:
+        wheel(**changes)
+    assert "\n" not in str(caught.value)
+
+
+def test_wheels_are_dynamic_bodies_and_methods_plain() -> None:
+    point = Particle(name="wheel", mass=1.0, position=(0.0, 0.0, 0.3))
+    with pytest.raises(SceneError, match="'wheel' is a particle"):
+        Scene(bodies=(point,), constraints=(tyre(),))
+    with pytest.raises(SceneError, match="cannot move"):
+        Scene(bodies=(RigidBody(name="wheel", motion="static", position=(0, 0, 0.3)),), constraints=(tyre(),))
+    with pytest.raises(MethodError, match="'tyre' has a tyre"):
+        simulate(wheel(), time_step=H, steps=1, method=Method(corrections=1))
+
+
+# --- springs beside the centre --------------------------------------------------------------------------
+
+BODY = RigidBody(
+    name="body", mass=2.0, inertia=(0.3, 0.4, 0.5), position=(0, 0, 0), angular_velocity=(0.1, 0.2, 0.3)
+)
+SPRING = Spring(
+    name="spring",
+    between=((0.0, 0.0, 3.0), "body"),
+    anchors=((0.0, 0.0, 0.0), (0.3, 0.2, 0.4)),
+    stiffness=30.0,
+    rest_length=1.0,
+)
+
+
+def test_a_spring_beside_the_centre_pulls_and_turns() -> None:
+    """In the first step h F/m and h I⁻¹ (r × F), F = k (|d| − l) along d."""
+    still = replace(BODY, angular_velocity=(0.0, 0.0, 0.0))
+    observe = {"v": Final(quantity=Velocity("body")), "w": Final(quantity=AngularVelocity("body"))}
+    h = 1e-9  # the velocities seen are those of the end, after a turn of h w
+    result = simulate(Scene(bodies=(still,), forces=(SPRING,)), time_step=h, steps=1, observe=observe)
+    arm = np.array((0.3, 0.2, 0.4))
+    d = np.array((0.0, 0.0, 3.0)) - arm
+    force = 30.0 * (1.0 - 1.0 / np.linalg.norm(d)) * d
+
+    np.testing.assert_allclose(result["v"], h * force / 2.0, rtol=1e-12)
+    np.testing.assert_allclose(
+        result["w"], h * np.cross(arm, force) / (0.3, 0.4, 0.5), rtol=1e-12, atol=1e-20
+    )
+
+
+@pytest.mark.parametrize(
+    ("method", "order"),
+    [(Method(), 1), (Method(half_step_velocities=True), 2), (Method(composition="order4"), 4)],
+)
+def test_it_keeps_energy_to_the_order_of_the_method(method: Method, order: int) -> None:
+    scene = Scene(bodies=(BODY,), forces=(SPRING,), gravity=(0.0, 0.0, -9.81))
+    observe = {"E": MaximumAbsolute(quantity=Energy(), from_start=True)}
+    off = [
+        float(simulate(scene, time_step=1.0 / n, steps=n, method=method, observe=observe)["E"])
+        for n in (60, 120)
+    ]
+
+    assert math.log2(off[0] / off[1]) == pytest.approx(order, abs=0.3)
+
+
+def test_two_bodies_it_ties_keep_their_momenta() -> None:
+    other = replace(BODY, name="other", position=(1.0, 2.0, 1.0), velocity=(0.1, 0.0, 0.0))
+    tie = replace(
+        SPRING, between=("other", "body"), anchors=((0.0, -0.5, 0.1), (0.3, 0.2, 0.4)), viscosity=2.0
+    )
+    observe = {
+        "p": MaximumAbsolute(quantity=Momentum(), from_start=True),
+        "L": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
+        "E": Trace(quantity=Energy()),
+    }
+    result = simulate(Scene(bodies=(BODY, other), forces=(tie,)), time_step=1e-3, steps=500, observe=observe)
+
+    assert float(np.abs(result["p"]).max()) < 1e-13
+    assert float(np.abs(result["L"]).max()) < 0.02  # first order: each arm is that of the step's start
+    assert float(result["E"][-1]) < float(result["E"][0])
+
+
+def test_a_spring_on_what_has_only_a_centre_is_refused() -> None:
+    point = Particle(name="body", mass=1.0, position=(0.0, 0.0, 0.0))
+    with pytest.raises(SceneError, match="particle 'body' has only its centre"):
+        Scene(bodies=(point,), forces=(SPRING,))
+    with pytest.raises(SceneError, match="point of the world already"):
+        replace(SPRING, anchors=((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    with pytest.raises(SceneError, match="anchors must be two points"):
+        replace(SPRING, anchors=((1.0, 0.0, 0.0),))  # type: ignore[arg-type]
+
+
+# --- a joint spring of bounded force --------------------------------------------------------------------
+
+
+def test_a_spring_of_bounded_force_gives_way_and_holds_again() -> None:
+    """A flywheel on a spring too weak for it: it slows down with F/I, is turned back, and swings within the spring's reach."""
+    body = RigidBody(
+        name="wheel", mass=1.0, inertia=(2.0, 2.0, 2.0), position=(0, 0, 0), angular_velocity=(0, 3.0, 0)
+    )
+    spring = JointSpring(stiffness=50.0, max_force=4.0)
+    hinge = Hinge(name="axle", between=(WORLD, "wheel"), axis=Y, compliance=0.0, spring=spring)
+    observe = {"w": Trace(quantity=AngularVelocity("wheel"))}
+    result = simulate(Scene(bodies=(body,), constraints=(hinge,)), time_step=H, steps=600, observe=observe)
+    change = np.diff(result["w"][:, 1]) / H
+
+    assert float(np.abs(change).max()) <= 2.0 * (1.0 + 1e-12)
+    np.testing.assert_allclose(change[40:200], -2.0, rtol=1e-12)
+    with pytest.raises(SceneError, match="max_force must not be negative"):
+        JointSpring(stiffness=1.0, max_force=-1.0)
+    with pytest.raises(MethodError, match="'axle' has a spring of bounded force"):
+        simulate(
+            Scene(bodies=(body,), constraints=(hinge,)),
+            time_step=H,
+            steps=1,
+            method=Method(half_step_velocities=True),
+        )

@@ -1,0 +1,49 @@
+"""The residual that a result reports is the one its run is judged by, and every row is judged."""
+
+from __future__ import annotations
+
+import pytest
+
+from spook_tracker.engine import WORLD, Ball, Method, Result, RigidBody, Scene, Sphere, simulate
+from tests.contact_scenes import DOWN, TIME_STEP, cube, ground
+
+
+def stack(count: int) -> Scene:
+    return Scene(bodies=(ground(), *(cube(f"box {k}", (0, 0, k + 0.5)) for k in range(count))), gravity=DOWN)
+
+
+def chain(count: int) -> Scene:
+    links = tuple(
+        RigidBody(name=f"link {k}", mass=1.0, shape=Sphere(0.1), position=(k, 0, 0)) for k in range(count)
+    )
+    ends = (WORLD, *(link.name for link in links))
+    joints = tuple(
+        Ball(name=f"pin {k}", between=(ends[k], ends[k + 1]), at=(k - 0.5, 0, 0)) for k in range(count)
+    )
+    return Scene(bodies=links, constraints=joints, gravity=DOWN, contacts=False)
+
+
+@pytest.mark.parametrize("scene", [stack(10), chain(30)], ids=["contacts", "joints"])
+@pytest.mark.parametrize("sweeps", [1, 5, 20])
+def test_what_is_reported_is_what_is_judged(scene: Scene, sweeps: int) -> None:
+    def first_step(bound: float) -> Result:
+        method = Method(solver="iterative", iterations=sweeps, unsettled_residual=bound)
+        return simulate(scene, time_step=TIME_STEP, steps=1, method=method)
+
+    low, high = first_step(1e-7), first_step(100.0)
+
+    assert high.status == "completed"
+    assert low.status == "unsettled"
+    assert f"off by up to {low.residual:.3g} m/s" in low.failure
+
+
+def test_a_hundred_boxes_on_fifty_sweeps_are_no_answer() -> None:
+    """It names the first step, the body and the residual."""
+    result = simulate(
+        stack(100), time_step=TIME_STEP, steps=60, method=Method(solver="iterative", iterations=50)
+    )
+
+    assert result.status == "unsettled"
+    assert result.failed_step is not None and result.failed_step <= 60
+    assert result.failed_body is not None and result.failed_body.startswith("box")
+    assert result.residual > 0.1

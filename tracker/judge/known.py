@@ -1,0 +1,69 @@
+"""What judged histories know about two runs that are compared: usual times, suspects, and who is to blame."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of
+from spook_tracker.tracker.judge.slower import Usual
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """What the history knows about two runs: see `known`."""
+
+    usual: Mapping[str, Usual] = field(default_factory=dict)  # level and noise of times at the earlier run
+    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of made series of run time
+    suspected: tuple[str, ...] = ()  # times whose slow night is not confirmed yet
+    first_bad: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # last good, first bad commit
+
+
+def known(told: Mapping[str, Told], before: str, after: str) -> Known:
+    """What judged histories know about two runs, by their ids.
+
+    A red series is blamed on the commit where it last became worse up to the later run.
+    """
+    found = judged_in(told, (before, after))
+    return known_of(told, found[before], found[after])
+
+
+def judged_in(told: Mapping[str, Told], runs: Collection[str]) -> dict[str, dict[str, Judged]]:
+    """The verdicts of some runs, by the run's id and by series."""
+    found: dict[str, dict[str, Judged]] = {run: {} for run in runs}
+    for key, series in told.items():
+        missing = len(found)
+        for judged in reversed(series.nights):
+            if judged.night.run.id in found:
+                found[judged.night.run.id].setdefault(key, judged)
+                missing -= 1
+                if not missing:
+                    break
+    return found
+
+
+def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapping[str, Judged]) -> Known:
+    """The same of the verdicts of both runs."""
+    usual: dict[str, Usual] = {}
+    values: dict[str, tuple[float, float]] = {}
+    first_bad: dict[str, tuple[str, str]] = {}
+    suspected = []
+    for key, series in told.items():
+        old, new = before.get(key), after.get(key)
+        if new is not None and new.red and new.worse_at is not None:
+            good = new.before_worse
+            first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
+        if series.definition.kind != "time" or old is None or old.usual is None:
+            continue
+        level, threshold = old.usual
+        usual[key] = (_time(old), threshold) if old.red else (level, threshold)
+        if new is not None:
+            confirmed = new.confirms and old.state == "suspected"  # by what both are slower than
+            values[key] = (level if confirmed else _time(old), _time(new))
+            if new.state == "suspected":
+                suspected.append(key)
+    return Known(usual=usual, values=values, suspected=tuple(suspected), first_bad=first_bad)
+
+
+def _time(judged: Judged) -> float:
+    return judged.night.value if judged.time is None else judged.time
