@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
@@ -101,6 +102,7 @@ def _earlier(history: History, before: str, after: str) -> Any:
     return history.resolve(before)
 
 
+@no_collection()
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
     """What changed between two versions, each named as on the command line; `before` may be fork-point."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
@@ -119,6 +121,7 @@ def compare(history: History, before: str, after: str, accepted: Sequence[Accept
     return compare_in(history, (old, earlier), (new, later), accepted)
 
 
+@no_collection()
 def judge(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """What became of a recorded run, against everything measured before it; red first."""
     from spook_tracker.tracker.judge.tonight import tonight
@@ -138,6 +141,7 @@ def idle_entries(
     return unused(accepted, names, night_of(history.resolve(run)), held)
 
 
+@no_collection()
 def trend(
     history: History,
     test: str,

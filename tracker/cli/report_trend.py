@@ -62,7 +62,7 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
     if not is_noisy(definition):
         told = [j for j in judged if j.verdict.word not in ("identical", "same", "new") and not _repeats(j)]
         return [
-            f"{day(j.night.run.started)} {commit_of(j.night.run)}: {j.verdict.name or j.verdict.word} "
+            f"{day(j.night.run.started)} {commit_of(j.night.run)}: {j.verdict.name or spaced(j.verdict.word)} "
             f"{j.verdict.sentence}"
             for j in told
         ]

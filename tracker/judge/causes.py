@@ -169,7 +169,7 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
         elif judged.state == "accepted" and open_from == len(found):
             found.append(_hit(told.key, told.definition, judged, "accepted"))
             open_from = len(found)
-        else:
+        elif open_from < len(found):
             end = judged.night.run
             found[open_from:] = [
                 replace(hit, standing=_ended(hit, judged), end=end) for hit in found[open_from:]

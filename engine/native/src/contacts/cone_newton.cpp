@@ -16,10 +16,11 @@ constexpr double refined = 1e-16;                   // of the square of what a d
 constexpr double start_blur = 0.2;                  // of the largest natural map
 constexpr double nearest = 1.0;  // of the blur: how far units may be from the path, in the mean
 constexpr double narrow = 0.03;  // a step so short has lost the path
+// Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
+// however redundant the points; with the tightest, what holding leaves is rounding soon after.
 constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
-constexpr double behind = 10.0,
-                 slow = 0.1;  // of the blur, and of itself: a residual that holding back leaves
-constexpr double far = 1e-3;  // a residual, of the speeds, from which the path may crawl
+constexpr double behind = 10.0, slow = 0.1;      // of the blur, and of itself: what holding back leaves
+constexpr double far = 1e-3;                     // a residual, of the speeds, from which the path may crawl
 constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
 constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
 constexpr int max_jumps = 10;                    // without half the residual
@@ -107,8 +108,8 @@ void ConeNewton::connect() {
     }
 }
 
-/// The square of the smoothed map a part of the way along Newton's direction and the path.
-double ConeNewton::merit(double blur, double length, double along) const {
+/// The square of the smoothed map a part of the way along Newton's direction and the path; past `enough` a part of it.
+double ConeNewton::merit(double blur, double length, double along, double enough) const {
     double sum = 0.0, map[3];
     for (const ConeUnit& unit : units_) {
         ConeUnit::Vec z = unit.z, u = unit.u;
@@ -117,6 +118,7 @@ double ConeNewton::merit(double blur, double length, double along) const {
             u[i] += length * unit.du[i] + along * unit.tu[i];
         }
         sum += unit.natural(z, u, {blur, hold_}, map);
+        if (sum > enough) break;
     }
     return sum;
 }
@@ -291,14 +293,14 @@ double ConeNewton::speed_of(const MixedSystem& system) const {
 ConeNewton::Search ConeNewton::search(double blur) const {
     const double wide = near_ * near_ * static_cast<double>(units_.size());
     for (const double share : {1e-3, 1e-2, 0.1, 0.3, 0.6, 0.9}) {
-        const double next = share * blur, after = merit(next, 1.0, 1.0 - share);
-        if (after <= wide * next * next) return {next, 1.0, 1.0 - share};
+        const double next = share * blur, room = wide * next * next;
+        if (merit(next, 1.0, 1.0 - share, room) <= room) return {next, 1.0, 1.0 - share};
     }
-    const double before = merit(blur, 0.0, 0.0);
+    const double before = merit(blur, 0.0, 0.0, unbounded);
     double length = 1.0, least = before;
     Search found{blur, 0.0, 0.0};
     for (int halving = 0; halving < 8; ++halving, length *= 0.5) {
-        const double now = merit(blur, length, 0.0);
+        const double now = merit(blur, length, 0.0, before);
         if (now < least) least = now, found.length = length;
         if (now <= (1.0 - 2e-4 * length) * before) break;
     }

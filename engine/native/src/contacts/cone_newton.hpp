@@ -21,8 +21,8 @@
 // four corners that are not quite in a plane rests on either three. Then the path is left: Newton's steps at b = 0,
 // taken whole, jump from one set of rows that push to another, as pivoting does, and the best point met is the answer.
 //
-// Sources: De Saxcé and Feng 1998 (the cone's law); Fukushima, Luo, Tseng 2002 (smoothing on second-order cones); Burke, Xu 2000 (following such paths);
-// Acary, Brémond, Huber 2018 (a comparison of solvers for this law).
+// Sources: De Saxcé and Feng 1998 (the cone's law); Fukushima, Luo, Tseng 2002 (smoothing on second-order cones);
+// Burke, Xu 2000 (following such paths); Acary, Brémond, Huber 2018 (a comparison of solvers for this law).
 #pragma once
 
 #include <cstdint>
@@ -64,7 +64,7 @@ private:
     void read(const RowBlock& given, int row, const FrictionPoint* friction, ConeUnit& unit) const;
     void connect();
     void measure(const MixedSystem& system);
-    double merit(double blur, double length, double along) const;
+    double merit(double blur, double length, double along, double enough) const;
     Left worst() const;
     double rounding() const;
     Search search(double blur) const;
