@@ -53,8 +53,12 @@ void ContactStage::hold_joints(MixedSystem& parting) const {
     }
 }
 
-/// Who pushed whom aside: contacts' ties are given, joints and the ground are added.
+/// Who is to be seen as one: contacts that pushed aside are given; contacts that push, whose laws a turn of some of
+/// their bodies would break, joints and the ground are added.
 void ContactStage::note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties) {
+    for (const Touch& touch : touches_)
+        if (touch.normal > 0.0)
+            ties.push_back({unknown_[touch.contact.first], unknown_[touch.contact.second]});
     for (const RowBlock& block : parting.rows) ties.push_back({block.first, block.second});
     parting_.velocity = parting.velocity;
     parting_.islands = find_islands(static_cast<int>(parting.mass.size()), ties);

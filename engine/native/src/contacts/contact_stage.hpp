@@ -118,7 +118,7 @@ public:
     /// How overlapping bodies are to be displaced at the end of the step.
     struct Parting {
         std::vector<Vec6> velocity;  // per moving body; empty when none is
-        Islands islands;             // of bodies that pushed each other aside, or hang together by joints
+        Islands islands;             // of bodies that push each other, or hang together by joints
         std::vector<char> grounded;  // per island: something that does not move by itself took part
     };
     const Parting& parting() const noexcept { return parting_; }
