@@ -116,10 +116,10 @@ def test_the_command_and_the_page_compare_alike(tmp_path: Path) -> None:
     for before, after in ((12, 13), (11, 13), (10, 11), (13, 9), (11, 12)):
         asked = ("compare", runs[before].id, runs[after].id, "--db", database)
         shown = CliRunner().invoke(main, [*asked, "--format", "json"])
-        page = told[json.dumps([runs[before].id, runs[after].id])]
+        _, page = told[json.dumps([runs[before].id, runs[after].id])]
         assert shown.exit_code == page["code"]
         assert json.loads(shown.stdout)["counts"] == page["counts"]
-    assert told[json.dumps([runs[12].id, runs[13].id])]["code"] == 1
+    assert told[json.dumps([runs[12].id, runs[13].id])][1]["code"] == 1
 
 
 LEVELS = st.sampled_from([0.5, 0.5, 0.5, 0.5004, 0.52, 0.7, 3.0, math.nan])
