@@ -50,9 +50,24 @@ def test_short_runs_are_repeated_until_the_clock_resolves_them():
 
 
 def test_long_runs_are_repeated_less_often_but_never_once():
-    (long,) = interleaved(runs(a=10.0), Clockwork(), 5)
+    engine = Clockwork()
+    (long,) = interleaved(runs(a=10.0), engine, 5)
 
-    assert len(long.seconds) == 2
+    assert len(long.seconds) == len(long.calibration) == 2
+    assert len(engine.calls) == 2, "the first one counts, too"
+
+
+def test_an_engine_without_a_clock_for_stages_is_not_asked_for_them_again():
+    engine = Clockwork()
+    asked = [lambda s, n=n: s(SimpleNamespace(name=n, seconds=0.1)) for n in ("a", "b", "c")]
+
+    def without(scene, **options):
+        result = engine(scene, **options)
+        result.stage_seconds = {}
+        return result
+
+    assert all(timing.stage_seconds == {} for timing in interleaved(asked, without, 2))
+    assert [name for name, stages in engine.calls if stages] == ["a"]
 
 
 def test_runs_that_were_disturbed_do_not_count():

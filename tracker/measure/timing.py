@@ -66,6 +66,15 @@ class _Lane:
     cpu: list[float] = field(default_factory=list)
     kernel: list[float] = field(default_factory=list)
 
+    def keep(self, kernel: float, taken: Sequence[tuple[float, float | None] | None]) -> None:
+        """Add a repeat; runs that failed in it do not count."""
+        whole = [both for both in taken if both is not None]
+        if whole:
+            self.kernel.append(kernel)
+            self.seconds.append(_undisturbed([seconds for seconds, _ in whole]))
+            own = [cpu for _, cpu in whole if cpu is not None]
+            self.cpu += [_undisturbed(own)] if len(own) == len(whole) else []
+
 
 def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> float | None:
     """Seconds of one run, None if it failed."""
@@ -88,35 +97,39 @@ def _both(
 
 
 def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list[Timing | None]:
-    """A timing of each run, None for those that fail; instructions and stages where they can be had."""
+    """A timing of each run, None for those that fail; instructions and stages where they can be had.
+
+    The first run of each warms the caches and tells how often it can be repeated; one that takes longer than all
+    its repeats should has no cold caches to speak of, and counts as the first of them.
+    """
     lanes: list[_Lane | None] = []
     for run in runs:
-        first = once(run, simulate)  # also warms caches
+        kernel = calibrate()
+        first = _both(run, simulate)
         if first is None:
             lanes.append(None)
             continue
-        grain = max(first, 1e-9)
+        grain = max(first[0], 1e-9)
         affordable = int(POINT_BUDGET / max(grain, RESOLVED))
-        lanes.append(
-            _Lane(
-                run=run,
-                runs=min(MOST_RUNS, max(1, math.ceil(RESOLVED / grain))),
-                repeats=max(FEWEST_REPEATS, min(repeats, affordable)),
-            )
+        fresh = _Lane(
+            run=run,
+            runs=min(MOST_RUNS, max(1, math.ceil(RESOLVED / grain))),
+            repeats=max(FEWEST_REPEATS, min(repeats, affordable)),
         )
-    for turn in range(repeats):
+        lanes.append(fresh)
+        if grain > POINT_BUDGET:
+            fresh.keep(kernel, [first])
+    for _ in range(repeats):
         for lane in lanes:
-            if lane is None or turn >= lane.repeats:
-                continue
-            kernel = calibrate()
-            taken = [_both(lane.run, simulate) for _ in range(lane.runs)]
-            whole = [both for both in taken if both is not None]
-            if whole:
-                lane.kernel.append(kernel)
-                lane.seconds.append(_undisturbed([seconds for seconds, _ in whole]))
-                own = [cpu for _, cpu in whole if cpu is not None]
-                lane.cpu += [_undisturbed(own)] if len(own) == len(whole) else []
-    return [_timing(lane, simulate) if lane and lane.seconds else None for lane in lanes]
+            if lane is not None and len(lane.kernel) < lane.repeats:
+                kernel = calibrate()
+                lane.keep(kernel, [_both(lane.run, simulate) for _ in range(lane.runs)])
+    clock = True  # until a run comes without one: an engine has it for all its stages or for none
+    timings: list[Timing | None] = []
+    for lane in lanes:
+        timings.append(_timing(lane, simulate, clock) if lane and lane.seconds else None)
+        clock = clock and (timings[-1] is None or not _short(lane) or bool(timings[-1].stage_seconds))
+    return timings
 
 
 def _undisturbed(seconds: Sequence[float]) -> float:
@@ -125,13 +138,17 @@ def _undisturbed(seconds: Sequence[float]) -> float:
     return sum(faster) / len(faster)
 
 
-def _timing(lane: _Lane, simulate: Simulate) -> Timing:
-    short = min(lane.seconds) <= STAGES_UP_TO
+def _short(lane: _Lane | None) -> bool:
+    return lane is not None and bool(lane.seconds) and min(lane.seconds) <= STAGES_UP_TO
+
+
+def _timing(lane: _Lane, simulate: Simulate, clock: bool) -> Timing:
+    short = _short(lane)
     return Timing(
         seconds=tuple(lane.seconds),
         runs_per_repeat=lane.runs,
         instructions=_instructions(lane.run, simulate) if short and can_count() else None,
-        stage_seconds=stage_seconds(lane.run, simulate) if short else {},
+        stage_seconds=stage_seconds(lane.run, simulate) if short and clock else {},
         cpu_seconds=tuple(lane.cpu) if len(lane.cpu) == len(lane.seconds) else (),
         calibration=tuple(lane.kernel),
     )
