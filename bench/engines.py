@@ -29,6 +29,7 @@ from spook_tracker.tracker.store.database import session_on
 OURS = "spook"
 ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
 CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
+PAGE = Path(__file__).parents[1] / "docs" / "engines.md"
 Causes = Mapping[tuple[str, str], tuple[str, str]]  # (test, engine): (cause, what would mend it)
 
 
@@ -164,7 +165,7 @@ def main(arguments: list[str]) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--db", default="sqlite:///build/engines.db")
-    parser.add_argument("--page", default="docs/engines.md")
+    parser.add_argument("--page", default=str(PAGE))
     parser.add_argument("--limit", type=float, default=5.0, help="s of one simulation of another engine")
     parser.add_argument(
         "--only-page", action="store_true", help="measure nothing, write the page of what is recorded"

@@ -65,3 +65,17 @@ def test_times_of_another_machine_are_not_set_against_ours(engines: Any, tmp_pat
     assert "not timed here: rival." in told
     assert "| rival | 5 | 1 | 0 | 1 |" in told, "its answers count wherever they were given"
     assert told.endswith("Nowhere.\n")
+
+
+def test_the_published_page_and_the_causes_are_of_one_piece(engines: Any) -> None:
+    """Wherever another engine leads there is a cause, and no cause is kept for what is no longer so."""
+    told = engines.PAGE.read_text(encoding="utf-8").partition("## Where another engine is first")[2]
+    lines = [line for line in told.splitlines() if line.startswith("- ")]
+
+    assert lines
+    assert not [line for line in lines if "No cause found yet" in line]
+    for (test, engine), (cause, cure) in engines.causes().items():
+        assert cause
+        assert cure
+        here = [line for line in lines if line.startswith(f"- **{test},") and f"**: {engine} in " in line]
+        assert here, f"{test}: {engine} is first nowhere; take the cause out"
