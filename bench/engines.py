@@ -10,6 +10,7 @@ none, the page says so.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
 import tomllib
@@ -29,6 +30,7 @@ from spook_tracker.tracker.store.database import session_on
 OURS = "spook"
 ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
 CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
+LIMIT = re.compile(r"time limit of ([\d.]+) s was reached")
 PAGE = Path(__file__).parents[1] / "docs" / "engines.md"
 Causes = Mapping[tuple[str, str], tuple[str, str]]  # (test, engine): (cause, what would mend it)
 
@@ -81,6 +83,7 @@ def page(database: str) -> str:
         "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts.",
         "",
         *_gates(samples),
+        *_rungs(samples),
         *_first(races),
         *_behind(races, causes()),
     ]
@@ -114,6 +117,31 @@ def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
         "",
         "| engine | keeps | misses | fails | not supported |",
         "|---|---|---|---|---|",
+        *(f"| {' | '.join(map(str, row))} |" for row in rows),
+        "",
+    ]
+
+
+def _rungs(samples: Mapping[str, ranks.Samples]) -> list[str]:
+    """How much of the ladders below was had of each engine, and what stopped the rest."""
+    rows = []
+    for name, told in samples.items():
+        found = [sample for definition, sample in told.values() if definition.kind == "ladder"]
+        outcomes = Counter(sample.outcome for sample in found)
+        late = {m[1] for sample in found if (m := LIMIT.search(sample.failure))}
+        bound = ", ".join(f"{seconds} s" for seconds in sorted(late, key=float))
+        others = len(found) - outcomes["value"] - outcomes["timed_out"] - outcomes["not_supported"]
+        rows.append(
+            (name, outcomes["value"], outcomes["timed_out"], bound or "-", others, outcomes["not_supported"])
+        )
+    return [
+        "## Rungs of the ladders",
+        "",
+        "A rung that takes longer than the time limit is out of time, and so are the finer ones after it: a front may",
+        "end there where patience would lead it on.",
+        "",
+        "| engine | values | out of time | time limit | diverged or else failed | not supported |",
+        "|---|---|---|---|---|---|",
         *(f"| {' | '.join(map(str, row))} |" for row in rows),
         "",
     ]

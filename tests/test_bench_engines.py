@@ -79,3 +79,27 @@ def test_the_published_page_and_the_causes_are_of_one_piece(engines: Any) -> Non
         assert cure
         here = [line for line in lines if line.startswith(f"- **{test},") and f"**: {engine} in " in line]
         assert here, f"{test}: {engine} is first nowhere; take the cause out"
+
+
+def test_rungs_that_were_out_of_time_are_counted_and_the_limit_told(engines: Any, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/engines.db"
+    slow = [
+        sample.series for sample in THEIRS.samples if "/ladder:" in sample.series and "/h=" in sample.series
+    ]
+    why = {
+        slow[0]: "the time limit of 0.5 s was reached before step 7",
+        slow[1]: "not tried: at 0.1 s a step",
+    }
+    samples = tuple(
+        msgspec.structs.replace(s, outcome="timed_out", failure=why[s.series]) if s.series in why else s
+        for s in THEIRS.samples
+    )
+    for run in (document(0), msgspec.structs.replace(THEIRS, samples=samples)):
+        tracker.record(run, database)
+    (line,) = (
+        line
+        for line in engines.page(database).partition("## Rungs")[2].splitlines()
+        if line.startswith("| rival |")
+    )
+
+    assert line.split(" | ")[2:4] == ["2", "0.5 s"]

@@ -9,7 +9,7 @@
 //   energy     Where the kinetic energy E has grown, the velocities are drawn towards the rigid motion that has the
 //              island's momenta: they keep the momenta, and with share s left, E(s) = E_rigid + s² (E − E_rigid).
 //              In an island that leans on the ground each body's angular momentum is shortened instead.
-// Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
+// Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, kinetic energy may not rise.
 #include <algorithm>
 #include <cmath>
 

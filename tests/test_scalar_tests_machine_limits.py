@@ -1,0 +1,224 @@
+"""Where the limits of machines, vehicles, ropes and things that float come from: each found again without the engine."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.scalar_tests import (
+    bowl,
+    capstan,
+    cornering,
+    floating_box,
+    gears,
+    motor,
+    robot_arm,
+    rope,
+    sinking_sphere,
+    slider_crank,
+    wires,
+)
+from tests.limits import measurement
+
+
+def test_the_motor_leads_by_the_sum_of_the_turns_of_its_steps() -> None:
+    """A step turns by 2 asin(h w/2) with √(1 − h² w²/4) w = ω, the speed after it."""
+    h = motor.TIME_STEP
+    speed = np.minimum(
+        motor.TORQUE / motor.INERTIA * h * np.arange(1, round(motor.DURATION / h) + 1), motor.SPEED
+    )
+    turned = float(np.sum(2.0 * np.arcsin(np.sqrt(0.5 * (1.0 - np.sqrt(1.0 - (h * speed) ** 2))))))
+    lead = (turned - float(motor.exact_angle(motor.DURATION))) / motor.LEAD - 1.0
+    metric = next(m for m in measurement("motor", "bounded").metrics if m.name == "angle_lead")
+
+    assert metric.passes(lead) and metric.holds_set_point(lead), lead
+    assert metric.limit == pytest.approx(lead, rel=0.01)
+
+
+def test_a_discrete_oscillation_is_shorter_by_the_cube_of_its_step() -> None:
+    """sin(θ/2) = h ω/2: the period of heave and swing, found by iterating the map of one step."""
+    for rate, test, configuration, metric in (
+        (floating_box.heave_rate(), "floating_box", "plain", "period_error"),
+        (sinking_sphere.SWING_RATE, "sinking_sphere", "pendulum", "swing_error"),
+    ):
+        (gate,) = (m for m in measurement(test, configuration).metrics if m.name == metric)
+        h, x, v, trace = 1.0 / 60.0, 1.0, 0.0, [1.0]
+        for _ in range(3600):
+            v -= h * rate**2 * x
+            x += h * v
+            trace.append(x)
+        found = floating_box.period(h * np.arange(3601), trace) * rate / (2.0 * math.pi) - 1.0
+
+        assert gate.passes(found)
+        assert found == pytest.approx(-((h * rate) ** 2) / 24.0, rel=0.03)
+
+
+def test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say() -> None:
+    """φ with sin φ = h ω: (h ω)²/6 of a speed, θ Σ z (h ω)³/6 of the meshes."""
+    spin = wires.TURNING * wires.DURATION / wires.RADIUS
+    share = wires.DRUM / wires.RADIUS**2 / (wires.HEAVY + wires.LIGHT + wires.DRUM / wires.RADIUS**2)
+    limits = {m.name: m.limit for m in measurement("wires", "plain").metrics}
+    assert limits["drum_error"] == pytest.approx((wires.TIME_STEP * spin) ** 2 / 6.0 * share, rel=0.01)
+    limits = {m.name: m.limit for m in measurement("gears", "plain").metrics}
+    assert limits["ratio_error"] == pytest.approx(gears.standing(), rel=0.01)
+
+
+def test_a_winch_is_faster_by_what_the_turning_of_its_drum_leaves_out() -> None:
+    """The drum turns by asin(h ω) a step; starting from rest with the steady torque the same in its share of the mass."""
+    h, c = capstan.TIME_STEP, capstan
+    limits = {m.name: m.limit for m in measurement("capstan", "winch").metrics}
+    lifted = math.asin(h * c.SPEED) / (h * c.SPEED) - 1.0
+    # velocities of one step: u for the wire, ω for the drum, u = r asin(h ω)/h; energy gives the rest
+    spin = slowly = 0.0
+    inertia, mass, r = c.MOMENT, c.LOAD, c.DRUM
+    for _ in range(60):
+        spin += h * (mass * c.GRAVITY * r - c.TORQUE) / (mass * r * r + inertia)
+        slowly = r * spin
+    share = inertia / r**2 / (mass + inertia / r**2)
+    sunk = share * (math.asin(h * slowly / r) / (h * slowly / r) - 1.0)
+
+    assert lifted <= limits["speed_error"] <= 1.1 * lifted
+    assert sunk <= limits["sinking_error"] <= 1.1 * sunk
+
+
+def test_the_torques_of_a_driven_arm_are_two_steps_late_at_most() -> None:
+    (gate,) = measurement("robot_arm", "driven").metrics
+    assert gate.limit == pytest.approx(robot_arm.lag_bound(), rel=0.01)
+    # The reference itself: torques times speeds are the rate of the energy of a driven arm.
+    pose, speeds, h = np.array(robot_arm.POSES[1]), np.array(robot_arm.SPEEDS), 1e-5
+
+    def energy(at: np.ndarray) -> float:
+        _, velocities, spins = robot_arm.inverse_dynamics(at, speeds, np.zeros(6))
+        arm = robot_arm.kinematics(at)
+        total = 0.0
+        for (_, _, centre, turn), (_, _, _, mass, inertia), v, w in zip(
+            arm, robot_arm.LINKS, velocities, spins, strict=True
+        ):
+            total += (
+                0.5 * mass * v @ v + 0.5 * w @ turn @ np.diag(inertia) @ turn.T @ w + mass * 9.81 * centre[2]
+            )
+        return total
+
+    torques, _, _ = robot_arm.inverse_dynamics(pose, speeds, np.zeros(6))
+    power = (energy(pose + h * speeds) - energy(pose - h * speeds)) / (2.0 * h)
+    assert torques @ speeds == pytest.approx(power, rel=1e-8)
+
+
+def test_the_terminal_speed_is_the_fixed_point_of_a_step_and_is_reached() -> None:
+    v, h = 0.0, sinking_sphere.TIME_STEP
+    for _ in range(600):
+        v += h * (sinking_sphere.PULL - sinking_sphere.RESISTANCE * v * v)
+    assert measurement("sinking_sphere", "plain").metrics[0].passes(v / sinking_sphere.TERMINAL - 1.0)
+
+
+def test_a_square_log_falls_between_the_densities_of_its_metacentre() -> None:
+    for ratio in (0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0)):
+        assert floating_box.metacentric_height(ratio) == pytest.approx(0.0, abs=1e-15)
+    assert all(floating_box.metacentric_height(ratio) > 0.0 for ratio in floating_box.UPRIGHT)
+    assert all(floating_box.metacentric_height(ratio) < 0.0 for ratio in floating_box.TILTED)
+    # The righting arm by shoelace formula over the corners of the section below the surface.
+    for ratio, roll in ((0.15, 0.1), (0.5, 0.17), (0.85, 0.05)):
+        low, c, s = -0.5, math.cos(roll), math.sin(roll)
+        edge = ratio - 0.5  # where the surface meets the centre line, at the same displaced area
+        y = np.array([0.5, 0.5, low, low])
+        z = np.array([low, edge - 0.5 * math.tan(roll), edge + 0.5 * math.tan(roll), low])
+        cross = y * np.roll(z, -1) - np.roll(y, -1) * z
+        area = 0.5 * cross.sum()
+        centre_y = ((y + np.roll(y, -1)) * cross).sum() / (6.0 * area)
+        centre_z = ((z + np.roll(z, -1)) * cross).sum() / (6.0 * area)
+        assert area == pytest.approx(ratio, rel=1e-12)
+        assert -(centre_y * c - centre_z * s) == pytest.approx(
+            floating_box.righting_arm(ratio, roll), rel=1e-9
+        )
+
+
+def test_the_slider_cranks_torque_by_newton_and_euler() -> None:
+    """Forces at pin and wrist, the guide's and the motor's: six equations of three bodies in the plane."""
+    s = slider_crank
+    for theta in (0.3, 1.0, 2.5, 4.4):
+        rod = (lambda t: s.CRANK * np.cos(t) + 0.5 * s.ROD * np.cos(s.pin(t)[1]), lambda t: 0.5 * s.pin(t)[2])
+        x, y, turn = (
+            s.SPEED**2 * float(s.slope(lambda t, f=f: s.slope(f, t, 1e-3), theta, 1e-3))
+            for f in (*rod, lambda t: -s.pin(t)[1])
+        )
+        slide = s.SPEED**2 * float(s.slope(lambda t: s.slope(lambda u: s.pin(u)[0], t, 1e-3), theta, 1e-3))
+        c, h = s.CRANK * math.cos(theta), s.CRANK * math.sin(theta)
+        a, b = 0.5 * (float(s.pin(theta)[0]) - c), 0.5 * h  # from the rod's middle: the wrist is (a, −b) away
+        # Unknown: P on the rod at the pin, Q on the slider at the wrist, N on the slider, τ on the crank.
+        matrix = np.array(
+            [
+                (1, 0, -1, 0, 0, 0),
+                (0, 1, 0, -1, 0, 0),
+                (-b, -a, -b, -a, 0, 0),
+                (0, 0, 1, 0, 0, 0),
+                (0, 0, 0, 1, 1, 0),
+                (h, -c, 0, 0, 0, 1),
+            ]
+        )
+        inertia = s.ROD_MASS * s.ROD**2 / 12.0
+        right = (s.ROD_MASS * x, s.ROD_MASS * y, inertia * turn, s.SLIDER * slide, 0.0, 0.0)
+
+        assert np.linalg.solve(matrix, right)[5] == pytest.approx(float(s.torque(theta)), rel=1e-6)
+
+
+def test_a_turning_rope_is_longer_by_what_its_damped_rows_let_through() -> None:
+    """A steady circle: w h a step, r − l = r (1 − cos w h)(1 + 2θ)/2; the angular momentum stays, m r² w."""
+    h, w = rope.TIME_STEP, rope.SPIN
+    longer = 1.0 / (1.0 - (1.0 - math.cos(w * h)) * 2.5)
+    slower = longer**-2
+    pull, energy = slower**2 * longer - 1.0, slower - 1.0
+    limits = {m.name: m.limit for m in measurement("rope", "plain").metrics}
+
+    assert abs(pull) <= limits["pull_error"] <= 1.2 * abs(pull)
+    assert abs(energy) <= limits["energy_error"] <= 1.2 * abs(energy)
+
+
+def test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by() -> None:
+    """The bicycle model with every stiffness C V/(V + 1 mm/s), solved as two equations of balance."""
+    c = cornering
+    for configuration, front, rear in (("plain", c.SOFT, c.HARD), ("oversteer", c.HARD, c.SOFT)):
+        limits = {m.name: m.limit for m in measurement("cornering", configuration).metrics}
+        rates = []
+        for speed in (c.SPEED, c.SPEED + c.CREEP):
+            f, r, share = 2.0 * front, 2.0 * rear, c.SPEED / speed
+            # sideways speed v and yaw rate: forces −C (v ± x w)/V (+ C δ in front) balance m V w and have no moment
+            balance = np.array(
+                (
+                    ((f + r) / c.SPEED, (f * c.AHEAD - r * c.BACK) / c.SPEED + c.MASS * c.SPEED / share),
+                    (
+                        (f * c.AHEAD - r * c.BACK) / c.SPEED,
+                        (f * c.AHEAD**2 + r * c.BACK**2) / c.SPEED,
+                    ),
+                )
+            )
+            rates.append(float(np.linalg.solve(balance, c.STEER * f * np.array((1.0, c.AHEAD)))[1]))
+        assert rates[0] == pytest.approx(c.yaw(c.SPEED, front, rear), rel=1e-12)
+        assert abs(rates[1] / rates[0] - 1.0) <= limits["yaw_error"] <= 3.0 * abs(rates[1] / rates[0] - 1.0)
+
+
+def test_many_facets_make_a_round_bowl_and_few_of_them_slow_a_ball_down_at_corners() -> None:
+    times = np.linspace(0.0, 1.8, 7201)
+    shares = [
+        bowl.half_period(times, bowl.rolled(times, count)) * bowl.PACE / math.pi - 1.0
+        for count in (bowl.FACETS, 1001)
+    ]
+    limits = {m.name: m.limit for m in measurement("bowl", "plain").metrics}
+    smooth, period = limits["smooth_error"], limits["period_error"]
+
+    assert isinstance(smooth, float) and isinstance(period, float)
+    assert abs(shares[0]) <= smooth - period <= 1.1 * abs(shares[0])
+    assert shares[1] == pytest.approx(
+        bowl.facet(1001)[1] ** 2 / 16.0, rel=0.05
+    )  # of a swing that is not small
+    # At the first corner, after half a facet: v² = 2 a s, then the part (cos Δ + 2/5)/(7/5) of it.
+    width, angle = bowl.facet(5)
+    half = (bowl.BOWL * math.cos(0.5 * width) - bowl.BALL) * math.tan(0.5 * width)
+    pull = 5.0 / 7.0 * bowl.GRAVITY * math.sin(angle)
+    reached = math.sqrt(2.0 * half / pull)
+    fine = reached + np.linspace(0.0, 1e-3, 2)
+    x = bowl.rolled(fine, 5)
+    slows = (math.cos(width) + 0.4) / 1.4
+    after = -math.sqrt(2.0 * pull * half) * slows * math.cos(angle - width)
+    assert (x[1] - x[0]) / 1e-3 == pytest.approx(after, rel=5e-3)
