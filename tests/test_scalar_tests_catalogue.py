@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from dataclasses import replace
 
 import pytest
 
-from spook_tracker.engine import explain
-from spook_tracker.scalar_tests.case import Metric, ScalarTest
+from spook_tracker.engine import PLAIN, explain, protocol
+from spook_tracker.scalar_tests.case import Configuration, Metric, ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.measure.others import asked_of
 
 PRINTED = {  # thesis, section 4.2: limit and unit of the seven continuous tests
     "beam": (4.9e-9, "%"),
@@ -194,3 +198,30 @@ def test_printed_limits_are_for_every_engine() -> None:
 
     assert len(gates) >= 7
     assert all(metric.every_engine for metric in gates)
+
+
+def test_to_ask_one_test_imports_no_other() -> None:
+    program = (
+        "import sys; from spook_tracker.tracker.measure.run import Questions, select; "
+        "select(Questions().tests(), ('falling_object',)); "
+        "print(*(name for name in sys.modules if name == 'scipy' or '.multibody' in name))"
+    )
+    shown = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+
+    assert shown.stdout.split() == []
+
+
+def test_other_engines_are_asked_every_time_step_that_any_of_our_settings_takes() -> None:
+    """Else our coarse compositions would race against nobody."""
+    coarse = Configuration(name="coarse", method=PLAIN, expected_order=None, time_steps=(1.0, 0.5))
+    ladder = replace(CATALOGUE["pendulum"].ladders[0], time_steps=(0.5, 0.25))
+    ladder = replace(ladder, configurations=(*ladder.configurations, coarse))
+    asked = asked_of(
+        {"pendulum": replace(CATALOGUE["pendulum"], ladders=(ladder,))},
+        (protocol.Configuration(name="theirs", reason=""),),
+        False,
+    )
+
+    assert ladder.steps_of(coarse) == (1.0, 0.5)
+    assert ladder.steps_of(ladder.configurations[0]) == (0.5, 0.25)
+    assert all(theirs.time_steps == (1.0, 0.5, 0.25) for theirs in asked["pendulum"].ladders)
