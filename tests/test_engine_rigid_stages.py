@@ -24,6 +24,7 @@ from spook_tracker.engine import (
     Sphere,
     simulate,
 )
+from spook_tracker.scalar_tests import cornering
 
 TIME_STEP = 1.0 / 60.0
 GRAVITY = (0.0, 0.0, -9.81)
@@ -111,6 +112,15 @@ def test_a_body_that_turns_too_fast_is_named() -> None:
 
     assert (result.status, result.failed_body, result.failed_step) == ("diverged", "top", 1)
     assert "turns too fast" in result.failure
+
+
+def test_a_loaded_wheel_that_was_given_its_spin_is_told_of_the_spin_and_not_of_its_load() -> None:
+    """At 20 m/s and 1/20 s a wheel turns by 3.3 rad a step; that its axle carries a vehicle as well is no cause."""
+    result = simulate(cornering.scene(20.0, steer=0.0), time_step=1 / 20, steps=10)
+
+    assert (result.status, result.failed_step) == ("diverged", 1)
+    assert "turns too fast" in result.failure
+    assert "tension" not in result.failure
 
 
 def test_rows_that_cannot_hold_together_are_named_and_a_compliance_lets_them() -> None:
