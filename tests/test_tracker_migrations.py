@@ -144,7 +144,7 @@ def test_every_class_of_outcome_can_be_stored(climbed):
     assert {row.outcome for row in climbed.scalars(select(models.Sample))} == set(classes)
 
 
-def test_all_the_way_down_and_up_again(session, url):
+def test_all_the_way_down_and_up_again(session, migrated_url):
     filled(session)
     session.close()
     engine = session.get_bind().engine
