@@ -285,21 +285,21 @@ def test_a_history_moves_between_databases_without_loss(request, tmp_path, kinds
     new.dispose()
 
 
-def test_a_copy_into_a_used_database_is_refused(session, url, tmp_path):
+def test_a_copy_into_a_used_database_is_refused(session, migrated_url, tmp_path):
     recorded(session, run())
     session.close()
 
     with pytest.raises(DatabaseError, match="already holds runs"):
-        copy_database(url, url)
+        copy_database(migrated_url, migrated_url)
 
 
-def test_a_copy_that_arrives_changed_is_taken_back(session, url, tmp_path, monkeypatch):
+def test_a_copy_that_arrives_changed_is_taken_back(session, migrated_url, tmp_path, monkeypatch):
     recorded(session, run())
     session.close()
     monkeypatch.setattr("spook_tracker.tracker.store.database_copy.digest", lambda connection, table: None)
 
     with pytest.raises(DatabaseError, match="arrived changed; nothing was copied"):
-        copy_database(url, f"sqlite:///{tmp_path}/copy.db")
+        copy_database(migrated_url, f"sqlite:///{tmp_path}/copy.db")
 
     copied = open_database(f"sqlite:///{tmp_path}/copy.db")
     assert sum(statistics(copied).rows.values()) == 0
