@@ -48,10 +48,51 @@ void far_stacks_do_not_know_each_other() {
     EXPECT(near.bodies[5].position.z > 2.3);  // still stacked
 }
 
+/// Two balls on the ground; the second one's row asks for another speed in a second round.
+void answered_islands_are_left_as_they_are() {
+    MixedSystem system;
+    Mat6 unit{};
+    for (int i = 0; i < 6; ++i) unit[7 * i] = 1.0;
+    system.mass = {unit, unit};
+    system.momentum = {{0, 0, -1, 0, 0, 0}, {0, 0, -1, 0, 0, 0}};
+    system.rows = {tie(0, -1), tie(1, -1)};
+    for (RowBlock& row : system.rows) {
+        row.first_jacobian[0] = {0, 0, 1, 0, 0, 0};
+        row.lower[0] = 0.0;
+    }
+    std::vector<FrictionPoint> none;
+    IslandSolver solver;
+    int asked = 0;
+    const IslandSolver::Solve solve = [&asked](MixedSystem& island, std::vector<FrictionPoint>& points,
+                                               DirectSolver& direct) {
+        ++asked;
+        return solve_friction_direct(island, points, FrictionModel::cone, direct);
+    };
+    solver.run(system, none, solve);
+    EXPECT(asked == 2);
+    const Vec6 kept = system.velocity[0];
+    const double push = system.rows[0].multiplier[0];
+    EXPECT_NEAR(push, 1.0, 1e-12);
+
+    system.rows[1].right[0] = 0.5;
+    system.momentum[0][2] = -7.0;  // seen only if the first island is asked again
+    const std::vector<char> answered{1, 0};
+    solver.run(system, none, solve, &answered);
+    EXPECT(asked == 3);
+    EXPECT(system.velocity[0] == kept && system.rows[0].multiplier[0] == push);
+    EXPECT_NEAR(system.velocity[1][2], 0.5, 1e-12);
+    EXPECT_NEAR(system.rows[1].multiplier[0], 1.5, 1e-12);
+
+    solver.run(system, none, solve);
+    EXPECT(asked == 5);
+    EXPECT_NEAR(system.rows[0].multiplier[0], 7.0, 1e-12);
+}
+
 }  // namespace
 
 int main() {
     static_bodies_join_nothing();
+    answered_islands_are_left_as_they_are();
     far_stacks_do_not_know_each_other();
     return report();
 }

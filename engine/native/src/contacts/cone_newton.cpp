@@ -13,10 +13,11 @@ namespace {
 
 constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
 constexpr double known = 1e-13;                     // of a start that is an answer already
-constexpr double refined = 1e-16;                   // of the square of what a direction is to answer
-constexpr double start_blur = 0.2;                  // of the largest natural map
-constexpr double nearest = 1.0;  // of the blur: how far units may be from the path, in the mean
-constexpr double narrow = 0.03;  // a step so short has lost the path
+constexpr double refined = 1e-12;                   // of the square of what Newton's direction is to answer
+constexpr double roughly = 1e-6;    // the same along the path, which only leads to the next point
+constexpr double start_blur = 0.2;  // of the largest natural map
+constexpr double nearest = 1.0;     // of the blur: how far units may be from the path, in the mean
+constexpr double narrow = 0.03;     // a step so short has lost the path
 // Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
 // however redundant the points; with the tightest, what holding leaves is rounding soon after.
 constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
@@ -25,8 +26,9 @@ constexpr double far = 1e-3;                     // a residual, of the speeds, f
 constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
 constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
 constexpr int max_jumps = 10;                    // without half the residual
-constexpr int max_losses = 3;                    // of the path, sought again
-constexpr double back = 10.0;                    //   so many blurs away
+constexpr int max_losses = 3;                    // of the path, sought again,
+constexpr double good_enough = 1e-5;  //   unless jumps left a residual so small: few find less then
+constexpr double back = 10.0;         //   so many blurs away
 
 /// M⁻¹ from its factor: good enough for directions, which are refined.
 Mat6 inverse_six(const Mat6& factor) noexcept {
@@ -205,13 +207,13 @@ bool ConeNewton::step(const MixedSystem& system, double blur) {
 /// Newton's direction, and the path's for the whole blur. False if nothing finite was found.
 bool ConeNewton::find_directions(double blur) {
     for (ConeUnit& unit : units_) unit.lack = {-unit.map[0], -unit.map[1], -unit.map[2]};
-    if (!answer(&ConeUnit::dz, &ConeUnit::du)) return false;
+    if (!answer(&ConeUnit::dz, &ConeUnit::du, refined)) return false;
     for (ConeUnit& unit : units_) unit.lack = {blur * unit.bend[0], blur * unit.bend[1], blur * unit.bend[2]};
-    return answer(&ConeUnit::tz, &ConeUnit::tu);
+    return answer(&ConeUnit::tz, &ConeUnit::tu, roughly);
 }
 
-/// The dz and du that answer what the units' laws lack, refined while that helps.
-bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du) {
+/// The dz and du that answer what the units' laws lack, refined while that helps and more than `enough` is left.
+bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du, double enough) {
     double asked = 0.0;
     for (ConeUnit& unit : units_) {
         unit.*dz = unit.*du = {};
@@ -245,7 +247,7 @@ bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* 
         if (round > 0 && !(left < before)) break;
         for (ConeUnit& unit : units_)
             for (int i = 0; i < unit.size; ++i) (unit.*dz)[i] += unit.c[i], (unit.*du)[i] += unit.turn[i];
-        if (left <= refined * asked) break;
+        if (left <= enough * asked) break;
         before = left;
     }
     return true;
@@ -394,6 +396,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
             jumps = 0, blur = 0.0;
             continue;
         }
+        if (best.speed <= good_enough * speed_) break;
         // Begin anew, further from the end and more carefully.
         jumps = -1, stalled = 0, hold_ = loosest_hold, ++losses;
         if (met > 0.0) {

@@ -71,7 +71,7 @@ private:
     void hold();
     void move(const MixedSystem& system, const Search& found);
     bool find_directions(double blur);
-    bool answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du);
+    bool answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du, double enough);
     static void push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to);
     static ConeUnit::Vec along(const ConeUnit& unit, const std::vector<Vec6>& v);
     static ConeUnit::Vec speed_along(const ConeUnit& unit, const std::vector<Vec6>& v,

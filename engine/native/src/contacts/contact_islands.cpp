@@ -38,8 +38,8 @@ Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties) {
     return islands;
 }
 
-FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points,
-                                 const Solve& solve) {
+FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
+                                 const std::vector<char>* answered) {
     const Islands islands = find_islands(system);
     auto solver_of = [&](int first_body) -> DirectSolver& {
         DirectSolver& solver = solvers_[first_body];
@@ -48,6 +48,9 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         return solver;
     };
     if (islands.count <= 1) return solve(system, points, solver_of(0));
+    std::vector<char> open(islands.count, answered == nullptr);
+    for (std::size_t k = 0; answered && k < system.rows.size(); ++k)
+        if (!(*answered)[k]) open[islands.of_body[std::max(system.rows[k].first, system.rows[k].second)]] = 1;
 
     const int bodies = static_cast<int>(system.mass.size());
     std::vector<MixedSystem> parts(islands.count);
@@ -62,6 +65,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
             solve_six(factor_six(system.mass[b]), system.velocity[b]);
             continue;
         }
+        if (!open[island]) continue;
         if (first_body[island] < 0) first_body[island] = b;
         place[b] = static_cast<int>(parts[island].mass.size());
         parts[island].mass.push_back(system.mass[b]);
@@ -72,19 +76,25 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         const RowBlock& block = system.rows[k];
         const int island = islands.of_body[std::max(block.first, block.second)];
         row_island[k] = island;
+        if (!open[island]) continue;
         row_place[k] = static_cast<int>(parts[island].rows.size());
         parts[island].rows.push_back(block);
         RowBlock& copy = parts[island].rows.back();
         if (copy.first >= 0) copy.first = place[copy.first];
         if (copy.second >= 0) copy.second = place[copy.second];
     }
-    for (const FrictionPoint& point : points) {
+    for (FrictionPoint& point : points) {
+        if (!open[row_island[point.block]]) {
+            point.normal = system.rows[point.block].multiplier[0];
+            continue;
+        }
         part_points[row_island[point.block]].push_back(point);
         part_points[row_island[point.block]].back().block = row_place[point.block];
     }
 
     FrictionReport sum;
     for (int island = 0; island < islands.count; ++island) {
+        if (!open[island]) continue;
         const FrictionReport report =
             solve(parts[island], part_points[island], solver_of(first_body[island]));
         sum.rounds += report.rounds;
@@ -95,8 +105,10 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         sum.finite = sum.finite && report.finite;
     }
     for (int b = 0; b < bodies; ++b)
-        if (islands.of_body[b] >= 0) system.velocity[b] = parts[islands.of_body[b]].velocity[place[b]];
+        if (islands.of_body[b] >= 0 && open[islands.of_body[b]])
+            system.velocity[b] = parts[islands.of_body[b]].velocity[place[b]];
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        if (!open[row_island[k]]) continue;
         const int first = system.rows[k].first, second = system.rows[k].second;
         system.rows[k] = parts[row_island[k]].rows[row_place[k]];
         system.rows[k].first = first;
@@ -105,6 +117,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     std::vector<std::size_t> next(islands.count, 0);
     for (FrictionPoint& point : points) {
         const int island = row_island[point.block], block = point.block;
+        if (!open[island]) continue;
         point = part_points[island][next[island]++];
         point.block = block;
     }

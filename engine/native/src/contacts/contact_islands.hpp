@@ -32,7 +32,9 @@ public:
 
     /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and sweeps and takes the
     /// largest residual.
-    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve);
+    /// Where `answered` says of all rows of an island that they are an answer already, it is left as it is.
+    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
+                       const std::vector<char>* answered = nullptr);
 
     BlockLdlt::Counters counters() const noexcept;
 

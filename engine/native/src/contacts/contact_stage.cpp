@@ -116,7 +116,8 @@ void ContactStage::add_friction(const Point& point, int block, std::vector<Frict
 }
 
 FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
-                                 IslandSolver& islands, FrictionModel model) {
+                                 IslandSolver& islands, FrictionModel model,
+                                 const std::vector<char>* answered) {
     const ContactOptions& o = options_;
     if (o.solver == SolverKind::direct && system.velocity.size() == system.mass.size() &&
         still_right(system, points, model))
@@ -132,7 +133,8 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
                 case SolverKind::direct: break;
             }
             return solve_friction_direct(island, own, model, solver);
-        });
+        },
+        answered);
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;
     counters_.sweeps += report.sweeps;
@@ -212,11 +214,14 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     std::vector<FrictionPoint> friction;
     std::vector<Vec6> next;
     FrictionReport report;
+    std::vector<char> answered;  // per row: the round before found it an answer
     for (int round = 0;; ++round) {
         system.rows.resize(joints);
         friction.clear();
+        answered.assign(joints, 1);
         for (Point& point : points_) {
             system.rows.push_back(resting_row(point));
+            answered.push_back(point.solved);
             if (system.rows.back().size > 1)
                 add_friction(point, static_cast<int>(system.rows.size()) - 1, friction);
         }
@@ -225,7 +230,11 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
             for (std::size_t b = 0; b < unknown_.size(); ++b)
                 if (unknown_[b] >= 0) system.velocity[unknown_[b]] = velocity_[b];
         }
-        report = run(system, friction, resting_solver_, options_.friction);
+        const FrictionReport before = report;
+        const bool late = round > 0 && options_.solver == SolverKind::direct;
+        report = run(system, friction, resting_solver_, options_.friction, late ? &answered : nullptr);
+        report.rounds += before.rounds, report.sweeps += before.sweeps;
+        report.converged = report.converged && before.converged;  // islands may have been left as they were
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();

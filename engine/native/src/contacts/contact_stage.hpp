@@ -246,7 +246,7 @@ private:
                     bool only_prescribed) const;
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
-                       FrictionModel model);
+                       FrictionModel model, const std::vector<char>* answered = nullptr);
     void after_impact(const MixedSystem& system);
     void mark_held(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);

@@ -10,8 +10,10 @@ namespace spook {
 
 namespace {
 
-constexpr int patience = 5;         // rounds without fewer offenders before Murty's rule
-constexpr int max_restarts = 7;     // then Murty's rule
+constexpr int patience = 5;      // rounds without fewer offenders before Murty's rule
+constexpr int max_restarts = 7;  // then Murty's rule
+constexpr int short_search = 4;  // rounds: too few for more offenders at its start than these
+constexpr int few_offenders = 4, offending_share = 25;  // and one row in so many
 constexpr double tightest = 1e-11;  // tolerance of a velocity, relative to the system's scale
 constexpr double loosest = 1e-7;    // where contradicting rigid contacts leave no exact answer
 
@@ -366,6 +368,8 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
             report.converged = false;
             continue;
         }
+        if (round == 0 && round_limit <= short_search && count > few_offenders + bounded / offending_share)
+            break;
         if (count < best && refined) best = count, left = patience;
         else if (left > 0) --left;
         if (left == 0 && report.restarts < max_restarts) {
