@@ -42,9 +42,9 @@ GROWTH = 1.6  # × the cost per contact of the smallest heap: what sorting pairs
 REST = 0.5  # × one step of a stack that is hit: at rest no matrix is factored
 TALL = 1.6  # × the cost per box of a stack of 100, for one of 500 at rest
 WIDE = 1.8  # the same for a hundred stacks of ten, none straight; 6 where rounding kept them from being found at rest
-KNOCKED = 25.0  # a knocked stack, of one at rest: 12 when it was set; 160 where Newton's hold lost the path
+KNOCKED = 15.0  # a knocked stack, of one at rest: 6 when it was set; 160 where Newton's hold lost the path
 BALL = Sphere(0.25)
-MIXED = 25.0  # × the median step by 50 sweeps: 64 mixed bodies, solved directly; the aim is 6
+MIXED = 9.0  # × the median step by 50 sweeps: 64 mixed bodies, solved directly; 4.5 when it was set
 WORST = 10.0  # × the median of the direct steps, in any step
 OVERLAP = 1e-3  # m, what heaps of spheres are compared at
 
