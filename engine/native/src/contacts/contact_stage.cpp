@@ -10,9 +10,9 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;     // of the larger body's radius: a depth that is rounding
-constexpr double rounding = 1e-15;  // of a place and of a size: four roundings
-constexpr int late_rounds = 3;      // of solves that set others in motion towards a third
+constexpr double slack_share = 1e-10;  // of the smaller body's radius
+constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
+constexpr int late_rounds = 3;         // of solves that set others in motion towards a third
 
 }  // namespace
 
@@ -147,7 +147,20 @@ double ContactStage::time_left(const Point& point) const noexcept {
 }
 
 double ContactStage::explained_depth(const Point& point) const noexcept {
-    return point.pressed_before + closed * size(point.contact);
+    return point.pressed_before + slack(point.contact);
+}
+
+/// The radius of the smaller of two bodies, of those that move by themselves, m.
+double ContactStage::moving_size(const Contact& contact) const noexcept {
+    const std::vector<double>& radius = detection_.radius();
+    const int a = contact.first, b = contact.second;
+    if (unknown_[a] < 0) return radius[b];
+    return unknown_[b] < 0 ? radius[a] : std::min(radius[a], radius[b]);
+}
+
+/// A depth that is rounding: it may come back as a speed, which gives a billionth of a body's height at most.
+double ContactStage::slack(const Contact& contact) const noexcept {
+    return slack_share * moving_size(contact);
 }
 
 /// A gap no larger than the rounding of the places it was found at is none. Answered with a speed it would come back
@@ -240,7 +253,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         order_points();
     }
     judge(system, friction, report);
-    if (unsettled_body_ >= 0) {
+    if (!report.converged) {
         std::vector<double> share;
         shorten_unsettled(system, joints, share);
         for (std::size_t k = joints; k < system.rows.size(); ++k)

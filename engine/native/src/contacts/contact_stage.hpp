@@ -44,7 +44,7 @@
 // v₊ = v + k + M⁻¹ Gᵀ z and q₊ = q + h v₊ follows E₊ − E = z·G v₊ − ½ |v₊ − v|²_M. Of rigid contacts z·G v₊ = z·r
 // with r <= 0 but for rounding, friction takes (beta·D v₊ <= 0), and parting pays for what it lifts. So r has no
 // Ups C v for a rigid contact that opens: it would push a body after its own speed, up to ½ Ups² |k|²_M a step.
-// A solve that has not settled proves nothing: its impulses z are shortened, island by island, to the largest s z for
+// A solve that stopped early proves nothing: its impulses z are shortened, island by island, to the largest s z for
 // which E₊ <= E. It exists: s = 0 is free fall, E₊ − E = −½ |k|²_M, and E₊ is convex in s.
 #pragma once
 
@@ -267,6 +267,7 @@ private:
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
     void blame(double residual, int unknown);
+    void blame_sunk();
     void shorten_unsettled(MixedSystem& system, std::size_t joints, std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
     // contact_parting.cpp
@@ -281,6 +282,8 @@ private:
     bool is_supplied(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
+    double moving_size(const Contact& contact) const noexcept;
+    double slack(const Contact& contact) const noexcept;
     double size(const Contact& contact) const noexcept;
     double gap(const Contact& contact) const noexcept;
     bool is_closed(const Contact& contact) const noexcept;
