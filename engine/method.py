@@ -35,7 +35,8 @@ class Method:
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1)
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
-                       law, its impulse against where a step of projection would put it
+                       law, its impulse against where a step of projection would put it; so does one that stopped early
+                       and left bodies sunk into each other by a fiftieth of the smaller one's radius
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
     force_stages       stages to keep although the scene does not need them, to measure what they cost

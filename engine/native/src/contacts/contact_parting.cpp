@@ -245,4 +245,15 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie
     return true;
 }
 
+void ContactStage::pay(int island, Vec3 momentum) noexcept {
+    for (Touch& touch : touches_) {
+        const int first = unknown_[touch.contact.first], second = unknown_[touch.contact.second];
+        if (std::min(first, second) >= 0 || parting_.islands.of_body[std::max(first, second)] != island)
+            continue;
+        if (!(touch.normal > 0.0 || touch.impact > 0.0)) continue;
+        touch.impulse += first >= 0 ? -momentum : momentum;
+        return;
+    }
+}
+
 }  // namespace spook

@@ -142,6 +142,10 @@ public:
     /// `again` when the bodies are displaced: what is linear in the displacement is not all.
     bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
 
+    /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse of
+    /// what does not move by itself: forces keep adding up to the momentum.
+    void pay(int island, Vec3 momentum) noexcept;
+
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
     bool held(int unknown) const noexcept { return held_[unknown] != 0; }
 
