@@ -21,7 +21,7 @@ def cells() -> dict[str, list[str]]:
     """The page's table of facts: what each setting of each engine answered."""
     table = PAGE.read_text(encoding="utf-8").partition("## What kinds of engines do")[2].partition("\n## ")[0]
     rows = [line.strip("|").split("|") for line in table.splitlines() if re.match(r"\| \w+ \(", line)]
-    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows}
+    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows[1:]}
 
 
 def said(cell: str) -> float:
@@ -72,13 +72,13 @@ def test_the_friction_of_mujocos_defaults_creeps() -> None:
     assert creep["spook (plain)"] < 1e-12
 
 
-def test_single_precision_stops_near_1e_6_and_double_does_not() -> None:
+def test_single_precision_loses_digits_that_double_keeps() -> None:
     lost = column(5)
     single = {"jolt", "rapier"}
 
     for name, error in lost.items():
         if name.split()[0] in single or name == "p2 (defaults)":
-            assert 1e-8 < error < 1e-4, name
+            assert 1e-6 < error < 1e-2, name
         else:
             assert error < 1e-12, name
     assert single <= {name.split()[0] for name in lost}
