@@ -286,7 +286,7 @@ KINDS = (
     "Five questions whose answers follow from how an engine is made, in every setting (`bench/engine_facts.py` states them):",
     "",
     "- **A chain of 26 links** gains energy, or comes apart, in joint coordinates with semi-implicit Euler at 1/60 s and",
-    "  1/240 s; Runge-Kutta steps and rods held as constraints stay near or below zero.",
+    "  1/240 s; rods held as constraints do not, nor does Runge-Kutta of order 4.",
     "- **A door on ten hinges** is held by many splits of its load. That of least norm is even; sweeps and joint coordinates",
     "  give others, whose forces across are off by as much as the largest of them, or by several times that.",
     "- **A beam of 80 locked boxes** on two piles falls between them where sweeps or springs hold the locks (free fall is",

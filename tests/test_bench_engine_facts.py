@@ -14,7 +14,7 @@ from spook_tracker.engine.find import find
 from spook_tracker.engine.result import SimulationFailed
 
 PAGE = Path(__file__).parents[1] / "docs" / "engines.md"
-UPPER = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+UPPER = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def cells() -> dict[str, list[str]]:
@@ -25,10 +25,11 @@ def cells() -> dict[str, list[str]]:
 
 
 def said(cell: str) -> float:
-    """2.2×10⁻²² -> 2.2e-22; what came apart is infinite."""
+    """2.2×10⁻²² -> 2.2e-22, 10⁻⁵ -> 1e-5; what came apart is infinite."""
     if cell in ("diverged", "not finite"):
         return float("inf")
-    return float(cell.translate(UPPER).replace("×10", "e"))
+    power = re.fullmatch(r"(?:(.+)×)?10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", cell)
+    return float(f"{power[1] or 1}e{power[2].translate(UPPER)}" if power else cell)
 
 
 def column(place: int) -> dict[str, float]:
