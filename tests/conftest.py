@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import make_url
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.store.database import open_database
@@ -47,9 +49,10 @@ def sqlite_url(tmp_path: Path) -> str:
 
 
 @pytest.fixture
-def postgresql_url(postgresql_server: postgresql.Server) -> str:
+def postgresql_url(postgresql_server: postgresql.Server) -> Iterator[str]:
     """An empty PostgreSQL database."""
-    return postgresql_server.new_database()
+    with postgresql_server.new_database() as url:
+        yield url
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
@@ -59,10 +62,47 @@ def url(request: pytest.FixtureRequest) -> str:
     return found
 
 
+@pytest.fixture(scope="session")
+def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A SQLite file at the newest revision, to be copied: migrating costs seven times as much."""
+    path = tmp_path_factory.mktemp("template") / "tracker.db"
+    open_database(f"sqlite:///{path}").dispose()
+    return path
+
+
+@pytest.fixture(scope="session")
+def postgresql_template(postgresql_server: postgresql.Server) -> Iterator[str]:
+    """The name of a PostgreSQL database at the newest revision, to be copied."""
+    with postgresql_server.new_database() as url:
+        open_database(url).dispose()
+        yield str(make_url(url).database)
+
+
 @pytest.fixture
-def session(url: str) -> Iterator[Session]:
-    """A session on an empty database of either kind, at the newest revision."""
-    engine = open_database(url)
+def migrated_sqlite_url(sqlite_url: str, sqlite_template: Path) -> str:
+    """A SQLite file at the newest revision, without runs."""
+    shutil.copyfile(sqlite_template, sqlite_url.removeprefix("sqlite:///"))
+    return sqlite_url
+
+
+@pytest.fixture
+def migrated_postgresql_url(postgresql_server: postgresql.Server, postgresql_template: str) -> Iterator[str]:
+    """A PostgreSQL database at the newest revision, without runs."""
+    with postgresql_server.new_database(copied=postgresql_template) as url:
+        yield url
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def migrated_url(request: pytest.FixtureRequest) -> str:
+    """A database of either kind at the newest revision, without runs."""
+    found: str = request.getfixturevalue(f"migrated_{request.param}_url")
+    return found
+
+
+@pytest.fixture
+def session(migrated_url: str) -> Iterator[Session]:
+    """A session on a database of either kind, at the newest revision, without runs."""
+    engine = open_database(migrated_url)
     with Session(engine) as session:
         yield session
     engine.dispose()

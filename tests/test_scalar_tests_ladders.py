@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
@@ -23,9 +22,22 @@ ORDERED = [entry for entry in LADDERS if entry[2].expected_order is not None]
 ORDERS = {(name, ladder.name, c.name): c.expected_order for name, ladder, c in LADDERS}
 
 
+KNOWN: dict[tuple[int, str, float], float] = {}
+
+
+def error_at(ladder: Ladder, h: float, configuration: Configuration, engine: Simulate = simulate) -> float:
+    """The error of a rung: of our engine asked once, however many tests look at it."""
+    if engine is not simulate:
+        return ladder.error(engine, h, configuration.method)
+    rung = id(ladder), configuration.name, h
+    if rung not in KNOWN:
+        KNOWN[rung] = ladder.error(engine, h, configuration.method)
+    return KNOWN[rung]
+
+
 def order(ladder: Ladder, configuration: Configuration, engine: Simulate = simulate) -> float:
     steps = [h for h in ladder.steps_of(configuration) if in_range(h, configuration.order_range)]
-    found = observed_order(steps, [ladder.error(engine, h, configuration.method) for h in steps])
+    found = observed_order(steps, [error_at(ladder, h, configuration, engine) for h in steps])
     assert found is not None
     return found
 
@@ -104,7 +116,7 @@ def test_every_target_is_within_reach(name: str) -> None:
         if ladder.target_error is None:
             continue
         for configuration in ladder.configurations:
-            errors = [
-                abs(ladder.error(simulate, h, configuration.method)) for h in ladder.steps_of(configuration)
-            ]
-            assert min(e for e in errors if math.isfinite(e)) <= ladder.target_error, configuration.name
+            assert any(
+                abs(error_at(ladder, h, configuration)) <= ladder.target_error
+                for h in sorted(ladder.steps_of(configuration), reverse=True)
+            ), configuration.name

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import signal
 import subprocess
 import sys
 import time
@@ -17,67 +16,9 @@ from spook_tracker.tracker.store.database import open_database
 from spook_tracker.tracker.store.database_check import check
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
+from tests.database_work import SERIES, write, write_once_told
+from tests.forked import begun, said
 from tests.run_documents import figure, run, run_of
-
-WRITER = """
-import sys
-from sqlalchemy.orm import Session
-from tests.run_documents import run_of
-from spook_tracker.tracker.store.database import open_database
-from spook_tracker.tracker.store.record import record
-engine = open_database(sys.argv[1])
-name, count = sys.argv[2], int(sys.argv[3])
-with Session(engine) as session:
-    for number in range(count):
-        values = {f"series {n}": n + number / 7 for n in range(40)}
-        record(session, run_of(values, id=f"{name}-{number}", idempotency_key=f"{name}-{number}"))
-        print(number, flush=True)
-engine.dispose()
-"""
-SERIES = 40  # samples in each of its runs
-
-
-AT_ONCE = """
-import os, sys
-from sqlalchemy.orm import Session
-from tests.run_documents import run_of
-from spook_tracker.tracker.store import revisions  # what is imported takes no time any more
-from spook_tracker.tracker.store.database import open_database
-from spook_tracker.tracker.store.record import record
-
-def write(name):
-    numbers = range(40) if name % 2 else range(39, -1, -1)
-    for k in range(1):
-        run = run_of({f"series {n} of {k}": n / 7 for n in numbers}, id=f"{name}-{k}", idempotency_key=f"{name}-{k}")
-        engine = open_database(sys.argv[1])
-        with Session(engine) as session:
-            record(session, run)
-        engine.dispose()
-
-start, go = os.pipe()
-children = []
-for name in range(int(sys.argv[2])):
-    child = os.fork()
-    if child == 0:
-        os.close(go)
-        os.read(start, 1)  # until the parent closes its end: all begin at the same moment
-        failed = 1
-        try:
-            write(name)
-            failed = 0
-        except BaseException as error:
-            print(error, flush=True)
-        os._exit(failed)
-    children.append(child)
-os.close(go)
-sys.exit(sum(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children))
-"""
-
-
-def writer(url: str, name: str, count: int) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-c", WRITER, url, name, str(count)], stdout=subprocess.PIPE, text=True
-    )
 
 
 def stored_runs(url: str) -> set[str]:
@@ -97,14 +38,12 @@ def test_a_process_killed_at_any_moment_leaves_whole_runs(url):
     """Everything it had announced as recorded is there; of the run it was at, all or nothing."""
     chance, announced = random.Random(7), set()
     for attempt in range(3):
-        process = writer(url, f"w{attempt}", 10_000)
-        assert process.stdout is not None
-        announced.add(f"w{attempt}-{process.stdout.readline().strip()}")  # it is at work now
+        process, pipe = begun(write, url, f"w{attempt}", 10_000)
+        announced.add(f"w{attempt}-{pipe.recv()}")  # it is at work now
         time.sleep(chance.uniform(0.0, 0.15))
-        process.send_signal(signal.SIGKILL)
-        announced |= {f"w{attempt}-{line.strip()}" for line in process.stdout if line.endswith("\n")}
-        process.stdout.close()
-        process.wait()
+        process.kill()
+        announced |= {f"w{attempt}-{number}" for number in said(pipe)}
+        process.join()
 
         stored = stored_runs(url)
 
@@ -112,39 +51,39 @@ def test_a_process_killed_at_any_moment_leaves_whole_runs(url):
         assert len(stored - announced) <= attempt + 1  # committed, but killed before it could say so
 
 
+def ended(writers) -> list[int | None]:
+    """How processes ended, once all have."""
+    for process, pipe in writers:
+        said(pipe)
+        process.join()
+    return [process.exitcode for process, _ in writers]
+
+
 def test_writers_at_the_same_time_wait_for_each_other(url):
     """Both start on an empty database: the first makes the tables, and no run of either is lost."""
-    processes = [writer(url, name, 10) for name in ("one", "two")]
-    for process in processes:
-        process.communicate(timeout=300)
-        assert process.returncode == 0
+    writers = [begun(write, url, name, 10) for name in ("one", "two")]
 
+    assert ended(writers) == [0, 0]
     assert stored_runs(url) == {f"{name}-{number}" for name in ("one", "two") for number in range(10)}
 
 
-@pytest.mark.parametrize("kind", ["sqlite", "postgresql"])
-def test_nine_writers_that_meet_on_a_new_database_lose_nothing(kind, request, tmp_path):
+@pytest.mark.parametrize("attempt", range(2))
+def test_nine_writers_that_meet_on_a_new_database_lose_nothing(url, attempt):
     """Whoever comes first makes the tables; the others neither take them for something strange nor collide."""
-    for attempt in range(2):
-        url = f"sqlite:///{tmp_path}/{attempt}.db"
-        if kind == "postgresql":
-            url = request.getfixturevalue("postgresql_server").new_database()
+    writers = [begun(write_once_told, url, name) for name in range(9)]
+    for _, pipe in writers:
+        assert pipe.recv() == "ready"
+    for _, pipe in writers:
+        pipe.send("go")
 
-        done = subprocess.run(
-            [sys.executable, "-c", AT_ONCE, url, "9"], capture_output=True, text=True, check=False
-        )
-
-        assert done.stdout == ""
-        assert done.returncode == 0, done.stderr
-        assert stored_runs(url) == {f"{name}-{number}" for name in range(9) for number in range(1)}
+    assert ended(writers) == [0] * 9
+    assert stored_runs(url) == {str(name) for name in range(9)}
 
 
 def test_writers_of_the_same_run_store_it_once(url):
-    processes = [writer(url, "same", 8) for _ in range(2)]
-    for process in processes:
-        process.communicate(timeout=300)
-        assert process.returncode == 0
+    writers = [begun(write, url, "same", 8) for _ in range(2)]
 
+    assert ended(writers) == [0, 0]
     assert stored_runs(url) == {f"same-{number}" for number in range(8)}
 
 

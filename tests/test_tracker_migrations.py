@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import signal
-import subprocess
-import sys
 from shutil import copytree
 from typing import get_args
 
@@ -24,6 +22,8 @@ from spook_tracker.tracker.store.database_copy import digest
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.revisions import configuration, differences, revert
+from tests.database_work import migrate_and_die
+from tests.forked import begun, said
 from tests.run_documents import definition, run, run_of, sample
 
 SCRIPTS = ScriptDirectory.from_config(configuration())
@@ -144,7 +144,7 @@ def test_every_class_of_outcome_can_be_stored(climbed):
     assert {row.outcome for row in climbed.scalars(select(models.Sample))} == set(classes)
 
 
-def test_all_the_way_down_and_up_again(session, url):
+def test_all_the_way_down_and_up_again(session, migrated_url):
     filled(session)
     session.close()
     engine = session.get_bind().engine
@@ -310,30 +310,6 @@ def test_urls_are_understood(monkeypatch):
             database_url(wrong)
 
 
-KILLED = """
-import os, signal, sys
-from sqlalchemy import event
-from spook_tracker.tracker.store.database import open_database
-from spook_tracker.tracker.store import connection
-
-left, real = [int(sys.argv[2])], connection.connected
-
-def counting(*given):
-    engine = real(*given)
-    @event.listens_for(engine, "before_cursor_execute")
-    def count(_connection, _cursor, statement, *_rest):
-        if statement.startswith(("UPDATE", "CREATE", "INSERT", "DROP", "ALTER")):
-            left[0] -= 1
-            if left[0] == 0:
-                os.kill(os.getpid(), signal.SIGKILL)
-    return engine
-
-import spook_tracker.tracker.store.database as database
-database.connected = counting
-open_database(sys.argv[1]).dispose()
-"""
-
-
 def contents(url):
     """Every row of every table."""
     engine = create_engine(url)
@@ -360,8 +336,10 @@ def test_a_migration_that_moves_every_row_is_whole_or_absent_wherever_it_is_kill
     }
 
     for statement in (1, 4, 9, 17):
-        done = subprocess.run([sys.executable, "-c", KILLED, url, str(statement)], check=False, timeout=300)
-        assert done.returncode == -signal.SIGKILL
+        process, pipe = begun(migrate_and_die, url, statement)
+        assert said(pipe) == []
+        process.join()
+        assert process.exitcode == -signal.SIGKILL
         assert contents(url) == below
 
     open_database(url).dispose()

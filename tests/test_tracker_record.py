@@ -42,11 +42,11 @@ def test_a_recorded_document_comes_back_equal(session):
     assert History(session).document(given.id) == given
 
 
-def test_a_recorded_run_is_there_for_everybody_at_once(session, url):
+def test_a_recorded_run_is_there_for_everybody_at_once(session, migrated_url):
     given = run()
     record(session, given)
 
-    reader = open_database(url, readonly=True)
+    reader = open_database(migrated_url, readonly=True)
     with Session(reader) as reading:
         assert [info.id for info in History(reading).runs()] == [given.id]
     reader.dispose()
