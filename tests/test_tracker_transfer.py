@@ -7,6 +7,7 @@ import json
 import jsonschema
 import msgspec
 import pytest
+from msgspec.structs import replace
 from sqlalchemy import delete, select, text, update
 from sqlalchemy.orm import Session
 
@@ -14,7 +15,7 @@ from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
 from spook_tracker.tracker.document.json_form import decode
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.document.schema import document_schema
-from spook_tracker.tracker.store import border, models
+from spook_tracker.tracker.store import border, models, transfer
 from spook_tracker.tracker.store.database import open_database
 from spook_tracker.tracker.store.database_check import check
 from spook_tracker.tracker.store.database_copy import copy_database
@@ -55,6 +56,56 @@ def test_importing_twice_changes_nothing(session, tmp_path):
     assert import_files(session, [tmp_path]).stored == (given.id,)
     assert import_files(session, [tmp_path / "run.json"]).present == (given.id,)
     assert History(session).document(given.id) == given
+
+
+def test_runs_stored_together_are_each_whole_or_absent_and_an_import_broken_off_goes_on(
+    session, tmp_path, monkeypatch
+):
+    given = [run_of({KEY: float(n), "b": -0.0}) for n in range(5)]
+    for place, document in enumerate(given):
+        (tmp_path / f"{place}.json").write_bytes(encoded(document))
+    monkeypatch.setattr(transfer, "TOGETHER", 4)  # two runs of two samples each
+    store, told = transfer.record_together, []
+
+    def breaks_off(session, runs):
+        if told:
+            raise KeyboardInterrupt
+        told.append(runs)
+        return store(session, runs)
+
+    monkeypatch.setattr(transfer, "record_together", breaks_off)
+    with pytest.raises(KeyboardInterrupt):
+        import_files(session, [tmp_path])
+    assert {found.id for found in History(session).runs()} == {document.id for document in given[:2]}
+    session.rollback()
+
+    monkeypatch.setattr(transfer, "record_together", store)
+    done = import_files(session, [tmp_path])
+
+    assert (len(done.present), len(done.stored)) == (2, 3)
+    assert [History(session).document(document.id) for document in given] == given
+
+
+def test_what_a_session_knows_to_be_there_is_asked_again_once_it_is_not(session, url):
+    record(session, run())
+    other = open_database(url)
+    with Session(other) as elsewhere:  # nothing of ours does this; a hand in the database may
+        for table in reversed(models.Base.metadata.sorted_tables):
+            elsewhere.execute(delete(table))
+        elsewhere.commit()
+    other.dispose()
+    again = run()
+
+    assert record(session, again)
+    assert History(session).document(again.id) == again
+
+
+def test_every_type_of_a_document_has_a_rule_for_what_can_be_stored_of_it():
+    fits = border._fits(RunDocument)
+
+    assert fits(run())
+    for series in (run().series[0], replace(run().series[0], aliases=("a" * (border.MAX_TEXT + 1),))):
+        assert fits(run(series=(series,))) == (series.aliases == run().series[0].aliases)
 
 
 def test_one_bad_file_and_nothing_is_imported(session, tmp_path):

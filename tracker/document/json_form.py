@@ -7,6 +7,7 @@ the float it stands for.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any, TypeVar
 
 import msgspec
@@ -44,7 +45,12 @@ def encode(part: Any) -> bytes:
 
 def decode(data: bytes | str, kind: type[Part]) -> Part:
     """A part of a document from JSON. msgspec.DecodeError if it is no such part."""
-    return msgspec.json.decode(data, type=kind, dec_hook=_read)
+    return _decoder(kind).decode(data)  # type: ignore[no-any-return, arg-type]
+
+
+@cache
+def _decoder(kind: Any) -> msgspec.json.Decoder[Any]:
+    return msgspec.json.Decoder(kind, dec_hook=_read)
 
 
 def readable(document: Any) -> str:

@@ -8,12 +8,16 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from operator import attrgetter
 from typing import Any
 
 import msgspec
+from msgspec import inspect
 
 from spook_tracker.tracker.document.errors import DocumentError
-from spook_tracker.tracker.document.json_form import Number, boxed, builtins, convert, decode
+from spook_tracker.tracker.document.json_form import boxed, builtins, convert, decode
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.rows import moment
 
@@ -22,6 +26,11 @@ MAX_SAMPLES = 100_000  # of one document, and as many series
 MAX_TEXT = 65_536  # characters of one text
 MAX_INTEGER = 2**63 - 1  # what a column holds
 REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+NUL = rb"\u0000"  # as JSON has to write it
+FITTING = (
+    inspect.FloatType, inspect.BoolType, inspect.NoneType, inspect.BytesType, inspect.LiteralType,
+    inspect.CustomType,
+)  # fmt: skip
 ESCAPE = re.compile(rb"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)  # one escape of a JSON text
 
 
@@ -52,20 +61,46 @@ def _cleaned(part: Any, place: str) -> Any:
     return part
 
 
-def _is_clean(part: Any) -> bool:
-    """Whether a part that was read into its types is already as `_cleaned` would leave it.
+Check = Callable[[Any], bool]
 
-    Types are right then, and a number of JSON is finite or a `Number`: texts and whole numbers remain.
-    """
-    if isinstance(part, str):
-        return len(part) <= MAX_TEXT and clean_text(part) == part
-    if isinstance(part, tuple):
-        return (bool(part) and type(part[0]) is Number) or all(map(_is_clean, part))
-    if isinstance(part, msgspec.Struct):
-        return all(_is_clean(getattr(part, name)) for name in part.__struct_fields__)
-    if isinstance(part, dict):
-        return all(map(_is_clean, part)) and all(map(_is_clean, part.values()))
-    return not isinstance(part, int) or abs(part) <= MAX_INTEGER
+
+@cache
+def _fits(kind: type) -> Check:
+    """Whether a part that was read as this type can be stored: what its type leaves open, and no more, is looked at."""
+    return _check(inspect.type_info(kind)) or (lambda part: True)
+
+
+def _check(kind: inspect.Type) -> Check | None:
+    """The check of one type; None if any value of it fits. Lengths of most texts are in their types."""
+    if isinstance(kind, FITTING) or (isinstance(kind, inspect.StrType) and kind.max_length is not None):
+        return None
+    if isinstance(kind, inspect.StrType):
+        return lambda text: len(text) <= MAX_TEXT
+    if isinstance(kind, inspect.IntType):
+        return lambda number: -MAX_INTEGER <= number <= MAX_INTEGER
+    if isinstance(kind, inspect.DictType):
+        value = _check(kind.value_type)
+        return None if value is None else lambda part: all(map(value, part.values()))
+    if isinstance(kind, inspect.VarTupleType):
+        item = _check(kind.item_type)
+        return None if item is None else lambda part: all(map(item, part))
+    if isinstance(kind, inspect.TupleType):
+        items = [check for check in map(_check, kind.item_types) if check is not None]
+        if not items:
+            return None
+        if len(items) == len(kind.item_types):
+            return lambda part: all(check(inner) for check, inner in zip(items, part, strict=True))
+    if isinstance(kind, inspect.UnionType):
+        some = [check for check in map(_check, kind.types) if check is not None]
+        if not some:
+            return None
+        if len(some) == 1 and kind.includes_none and len(kind.types) == 2:
+            return lambda part: part is None or some[0](part)
+    if isinstance(kind, inspect.StructType):
+        fields = [(attrgetter(field.name), _check(field.type)) for field in kind.fields]
+        looked_at = [(of, check) for of, check in fields if check is not None]
+        return (lambda part: all(check(of(part)) for of, check in looked_at)) if looked_at else None
+    raise TypeError(f"{kind} has no rule for what can be stored of it")
 
 
 def checked(run: RunDocument) -> RunDocument:
@@ -87,8 +122,10 @@ def decoded(data: bytes, origin: str = "the document") -> RunDocument:
     if len(data) > MAX_BYTES:
         raise DocumentError(f"{origin}: {len(data)} bytes; a run document has at most {MAX_BYTES}")
     try:
-        run = decode(_without_surrogates(data), RunDocument)
-        return _sensible(run) if _is_clean(run) else checked(run)
+        data = _without_surrogates(data)
+        run = decode(data, RunDocument)
+        storable = NUL not in data and _fits(RunDocument)(run)  # as `_cleaned` would leave it
+        return _sensible(run) if storable else checked(run)
     except (msgspec.ValidationError, DocumentError) as error:
         raise DocumentError(f"{origin} is not a valid run document: {error!s:.300}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -1,8 +1,9 @@
-"""Store one run: one document, one transaction. Killed at any moment, the run is whole or absent."""
+"""Store runs: each in one transaction, alone or with others. Killed at any moment, a run is whole or absent."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import Table, insert, or_, select, update
@@ -18,6 +19,8 @@ from spook_tracker.tracker.store.identity import identity
 
 ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
 CHUNK = 500  # ids in one IN (...), well below every database's limit
+Present = dict[tuple[str, int], rows.Row]  # by table and id
+PRESENT = "rows known to be there"  # where a session keeps them
 
 
 def record(session: Session, run: RunDocument) -> bool:
@@ -30,14 +33,22 @@ def record(session: Session, run: RunDocument) -> bool:
 
 def record_checked(session: Session, run: RunDocument) -> bool:
     """The same for a document that tracker/store/border.py has given out."""
+    return record_together(session, [run])[0]
+
+
+def record_together(session: Session, runs: Sequence[RunDocument]) -> list[bool]:
+    """The same for several such documents in one transaction: whether each of them was new."""
     with in_words(session):
         for attempt in range(ATTEMPTS):
+            there = dict(session.info.get(PRESENT, {}))
             try:
-                stored = _store(session, run)
+                stored = [_store(session, run, there) for run in runs]
                 session.commit()
+                session.info[PRESENT] = there
                 return stored
             except IntegrityError:  # another process stored the same engine, series, ... meanwhile
                 session.rollback()
+                session.info.pop(PRESENT, None)
                 if attempt == ATTEMPTS - 1:
                     raise
             except BaseException:
@@ -55,20 +66,20 @@ def _known(session: Session, run: RunDocument) -> bool:
     return bool(keys)
 
 
-def _store(session: Session, run: RunDocument) -> bool:
+def _store(session: Session, run: RunDocument, there: Present) -> bool:
     one_writer(session)  # two that insert the same rows in another order would wait for each other
     if _known(session, run):
         return False
     engine, machine = rows.engine_row(run.engine), rows.machine_row(run.machine)
     cards = rows.cards_row(run.tests)
     definitions = [rows.definition_row(definition) for definition in run.series]
-    _ensure(session, models.EngineVersion, [engine])
-    _ensure(session, models.Machine, [machine])
-    _ensure(session, models.TestCards, [cards])
-    keys = {definition.key for definition in run.series}
-    _ensure(session, models.Series, [{"id": identity("series", key), "key": key} for key in sorted(keys)])
+    _ensure(session, models.EngineVersion, [engine], there)
+    _ensure(session, models.Machine, [machine], there)
+    _ensure(session, models.TestCards, [cards], there)
+    ids = {definition.key: row["series_id"] for definition, row in zip(run.series, definitions, strict=True)}
+    _ensure(session, models.Series, [{"id": ids[key], "key": key} for key in sorted(ids)], there)
     _ensure_aliases(session, run)
-    _ensure(session, models.Definition, definitions)
+    _ensure(session, models.Definition, definitions, there)
     list_id = _ensure_list(session, [definition["id"] for definition in definitions])
 
     gates = {definition.key for definition in run.series if definition.role == "gate"}
@@ -101,7 +112,7 @@ def _store(session: Session, run: RunDocument) -> bool:
     definition_ids = dict(zip((d.key for d in run.series), (row["id"] for row in definitions), strict=True))
     samples, evidence, timings = [], [], []
     for position, sample in enumerate(run.samples):
-        here = place | {"series_id": identity("series", sample.series)}
+        here = place | {"series_id": ids[sample.series]}
         where = {"definition_id": definition_ids[sample.series], "position": position}
         samples.append(here | where | rows.sample_row(sample))
         if (proof := rows.evidence_row(sample)) is not None:
@@ -125,20 +136,36 @@ def _bodies(place: dict[str, Any], parts: Sequence[Any]) -> list[rows.Row]:
 
 
 def _append(session: Session, model: type[models.Base], new: list[rows.Row]) -> None:
-    if new:
-        session.execute(insert(model.__table__), new)  # type: ignore[arg-type]
+    """Insert rows, all with the same columns: by the driver, for SQLAlchemy looks at each value of each row."""
+    if not new:
+        return
+    connection, table, names = session.connection(), model.__table__, list(new[0])
+    assert isinstance(table, Table)
+    mark = {"qmark": "?", "format": "%s", "pyformat": "%s"}[connection.dialect.paramstyle]
+    columns, marks = ", ".join(f'"{name}"' for name in names), ", ".join([mark] * len(names))
+    values: Iterable[tuple[Any, ...]] = (tuple(row.values()) for row in new)
+    if "started_at" in names:  # the one column that a database may write in a way of its own; it comes first
+        kind = table.c.started_at.type.dialect_impl(connection.dialect)
+        written = lru_cache(kind.bind_processor(connection.dialect) or (lambda moment: moment))
+        values = ((written(moment), *rest) for moment, *rest in values)
+    connection.exec_driver_sql(f'INSERT INTO "{table.name}" ({columns}) VALUES ({marks})', list(values))
 
 
-def _ensure(session: Session, model: type[models.Base], wanted: list[rows.Row]) -> None:
-    """Insert the rows whose id is not there yet. Equal ids mean equal content, which is verified."""
+def _ensure(session: Session, model: type[models.Base], wanted: list[rows.Row], there: Present) -> None:
+    """Insert the rows whose id is not there yet. Equal ids mean equal content, which is verified.
+
+    `there` are rows of which that is known: such rows are never changed or removed.
+    """
     table = model.__table__
     assert isinstance(table, Table)
-    by_id = {row["id"]: row for row in wanted}
+    by_id = {row["id"]: row for row in wanted if there.get((table.name, row["id"])) != row}
+    new = dict(by_id)
     for ids in _chunks(sorted(by_id)):
-        for there in session.execute(select(table).where(table.c.id.in_(ids))).mappings():
-            if dict(there) != by_id.pop(there["id"]):
-                raise DatabaseError(f"two different rows of {table.name} have the id {there['id']}")
-    _append(session, model, list(by_id.values()))
+        for stored in session.execute(select(table).where(table.c.id.in_(ids))).mappings():
+            if dict(stored) != new.pop(stored["id"]):
+                raise DatabaseError(f"two different rows of {table.name} have the id {stored['id']}")
+    _append(session, model, list(new.values()))
+    there.update(((table.name, row_id), row) for row_id, row in by_id.items())
 
 
 def add_again(session: Session, run: RunDocument) -> None:

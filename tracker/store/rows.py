@@ -6,6 +6,7 @@ import math
 import zlib
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import msgspec
@@ -114,7 +115,13 @@ def limits(definition: document.SeriesDefinition) -> tuple[float | None, float |
 
 
 def definition_row(definition: document.SeriesDefinition) -> Row:
-    body = json_of(definition)
+    """The row of a definition, not to be changed: definitions are the same night after night."""
+    return _definition_row(json_of(definition))
+
+
+@lru_cache(maxsize=20_000)
+def _definition_row(body: str) -> Row:
+    definition = definition_of(body)
     low, high = limits(definition)
     same = ("test", "configuration", "metric", "unit", "role", "better", "kind", "test_version")
     return {

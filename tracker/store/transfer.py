@@ -18,8 +18,10 @@ from spook_tracker.tracker.document.json_form import readable
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.record import record_checked
+from spook_tracker.tracker.store.record import record_together
 from spook_tracker.tracker.store.versions import RunInfo
+
+TOGETHER = 5_000  # samples, and a little more, in one transaction
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +75,29 @@ def import_files(session: Session, paths: Iterable[Path]) -> Imported:
     """Store the documents in `paths`: files, or folders of *.json files. Runs already there are left alone.
 
     Every file is read and validated before anything is written: DocumentError names the file and the place
-    in it. Each run is one transaction, so an interrupted import can simply be repeated.
+    in it. Each run is whole or absent, so an interrupted import can simply be repeated.
     """
     files = list(_files(paths))
     for file in files:
         read_document(file)
     stored: list[str] = []
     present: list[str] = []
-    for file in files:
-        run = read_document(file)
-        (stored if record_checked(session, run) else present).append(run.id)
+    for runs in _together(map(read_document, files)):
+        for run, new in zip(runs, record_together(session, runs), strict=True):
+            (stored if new else present).append(run.id)
     return Imported(tuple(stored), tuple(present))
+
+
+def _together(runs: Iterable[RunDocument]) -> Iterator[list[RunDocument]]:
+    """Runs that are stored in one transaction: so many that it is short, and other writers need not wait."""
+    found: list[RunDocument] = []
+    for run in runs:
+        found.append(run)
+        if sum(len(one.samples) for one in found) >= TOGETHER:
+            yield found
+            found = []
+    if found:
+        yield found
 
 
 def read_document(path: Path) -> RunDocument:

@@ -82,21 +82,20 @@ public:
                 b.velocity = {v[0], v[1], v[2]};
                 b.spin = {v[3], v[4], v[5]};
             }
-            Vec3 moved = b.velocity, turned = b.spin;
-            for (const std::vector<Vec6>* extra : {&stage.correction(), &stage.parting().velocity}) {
-                if (b.mass == 0.0 || !touching || extra->empty()) continue;
-                const Vec6& c = (*extra)[u];
-                moved += {c[0], c[1], c[2]};
-                turned += {c[3], c[4], c[5]};
+            const bool led = b.mass > 0.0 && touching && !stage.correction().empty();
+            const Vec6 extra = led ? stage.correction()[u] : Vec6{};
+            if (b.mass > 0.0) {
+                ++u;
+                move(b, packed(b));
+                move(b, extra);
             }
-            if (b.mass > 0.0) ++u;
-            b.position += h * moved;
-            const double angle = h * norm(turned),
-                         s = angle > 1e-12 ? std::sin(0.5 * angle) / norm(turned) : 0.5 * h;
-            b.turn = Quat{std::cos(0.5 * angle), s * turned.x, s * turned.y, s * turned.z} * b.turn;
-            const double n = std::sqrt(b.turn.w * b.turn.w + b.turn.x * b.turn.x + b.turn.y * b.turn.y +
-                                       b.turn.z * b.turn.z);
-            b.turn = {b.turn.w / n, b.turn.x / n, b.turn.y / n, b.turn.z / n};
+        }
+        for (int round = 0; touching && round < 3; ++round) {
+            for (std::size_t k = 0; k < bodies.size(); ++k)
+                poses[k] = {bodies[k].position, rotation(bodies[k].turn)};
+            if (!stage.part(system, 0, poses, round > 0)) break;
+            for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
+                if (bodies[k].mass > 0.0) move(bodies[k], stage.parting().velocity[u++]);
         }
     }
 
@@ -118,6 +117,17 @@ public:
     spook::ContactStage stage;
 
 private:
+    void move(ContactBody& b, const spook::Vec6& v) const {
+        using namespace spook;
+        const double h = options.time_step;
+        const Vec3 turned{v[3], v[4], v[5]};
+        b.position += h * Vec3{v[0], v[1], v[2]};
+        const double angle = h * norm(turned),
+                     s = angle > 1e-12 ? std::sin(0.5 * angle) / norm(turned) : 0.5 * h;
+        const Quat q = Quat{std::cos(0.5 * angle), s * turned.x, s * turned.y, s * turned.z} * b.turn;
+        const double n = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+        b.turn = {q.w / n, q.x / n, q.y / n, q.z / n};
+    }
     static spook::Vec6 packed(const ContactBody& b) {
         return {b.velocity.x, b.velocity.y, b.velocity.z, b.spin.x, b.spin.y, b.spin.z};
     }

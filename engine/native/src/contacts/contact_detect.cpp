@@ -89,6 +89,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     for (std::size_t b = 0; b < bodies; ++b)
         predicted_[b] = supported_[b] || jointed_[b] || unknown_[b] < 0 ? velocity[b] : free_velocity[b];
     const std::size_t closed_points = points_.size();
+    if (!begun_) find_given();
     if (find_strikes(predicted_, false) > 0) {
         find_events();
         take_back_strikes(closed_points, predicted_);

@@ -104,21 +104,24 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     }
     counters_.unsettled += !report.converged;
 
+    std::vector<double> share;
+    if (unsettled_body_ >= 0) shorten_unsettled(system, system.rows.size(), share);
     mark_held(system);  // by joints; of contacts those that push
     touches_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
-        const double* impulse = sweeps_.impulse(static_cast<int>(k));
+        double impulse[3];
+        std::copy_n(sweeps_.impulse(static_cast<int>(k)), 3, impulse);
+        if (!share.empty())
+            for (double& z : impulse)
+                z *= share[std::max(unknown_[point.contact.first], unknown_[point.contact.second])];
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
         record(system, point, impulse[0], impulse[1] * point.tangent + impulse[2] * across);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;
     }
-    if (report.finite) {
-        part_by_sweeps(system);
-        correct_events(system);
-    }
+    if (report.finite) correct_events(system);
     std::stable_sort(touches_.begin(), touches_.end(),
                      [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; });
     return report.finite;

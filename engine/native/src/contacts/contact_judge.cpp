@@ -101,4 +101,54 @@ void ContactStage::blame(double residual, int unknown) {
         static_cast<int>(std::find(unknown_.begin(), unknown_.end(), unknown) - unknown_.begin());
 }
 
+/// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise
+/// the energy; all of it in islands that joints hold or something drives. Shortens the velocities alike.
+void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints,
+                                     std::vector<double>& share) const {
+    const std::size_t bodies = system.mass.size();
+    share.assign(bodies, 1.0);
+    std::vector<Islands::Tie> ties;
+    for (std::size_t k = 0; k < joints; ++k) ties.push_back({system.rows[k].first, system.rows[k].second});
+    for (const Point& point : points_)
+        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
+    const Islands islands = find_islands(static_cast<int>(bodies), ties);
+    struct Sums {
+        double square = 0.0, linear = 0.0, fall = 0.0;  // E₊ − E = square s² + linear s − fall
+        bool driven = false;
+    };
+    std::vector<Sums> sums(islands.count);
+    const auto driven = [&](int first, int second) {
+        sums[islands.of_body[std::max(first, second)]].driven = true;
+    };
+    for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
+    for (const Point& point : points_)
+        if (is_supplied(point.contact) || point.material.compliance > 0.0)
+            driven(unknown_[point.contact.first], unknown_[point.contact.second]);
+    std::vector<Vec6> free = system.momentum;
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        const int u = unknown_[b];
+        if (u < 0 || islands.of_body[u] < 0) continue;
+        solve_six(factor_six(system.mass[u]), free[u]);
+        const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
+                   kick = sum(free[u], velocity_[b], -1.0);
+        Sums& own = sums[islands.of_body[u]];
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6; ++j) {
+                const double m = system.mass[u][6 * i + j];
+                own.square += 0.5 * m * by_contacts[i] * by_contacts[j];
+                own.linear += m * by_contacts[i] * velocity_[b][j];
+                own.fall += 0.5 * m * kick[i] * kick[j];
+            }
+    }
+    for (std::size_t u = 0; u < bodies; ++u) {
+        if (islands.of_body[u] < 0) continue;
+        const auto& [square, linear, fall, is_driven] = sums[islands.of_body[u]];
+        if (is_driven || !(square + linear > fall)) continue;
+        const double root = std::sqrt(linear * linear + 4.0 * square * fall);
+        share[u] = linear > 0.0 ? 2.0 * fall / (linear + root) : (root - linear) / (2.0 * square);
+        for (int i = 0; i < 6; ++i)
+            system.velocity[u][i] = free[u][i] + share[u] * (system.velocity[u][i] - free[u][i]);
+    }
+}
+
 }  // namespace spook

@@ -1,4 +1,4 @@
-// The contact stage's last part: by which displacements overlapping bodies part.
+// The contact stage's last part: which bodies overlap where the step ends, and by which displacements they part.
 #include <algorithm>
 
 #include "contacts/contact_geometry.hpp"
@@ -11,15 +11,11 @@ namespace {
 
 constexpr double joint_give = 1e-6;  // of a row's own inertia: what a joint yields while overlaps are parted
 constexpr double contact_give = 1e-3;  // and what a contact of jointed bodies does
+constexpr double closed = 1e-9;        // of the larger body's radius: a depth that is rounding
+constexpr double around = 4.0;         // of the deepest overlap: gaps that parting may close
+constexpr int feature_bits = 16;       // of a contact's key; the rest is the pair
 
 }  // namespace
-
-/// Whether two bodies overlap by more than their contact's compliance explains.
-bool ContactStage::some_overlap() const {
-    return std::any_of(points_.begin(), points_.end(), [this](const Point& point) {
-        return point.contact.point.gap < -explained_depth(point);
-    });
-}
 
 /// How far a compliant contact is pressed in at the end of the step: where it was, and the way its bodies go.
 double ContactStage::pressed(const MixedSystem& system, const Point& point) const {
@@ -53,11 +49,103 @@ void ContactStage::hold_joints(MixedSystem& parting) const {
     }
 }
 
+/// Whether a moving surface, or a body that moves as it is told, may do work at a contact.
+bool ContactStage::is_supplied(const Contact& contact) const {
+    for (const int b : {contact.first, contact.second}) {
+        if (norm(materials_[b].surface_velocity) > 0.0) return true;
+        if (norm(linear(prescribed_[b])) > 0.0 || norm(angular(prescribed_[b])) > 0.0) return true;
+    }
+    return false;
+}
+
+/// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
+void ContactStage::find_given() {
+    begun_ = true;
+    for (const Point& point : points_) {
+        const double excess = -point.contact.point.gap - explained_depth(point);
+        if (!(excess > 0.0)) continue;
+        double& given = given_[point.contact.key >> feature_bits];
+        given = std::max(given, excess);
+    }
+}
+
+/// Takes down what is left of it, at most what it was.
+void ContactStage::note_given() {
+    if (given_.empty()) return;
+    std::map<std::uint64_t, double> left;
+    for (const Point& lap : laps_) {
+        const auto given = given_.find(lap.contact.key >> feature_bits);
+        if (!(lap.push > 0.0) || given == given_.end()) continue;
+        double& depth = left[given->first];
+        depth = std::max(depth, std::min(lap.push, given->second));
+    }
+    given_ = std::move(left);
+}
+
+/// Points of the step's pairs, up to gaps of `margin`, with the bodies at `poses`, into laps_; their largest overlap that
+/// nothing explains. With no margin, pairs that have not moved against each other are left out.
+double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin, bool again) {
+    laps_.clear();
+    const std::vector<double>& radius = detection_.radius();
+    const auto moved = [&](int b) {
+        double turned = 0.0;
+        for (int i = 0; i < 9; ++i)
+            turned = std::max(turned, std::abs(poses[b].rotation.m[i] - poses_[b].rotation.m[i]));
+        return norm(poses[b].position - poses_[b].position) + (turned > 0.0 ? 3.0 * turned * radius[b] : 0.0);
+    };
+    double deepest = 0.0;
+    for (std::size_t from = 0, end = 0; from < touches_.size(); from = end) {
+        const std::uint64_t key = touches_[from].contact.key >> feature_bits;
+        const int a = touches_[from].contact.first, b = touches_[from].contact.second;
+        const double rounding = closed * size(touches_[from].contact);
+        double most_pressed = 0.0;
+        bool overlapped = false;
+        for (; end < touches_.size() && touches_[end].contact.key >> feature_bits == key; ++end) {
+            most_pressed = std::max(most_pressed, touches_[end].pressed);
+            overlapped = overlapped || touches_[end].contact.point.gap < -rounding;
+        }
+        if (margin == 0.0 && !overlapped && moved(a) + moved(b) < 0.1 * rounding) continue;
+        scratch_.clear();
+        const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
+        detection_.touch(pair, poses[a], poses[b], margin, scratch_);
+        for (const Contact& contact : scratch_) {
+            const SurfaceMaterial material = combined(materials_[a], materials_[b]);
+            double pressed = material.compliance > 0.0 ? most_pressed : 0.0, before = 0.0;
+            for (std::size_t k = from; k < end; ++k)
+                if (touches_[k].contact.key == contact.key)
+                    pressed = touches_[k].pressed, before = touches_[k].parting;
+            double excess = -contact.point.gap - pressed - rounding;
+            if (again && excess > 0.0 && given_.contains(key))
+                excess = std::max(0.0, excess - given_.at(key));
+            deepest = std::max(deepest, excess);
+            if (margin == 0.0) continue;
+            Point& lap = laps_.emplace_back();
+            lap.contact = contact;
+            lap.material = material;
+            lap.first_arm = contact.point.position - poses[a].position;
+            lap.second_arm = contact.point.position - poses[b].position;
+            lap.tangent = world_tangent(contact.point.normal);
+            lap.parting_before = before;
+            lap.push = excess;
+        }
+    }
+    return deepest;
+}
+
+/// How fast the bodies of an overlap are to part in the step, m/s; of points apart, how fast they may close.
+double ContactStage::parting_speed(const Point& lap, bool again) const {
+    const double h = options_.time_step, excess = lap.push;
+    const auto given = given_.find(lap.contact.key >> feature_bits);
+    if (again || !(excess > 0.0) || given == given_.end()) return excess / h;
+    const double slow = std::min(excess, given->second);
+    return regularise(0.0, lap.material.damping, h).violation_gain * slow + (excess - slow) / h;
+}
+
 /// Who is to be seen as one: contacts that pushed aside are given; contacts that push, whose laws a turn of some of
 /// their bodies would break, joints and the ground are added.
 void ContactStage::note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties) {
     for (const Touch& touch : touches_)
-        if (touch.normal > 0.0)
+        if (touch.normal > 0.0 || touch.impact > 0.0)
             ties.push_back({unknown_[touch.contact.first], unknown_[touch.contact.second]});
     for (const RowBlock& block : parting.rows) ties.push_back({block.first, block.second});
     parting_.velocity = parting.velocity;
@@ -67,80 +155,91 @@ void ContactStage::note_parted(const MixedSystem& parting, std::vector<Islands::
         const int body = std::max(first, second);
         if (std::min(first, second) < 0 && body >= 0) parting_.grounded[parting_.islands.of_body[body]] = 1;
     }
+    parting_.supplied.assign(parting_.islands.count, 0);
+    const auto island = [this](const Contact& contact) {
+        return parting_.islands.of_body[std::max(unknown_[contact.first], unknown_[contact.second])];
+    };
+    for (const Touch& touch : touches_)
+        if (is_supplied(touch.contact) && island(touch.contact) >= 0)
+            parting_.supplied[island(touch.contact)] = 1;
+    for (const Point& lap : laps_)
+        if (lap.push > 0.0 && given_.contains(lap.contact.key >> feature_bits) && island(lap.contact) >= 0)
+            parting_.supplied[island(lap.contact)] = 1;
 }
 
-void ContactStage::part_overlaps(const MixedSystem& system, std::size_t joints) {
-    if (!some_overlap()) return;
-    ++counters_.corrections;
-    const double h = options_.time_step;
-    MixedSystem parting;
+bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses,
+                        bool again) {
+    parting_.velocity.clear();
+    parting_.deepest = find_overlaps(poses, 0.0, again);
+    if (!(parting_.deepest > 0.0)) {
+        if (!again) given_.clear();
+        return false;
+    }
+    if (!again) ++counters_.corrections;
+    find_overlaps(poses, around * parting_.deepest, again);
+    MixedSystem& parting = parting_system_;
     parting.mass = system.mass;
     parting.momentum.assign(system.mass.size(), Vec6{});
     parting.rows.assign(system.rows.begin(), system.rows.begin() + static_cast<std::ptrdiff_t>(joints));
     hold_joints(parting);
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        RowBlock block = row_block(points_[k], 1);
-        const double gap = points_[k].contact.point.gap;
-        const double ahead =
-            gap + h * (row_velocity(system.rows[joints + k], 0, system.velocity) - block.right[0]);
-        const double excess = -gap - explained_depth(points_[k]);
-        const double rate = regularise(0.0, points_[k].material.damping, h).violation_gain;
-        block.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
-        block.state[0] = excess > 0.0 ? RowState::free : RowState::at_lower;
+    std::vector<Islands::Tie> ties;
+    const bool by_sweeps = options_.solver == SolverKind::iterative && !resists_turning_;
+    if (!(by_sweeps ? part_by_sweeps(parting, ties, again) : part_directly(parting, ties, again)))
+        return false;
+    note_parted(parting, ties);
+    if (!again) note_given();
+    return true;
+}
+
+bool ContactStage::part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again) {
+    const std::size_t joints = parting.rows.size();
+    for (const Point& lap : laps_) {
+        RowBlock block = row_block(lap, 1);
+        block.right[0] = parting_speed(lap, again);
+        block.state[0] = lap.push > 0.0 ? RowState::free : RowState::at_lower;
         if (joints > 0) block.softness[0] = contact_give * own_inertia(parting, block, 0);
         parting.rows.push_back(block);
     }
+    parting.velocity.clear();
     std::vector<FrictionPoint> none;
-    if (!run(parting, none, parting_solver_, options_.friction).finite) return;
-    std::vector<Islands::Tie> ties;
+    if (!run(parting, none, parting_solver_, options_.friction).finite) return false;
     for (std::size_t k = joints; k < parting.rows.size(); ++k)
         if (parting.rows[k].multiplier[0] != 0.0)
             ties.push_back({parting.rows[k].first, parting.rows[k].second});
     parting.rows.resize(joints);
-    note_parted(parting, ties);
+    return true;
 }
 
-/// part_overlaps(), by sweeps.
-void ContactStage::part_by_sweeps(const MixedSystem& system) {
-    if (!some_overlap()) return;
-    ++counters_.corrections;
-    const double h = options_.time_step;
-    MixedSystem& parting = parting_system_;
-    parting.mass = system.mass;
-    parting.momentum.assign(system.mass.size(), Vec6{});
-    parting.rows = system.rows;
-    hold_joints(parting);
+bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again) {
     parting_sweeps_.start_beside(sweeps_, parting, options_.friction);
-    for (std::size_t b = 0; b < unknown_.size(); ++b)
-        next_[b] = unknown_[b] >= 0 ? system.velocity[unknown_[b]] : velocity_[b];
-    for (const Point& point : points_) {
+    for (const Point& lap : laps_) {
         SweepContact row;
-        row.first = unknown_[point.contact.first];
-        row.second = unknown_[point.contact.second];
-        row.normal = point.contact.point.normal;
-        row.tangent = point.tangent;
-        row.first_arm = point.first_arm;
-        row.second_arm = point.second_arm;
-        const double gap = point.contact.point.gap, excess = -gap - explained_depth(point);
-        const double ahead = gap + h * relative(point, row.normal, next_, false);
-        const double rate = regularise(0.0, point.material.damping, h).violation_gain;
-        row.right[0] = excess > 0.0 ? rate * excess : -std::max(0.0, ahead) / h;
-        row.impulse[0] = point.parting_before;
-        if (!parting.rows.empty()) row.softness = contact_give * own_inertia(parting, row_block(point, 1), 0);
+        row.first = unknown_[lap.contact.first];
+        row.second = unknown_[lap.contact.second];
+        row.normal = lap.contact.point.normal;
+        row.tangent = lap.tangent;
+        row.first_arm = lap.first_arm;
+        row.second_arm = lap.second_arm;
+        row.right[0] = parting_speed(lap, again);
+        row.impulse[0] = lap.parting_before;
+        if (!parting.rows.empty()) row.softness = contact_give * own_inertia(parting, row_block(lap, 1), 0);
         parting_sweeps_.add(row);
     }
     const FrictionReport report =
         parting_sweeps_.run(options_.iterations, options_.residual_tolerance, nullptr);
     counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-    if (!report.finite) return;
+    if (!report.finite) return false;
     parting_sweeps_.write(parting);
-    std::vector<Islands::Tie> ties;
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        touches_[k].parting = parting_sweeps_.impulse(static_cast<int>(k))[0];
-        if (touches_[k].parting != 0.0)
-            ties.push_back({unknown_[points_[k].contact.first], unknown_[points_[k].contact.second]});
+    for (std::size_t k = 0; k < laps_.size(); ++k) {
+        const Contact& contact = laps_[k].contact;
+        const double impulse = parting_sweeps_.impulse(static_cast<int>(k))[0];
+        const auto touch =
+            std::lower_bound(touches_.begin(), touches_.end(), contact.key,
+                             [](const Touch& t, std::uint64_t key) { return t.contact.key < key; });
+        if (touch != touches_.end() && touch->contact.key == contact.key) touch->parting = impulse;
+        if (impulse != 0.0) ties.push_back({unknown_[contact.first], unknown_[contact.second]});
     }
-    note_parted(parting, ties);
+    return true;
 }
 
 }  // namespace spook

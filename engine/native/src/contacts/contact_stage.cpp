@@ -169,10 +169,11 @@ double ContactStage::resting_right(Point& point) const {
     const bool touching = is_closed(point.contact);
     if (point.event)  // another point of a pair that meets may still be open
         return -(touching ? 0.0 : gap / time_left(point));
+    if (!touching) return -gap / h;
     const Regularisation row = regularise(point.material.compliance, point.material.damping, h);
-    return !touching
-               ? -gap / h
-               : -row.violation_gain * std::max(gap, -explained_depth(point)) + row.upsilon * point.approach;
+    const double depth = -row.violation_gain * std::max(gap, -explained_depth(point));
+    // A rigid contact that opens is not pushed after its own speed.
+    return point.material.compliance > 0.0 ? depth + row.upsilon * point.approach : depth;
 }
 
 /// Whether a point is likely to push: what a solver starts from.
@@ -241,6 +242,13 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         order_points();
     }
     judge(system, friction, report);
+    if (unsettled_body_ >= 0) {
+        std::vector<double> share;
+        shorten_unsettled(system, joints, share);
+        for (std::size_t k = joints; k < system.rows.size(); ++k)
+            for (double& z : system.rows[k].multiplier)
+                z *= share[std::max(system.rows[k].first, system.rows[k].second)];
+    }
 
     touches_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
@@ -249,10 +257,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         Touch& touch = record(system, point, point.normal, along);
         std::copy_n(point.turning, 3, touch.turning);
     }
-    if (report.finite) {
-        part_overlaps(system, joints);
-        correct_events(system);
-    }
+    if (report.finite) correct_events(system);
     return report.finite;
 }
 

@@ -10,7 +10,7 @@
 //                    −g/h                     for an open one: it may close, no more;
 //                  then pairs that touch only because of these impulses are looked for, and all is solved again
 //                  (the iterative solver looks between its sweeps, and gives them rows in the same solve);
-//   4. parting     a displacement velocity that parts overlapping bodies and leaves no trace in v.
+//   4. parting     where the step ends, a displacement that parts overlapping bodies and leaves no trace in v.
 //
 // What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
 // finds that they meet (`collision/sweep.hpp`). Bodies in contact are swept with v, which their supports agree
@@ -33,12 +33,23 @@
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was
 // pressed in while it was one, the way its bodies went along the normal, enters r: what it gives back it has been
-// given. The rest is parted by positions, at the same rate 4 Ups per step, through the same solver with joints held: far more rigidly than their compliance, which at
-// tiny steps yields more than a body does, and more rigidly than the contacts, so that joints win where both cannot
-// be. What such a step of finite size does to joints, momenta and energy is put right in `rigid/rigid_parting.cpp`.
+// given. The rest is parted by positions, through the same solver with joints held: far more rigidly than their
+// compliance, which at tiny steps yields more than a body does, and more rigidly than the contacts, so that joints
+// win where both cannot be. An overlap the scene began with goes at the rate 4 Ups per step; one that comes from
+// curved paths, features that swung in or sweeps that stopped early goes at once, in the step that makes it: there
+// the contacts have taken the energy that lifting the bodies back costs. What such a displacement of finite size
+// does to joints, momenta and energy is put right in `rigid/rigid_parting.cpp`.
+//
+// Why a settled step cannot raise the energy (E kinetic and potential, constant force f, k = h M⁻¹ f): from
+// v₊ = v + k + M⁻¹ Gᵀ z and q₊ = q + h v₊ follows E₊ − E = z·G v₊ − ½ |v₊ − v|²_M. Of rigid contacts z·G v₊ = z·r
+// with r <= 0 but for rounding, friction takes (beta·D v₊ <= 0), and parting pays for what it lifts. So r has no
+// Ups C v for a rigid contact that opens: it would push a body after its own speed, up to ½ Ups² |k|²_M a step.
+// A solve that has not settled proves nothing: its impulses z are shortened, island by island, to the largest s z for
+// which E₊ <= E. It exists: s = 0 is free fall, E₊ − E = −½ |k|²_M, and E₊ is convex in s.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -120,8 +131,16 @@ public:
         std::vector<Vec6> velocity;  // per moving body; empty when none is
         Islands islands;             // of bodies that push each other, or hang together by joints
         std::vector<char> grounded;  // per island: something that does not move by itself took part
+        std::vector<char>
+            supplied;          // per island: what moves it, or an overlap of the start, may do work on it
+        double deepest = 0.0;  // overlap that nothing explains, m
     };
     const Parting& parting() const noexcept { return parting_; }
+
+    /// Looks among the pairs of this step's points for overlaps with the bodies at `poses`, where the step ends, and
+    /// fills parting(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
+    /// `again` when the bodies are displaced: what is linear in the displacement is not all.
+    bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
 
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
     bool held(int unknown) const noexcept { return held_[unknown] != 0; }
@@ -146,13 +165,21 @@ public:
         std::vector<Touch> touches;
         ContactCounters counters;
         std::map<int, Patience> resting, impact, parting;
+        std::map<std::uint64_t, double> given;
+        bool begun = false;
     };
     Memory memory() const {
-        return {touches_, counters_, resting_solver_.patience(), impact_solver_.patience(),
-                parting_solver_.patience()};
+        return {touches_,
+                counters_,
+                resting_solver_.patience(),
+                impact_solver_.patience(),
+                parting_solver_.patience(),
+                given_,
+                begun_};
     }
     void remember(const Memory& memory) {
         touches_ = memory.touches, counters_ = memory.counters;
+        given_ = memory.given, begun_ = memory.begun;
         resting_solver_.be_patient(memory.resting);
         impact_solver_.be_patient(memory.impact);
         parting_solver_.be_patient(memory.parting);
@@ -241,15 +268,21 @@ private:
     bool find_more();
     bool is_settled(MixedSystem& system);
     void hand_over();
-    void part_by_sweeps(const MixedSystem& system);
-    bool some_overlap() const;
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
     void blame(double residual, int unknown);
+    void shorten_unsettled(MixedSystem& system, std::size_t joints, std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
-    void part_overlaps(const MixedSystem& system, std::size_t joints);
+    // contact_parting.cpp
+    void find_given();
+    void note_given();
+    double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
+    double parting_speed(const Point& lap, bool again) const;
+    bool part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
+    bool part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
     void hold_joints(MixedSystem& parting) const;
     void note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties);
+    bool is_supplied(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
     double size(const Contact& contact) const noexcept;
@@ -270,7 +303,10 @@ private:
     MixedSystem parting_system_;
     Parting parting_;
     std::vector<char> yielding_;
-    std::vector<Vec6> next_;                     // velocities between sweeps, per body of the scene
+    std::vector<Point> laps_;                // points of the step's pairs where it ends
+    std::map<std::uint64_t, double> given_;  // by pair: overlap the scene began with, as far as it is left, m
+    bool begun_ = false;                     // whether it is known
+    std::vector<Vec6> next_;                 // velocities between sweeps, per body of the scene
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 
     std::vector<Pose> poses_;

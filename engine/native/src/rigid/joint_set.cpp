@@ -163,9 +163,13 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
     right.upper[spring] = axial.spring_impulse;
 }
 
-/// The right side of a row that only pushes `inwards`.
+/// The right side of a row that only pushes `inwards`. What the scene began with beyond the limit is no violation: it
+/// would come back as a speed, at a tiny step as megajoules. The bodies are led back instead (given_back()).
 double JointSet::one_sided(double inwards, double violation, double rate, const Regularisation& row,
-                           double restitution, State& state) const noexcept {
+                           double restitution, State& state) noexcept {
+    const double beyond = std::max(0.0, -inwards * violation);
+    state.given = state.given < 0.0 ? beyond : std::min(state.given, beyond);
+    if (state.given > 0.0) some_given_ = true, violation += inwards * state.given;
     const double gap = inwards * violation, approach = -inwards * rate;
     const bool open = gap > 0.0, hit = approach > 0.0 && !state.at_limit;
     double value = open ? -violation / time_step_ : row.upsilon * rate - row.violation_gain * violation;
@@ -234,6 +238,23 @@ void JointSet::overstep(int index, std::span<const BodyState> bodies, double* ou
     const double at = coordinate(block.joint, bodies), low = at - axial.lower, high = at - axial.upper;
     out[axial.has_motor ? 1 : 0] =
         axial.lower == axial.upper ? low : std::min(0.0, low) + std::max(0.0, high);
+}
+
+double JointSet::given_back(int index, int& row) const noexcept {
+    const JointBlock& block = blocks_[index];
+    const Joint& joint = joints_[block.joint];
+    const double given = states[block.joint].given;
+    row = 0;
+    if (!(given > 0.0) || states[block.joint].broken) return 0.0;
+    if (!block.axial)
+        return joint.general >= 0 && generals_[joint.general].one_sided
+                   ? time_step_ * generals_[joint.general].row.violation_gain * given
+                   : 0.0;
+    const Axial& axial = axials_[joint.axial];
+    row = axial.has_motor ? 1 : 0;
+    const double angle = states[block.joint].angle;
+    const bool low = angle - axial.lower <= axial.upper - angle;
+    return (low ? -1.0 : 1.0) * time_step_ * axial.limit.violation_gain * given;
 }
 
 double JointSet::coordinate(int index, std::span<const BodyState> bodies) const noexcept {

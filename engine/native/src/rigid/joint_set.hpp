@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "linear/large_array.hpp"
@@ -50,7 +51,9 @@ public:
         Vec3 first_reach,
             second_reach;  // from the centres to the point where forces are read, at the last step
         bool broken = false;
-        bool at_limit = false;          // the free coordinate's limit was closed in the last step
+        bool at_limit = false;  // the free coordinate's limit was closed in the last step
+        double given =
+            -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
         double angle = 0.0;             // unwrapped coordinate of a hinge that needs it
         std::array<double, 2> bound{};  // N s: of an eye's row; of a tyre's rows along and across
     };
@@ -108,6 +111,11 @@ public:
     }
     /// Free coordinate of a hinge (unwrapped) or prismatic joint.
     double coordinate(int joint, std::span<const BodyState> bodies) const noexcept;
+    /// Whether some limit that the scene began beyond was assembled since this was asked last.
+    bool take_given() noexcept { return std::exchange(some_given_, false); }
+    /// How far the one-sided row of a block is to come back in this step, since the scene began beyond it: a part of
+    /// its overstep(), whose sign it has; `row` is its index. 0 where there is none.
+    double given_back(int block, int& row) const noexcept;
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept {
         if (joints_[joint].axial < 0 &&
@@ -198,12 +206,13 @@ private:
     void assemble_tyre(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                        double* second, BlockRight& right) noexcept;
     double one_sided(double inwards, double violation, double rate, const Regularisation& row,
-                     double restitution, State& state) const noexcept;
+                     double restitution, State& state) noexcept;
     double unwrapped(const Joint& joint, double angle, double near) const noexcept;
     void assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                         double* second, BlockRight& right) noexcept;
 
     double time_step_;
+    bool some_given_ = false;
     BodyState world_;
     LargeArray<Joint> joints_;
     std::vector<Axial> axials_;

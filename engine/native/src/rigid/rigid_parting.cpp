@@ -1,7 +1,7 @@
 // Overlapping bodies are parted by positions, and nothing else is to be seen of it.
 //
-// The contact stage gives displacements d, of the order of a fifth of an overlap whatever the time step. What is linear
-// in d its rows take care of; the rest is done here, island by island:
+// The contact stage gives displacements d, of the order of an overlap whatever the time step. What is linear in d its
+// rows take care of; the rest is done here, island by island:
 //   joints     A turn of finite size leaves a violation of order d², which the next step's rows would answer with the
 //              speed (4/h) Ups d²: 1000 J out of nothing at h = 1e-6 s. Newton's method takes it back, along M⁻¹ Gᵀ.
 //   momenta    Σ m d = 0 holds already. Σ r × p + l is brought back by one rigid turn of the whole island, v += w × r,
@@ -9,7 +9,10 @@
 //   energy     Where the kinetic energy E has grown, the velocities are drawn towards the rigid motion that has the
 //              island's momenta: they keep the momenta, and with share s left, E(s) = E_rigid + s² (E − E_rigid).
 //              In an island that leans on the ground each body's angular momentum is shortened instead.
-// Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, kinetic energy may not rise.
+//   lifting    Bodies lifted against gravity gain Σ −f d. Contacts have taken energy in the same step, by stopping
+//              bodies, by friction, or by letting them sink: it pays first. The rest is paid by the kinetic energy, all
+//              velocities shortened alike, which no row over resting bodies feels. What both cannot pay is not lifted.
+// Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
 #include <algorithm>
 #include <cmath>
 
@@ -24,6 +27,7 @@ constexpr double held = 1e-13;         // of a joint's size: a violation that is
 constexpr double nearly_held = 1e-11;  // and what may be left where rounding is worse
 constexpr int most_halvings = 4;       // of the displacement
 constexpr double rounding = 4e-16;     // of the energy
+constexpr int most_partings = 4;       // of a step
 
 double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
     return body.mass * dot(s.velocity, s.velocity) +
@@ -38,9 +42,83 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 
 }  // namespace
 
-void RigidSystem::part_bodies() {
-    const ContactStage::Parting& parting = contacts_->parting();
-    const Islands& islands = parting.islands;
+/// What the step is to be compared with.
+void RigidSystem::note_begin() {
+    begun_.resize(constants_.size());
+    for (int i : tied_) {
+        const BodyState& s = live_.bodies[i];
+        begun_[i] = {s.displacement, twice_energy(constants_[i], s)};
+    }
+}
+
+/// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first
+/// order.
+void RigidSystem::part_overlaps() {
+    double last = 0.0;
+    for (int round = 0; round < most_partings; ++round) {
+        end_poses_.resize(constants_.size());
+        for (int i = 0; i < bodies(); ++i)
+            end_poses_[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
+        if (!contacts_->part(mixed_, joints_.blocks().size(), end_poses_, round > 0)) return;
+        const double deepest = contacts_->parting().deepest;
+        if (round > 0 && !(deepest < 0.5 * last)) return;
+        last = deepest;
+        part_bodies();
+    }
+}
+
+/// The energy that contacts have taken from some bodies in this step so far, J: what forces and joints did on them,
+/// less what their kinetic energy has grown by; none if that is negative.
+double RigidSystem::taken(const std::vector<int>& members, const std::vector<int>& own_blocks) const {
+    double sum = 0.0;
+    for (const int k : members) {
+        const int i = tied_[k];
+        const BodyState& s = live_.bodies[i];
+        sum += 0.5 * (begun_[i].energy - twice_energy(constants_[i], s)) +
+               dot(force(i), s.displacement - begun_[i].displacement) +
+               h_ * dot(constants_[i].torque, s.angular_velocity);
+    }
+    for (const int k : own_blocks) {
+        const RowBlock& block = mixed_.rows[k];
+        double work = 0.0;
+        for (int i = 0; i < block.size; ++i) {
+            double speed = row_velocity(block, i, mixed_.velocity);
+            if (block.first >= 0) speed += dot(block.first_jacobian[i], velocities_[tied_[block.first]]);
+            if (block.second >= 0) speed += dot(block.second_jacobian[i], velocities_[tied_[block.second]]);
+            work += 0.5 * block.multiplier[i] * speed;
+        }
+        sum += std::max(0.0, work);
+    }
+    return std::max(0.0, sum);
+}
+
+/// What the displacement has cost against the forces, J.
+double RigidSystem::lifted(const std::vector<int>& members) const {
+    double sum = 0.0;
+    for (const int k : members) {
+        const int i = tied_[k];
+        sum -= dot(force(i), live_.bodies[i].displacement - unparted_[i].displacement);
+    }
+    return sum;
+}
+
+/// The part of an island's displacement that what contacts took and its kinetic energy can pay for.
+double RigidSystem::fundable(int island) const {
+    const ContactStage::Parting& parting = *parting_;
+    if (parting.supplied[island] != 0) return 1.0;
+    double cost = 0.0, twice = 0.0;
+    for (const int k : parted_[island]) {
+        const Vec6& d = parting.velocity[k];
+        cost -= h_ * dot(force(tied_[k]), {d[0], d[1], d[2]});
+        twice += twice_energy(constants_[tied_[k]], unparted_[tied_[k]]);
+    }
+    const double funds = taken_[island] + 0.5 * twice;
+    return cost <= funds ? 1.0 : 0.999 * funds / cost;
+}
+
+/// Who belongs to which island, and how far its joints are from where they hold.
+void RigidSystem::gather_islands() {
+    const Islands& islands = parting_->islands;
     parted_.resize(islands.count);
     parted_blocks_.resize(islands.count);
     for (std::vector<int>& members : parted_) members.clear();
@@ -57,19 +135,57 @@ void RigidSystem::part_bodies() {
         if (tied >= 0) parted_blocks_[islands.of_body[tied]].push_back(static_cast<int>(k));
     }
     overstep_.resize(rows);
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+        joints_.overstep(static_cast<int>(k), live_.bodies, overstep_.data() + overstep_at_[k]);
     unparted_ = live_.bodies;
-    for (int island = 0; island < islands.count; ++island) {
-        for (const int k : parted_blocks_[island])
-            joints_.overstep(k, live_.bodies, overstep_.data() + overstep_at_[k]);
+    taken_.assign(islands.count, 0.0);
+}
+
+/// Leads bodies that the scene has put beyond their joints' limits a part of the way back, at the rate of the limit's
+/// row: by positions, with all other rows where they are.
+void RigidSystem::lead_back() {
+    std::vector<Islands::Tie> ties;
+    const auto blocks = joints_.blocks();
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+        ties.push_back({mixed_.rows[k].first, mixed_.rows[k].second});
+    leading_.islands = spook::find_islands(static_cast<int>(tied_.size()), ties);
+    const std::size_t islands = static_cast<std::size_t>(leading_.islands.count);
+    leading_.velocity.assign(tied_.size(), Vec6{});
+    leading_.grounded.assign(islands, 0);
+    leading_.supplied.assign(islands, 1);
+    parting_ = &leading_;
+    gather_islands();
+    std::vector<char> beyond(islands, 0);
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        const auto [first, second] = ties[k];
+        const int island = leading_.islands.of_body[std::max(first, second)];
+        if (std::min(first, second) < 0) leading_.grounded[island] = 1;
+        int row = 0;
+        const double back = joints_.given_back(static_cast<int>(k), row);
+        if (back == 0.0) continue;
+        overstep_[overstep_at_[k] + row] -= back;
+        beyond[island] = 1;
+    }
+    for (int island = 0; island < leading_.islands.count; ++island)
+        if (beyond[island] != 0 && !part_island(island, 1.0))
+            for (const int k : parted_[island]) live_.bodies[tied_[k]] = unparted_[tied_[k]];
+}
+
+void RigidSystem::part_bodies() {
+    parting_ = &contacts_->parting();
+    gather_islands();
+    for (int island = 0; island < parting_->islands.count; ++island) {
+        taken_[island] = taken(parted_[island], parted_blocks_[island]);
+        const double share = fundable(island);
         for (int halving = 0; halving < most_halvings; ++halving) {
-            if (part_island(island, std::ldexp(1.0, -halving))) break;
+            if (part_island(island, std::ldexp(share, -halving))) break;
             for (const int k : parted_[island]) live_.bodies[tied_[k]] = unparted_[tied_[k]];
         }
     }
 }
 
 bool RigidSystem::part_island(int island, double share) {
-    const ContactStage::Parting& parting = contacts_->parting();
+    const ContactStage::Parting& parting = *parting_;
     const std::vector<int>& members = parted_[island];
     for (const int k : members) {
         const Vec6& d = parting.velocity[k];
@@ -77,8 +193,23 @@ bool RigidSystem::part_island(int island, double share) {
                  live_.bodies[tied_[k]]);
     }
     if (!hold_joints(members, parted_blocks_[island])) return false;
-    if (parting.grounded[island] == 0) return keep_momenta(members);
-    for (const int k : members) keep_spin_energy(tied_[k]);
+    double limit = 0.0, now = 0.0;
+    for (const int k : members) limit += twice_energy(constants_[tied_[k]], unparted_[tied_[k]]);
+    if (parting.supplied[island] == 0) limit -= 2.0 * std::max(0.0, lifted(members) - taken_[island]);
+    if (!(limit >= 0.0)) return false;
+    if (parting.grounded[island] == 0) return keep_momenta(members, limit);
+    for (const int k : members) {
+        keep_spin_energy(tied_[k]);
+        now += twice_energy(constants_[tied_[k]], live_.bodies[tied_[k]]);
+    }
+    if (now <= limit) return true;
+    const double left = std::sqrt(limit / now);
+    for (const int k : members) {
+        BodyState& s = live_.bodies[tied_[k]];
+        s.velocity *= left;
+        s.angular_momentum *= left;
+        if (!constants_[tied_[k]].particle) refresh(constants_[tied_[k]], s);
+    }
     return true;
 }
 
@@ -113,9 +244,9 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
             double now[6];
             joints_.overstep(k, live_.bodies, now);
             for (int row = 0; row < block.size; ++row) {
-                const double change = now[row] - overstep_[overstep_at_[k] + row];
+                const double wanted = overstep_[overstep_at_[k] + row], change = now[row] - wanted;
                 block.right[row] = -change / h_;
-                if (change == 0.0 && !joints_.always_holds(blocks[k]))
+                if (now[row] == 0.0 && wanted == 0.0 && !joints_.always_holds(blocks[k]))
                     block.lower[row] = block.upper[row] = 0.0;
                 const double relative = std::abs(change) / joints_.gain(k, row).extent;
                 if (!(relative <= worst)) worst = relative;
@@ -146,10 +277,11 @@ void RigidSystem::keep_spin_energy(int body) {
     refresh(constants, s);
 }
 
-/// Brings an island back to the angular momentum it had, and to no more than the energy; false if it cannot be.
-bool RigidSystem::keep_momenta(const std::vector<int>& members) {
+/// Brings an island back to the angular momentum it had, and to no more than `limit`, twice the kinetic energy allowed;
+/// false if it cannot be.
+bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     const auto [centre, inertia] = island_frame(members);
-    double mass = 0.0, before = 0.0;
+    double mass = 0.0;
     Vec3 momentum, spin, gained;
     for (const int k : members) {
         const int i = tied_[k];
@@ -158,7 +290,6 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members) {
         mass += constants_[i].mass;
         momentum += p;
         gained += cross(s.displacement - old.displacement, p);
-        before += twice_energy(constants_[i], old);
     }
     const auto turn_all = [&](Vec3 rate) {
         for (const int k : members) {
@@ -179,11 +310,11 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members) {
         spin += constants_[tied_[k]].mass * cross(position_of(tied_[k]) - centre, s.velocity) +
                 s.angular_momentum;
     }
-    if (after <= before * (1.0 + rounding)) return true;
+    if (after <= limit * (1.0 + rounding)) return true;
     const Vec3 drift = (1.0 / mass) * momentum, turn = solved(inertia, spin);
     const double rigid = mass * dot(drift, drift) + dot(turn, spin);
-    if (!(rigid <= before) || !finite(turn)) return false;
-    const double share = std::sqrt((before - rigid) / (after - rigid));
+    if (!(rigid <= limit) || !finite(turn)) return false;
+    const double share = std::sqrt((limit - rigid) / (after - rigid));
     for (const int k : members) {
         const BodyConstants& body = constants_[tied_[k]];
         BodyState& s = live_.bodies[tied_[k]];

@@ -98,9 +98,10 @@ bool RigidSystem::find_contacts() {
             for (int k = 0; k < 3; ++k) free_velocities_[i][3 + k] += dw[k];
         }
     }
-    const bool found = contacts_->detect(poses_, velocities_, free_velocities_);
+    touching_ = contacts_->detect(poses_, velocities_, free_velocities_);
+    if (touching_) note_begin();
     if (clock_) clock_->mark(Stage::collision);
-    return found;
+    return touching_;
 }
 
 void RigidSystem::integrate_body(int i) {
@@ -119,7 +120,8 @@ void RigidSystem::integrate_all() {
             displace(constants_[tied_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
                      {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[tied_[k]]);
     }
-    if (contacts_ && !contacts_->parting().velocity.empty()) part_bodies();
+    if (joints_.take_given()) lead_back();
+    if (touching_) part_overlaps();
     if (clock_) clock_->mark(Stage::integrate_positions);
 }
 

@@ -238,11 +238,22 @@ private:
     void solve_mixed(bool touching);
     bool pivot_rows();
     // rigid_parting.cpp: overlapping bodies are parted by positions
+    void note_begin();
+    void part_overlaps();
+    void lead_back();
+    void gather_islands();
     void part_bodies();
+    double fundable(int island) const;
     bool part_island(int island, double share);
     bool hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks);
     void keep_spin_energy(int body);
-    bool keep_momenta(const std::vector<int>& members);
+    bool keep_momenta(const std::vector<int>& members, double limit);
+    double taken(const std::vector<int>& members, const std::vector<int>& own_blocks) const;
+    double lifted(const std::vector<int>& members) const;
+    Vec3 force(int body) const {
+        const Vec3 f = constants_[body].mass * acceleration_[body];
+        return force_.empty() ? f : f + force_[body];
+    }
 
     void integrate_body(int body);
     void integrate_all();
@@ -313,7 +324,17 @@ private:
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
     std::vector<Vec6> velocities_, free_velocities_;
+    struct Begun {
+        Vec3 displacement;
+        double energy = 0.0;  // twice the kinetic one
+    };
+    std::vector<Begun> begun_;       // per body: the start of a step with contacts
+    bool touching_ = false;          // whether the step had any
+    ContactStage::Parting leading_;  // of bodies beyond their joints' limits: no displacement
+    const ContactStage::Parting* parting_ = nullptr;  // what is at hand
+    std::vector<Pose> end_poses_;
     LargeArray<BodyState> unparted_;                        // per body, before overlaps are parted
+    std::vector<double> taken_;                             // per island, see taken()
     std::vector<std::vector<int>> parted_, parted_blocks_;  // per island: tied bodies, blocks of joints
     std::vector<double> overstep_;                          // per row of joints, before
     std::vector<std::size_t> overstep_at_;                  // per block
