@@ -178,6 +178,7 @@ private:
 
     // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
     void start_half_step();
+    void start_half_step_touching();
     void read_half_step();
     void find_bias(double* bias) const;
     bool move_all(double h);
