@@ -350,7 +350,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--limit",
         type=float,
-        default=1.0,
+        default=0.5,
         help="s of one simulation of another engine, and of a ladder's together",
     )
     parser.add_argument("--missing", action="store_true", help="ask only whom the database has no run of")
