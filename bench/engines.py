@@ -111,6 +111,8 @@ def page(database: str, of_facts: str = "") -> str:
         "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
         f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
+        "Whoever is missing was not installed: `pip install 'spook-tracker[mujoco,exudyn,drake,dart,pybullet]'` and "
+        f"`npm install {' '.join(find.NODE.values())}` bring all.",
         "",
         *READING,
         "",
