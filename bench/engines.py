@@ -32,11 +32,10 @@ from spook_tracker.tracker.store.database import session_on
 
 OURS = "spook"
 FACTS = "bench.engine_facts:FACTS"
-FACT = "fact_"  # what the names of its tests begin with
 FACT_LIMIT = 5.0  # s of one simulation
 # Of another engine: short runs are timed three times, what takes longer than this many seconds once; most of the time goes
 # into models that are built anew for each.
-REPEATS = Repeats(most=3, seconds=0.05, fewest=1, stages_up_to=0.02, runs=20)
+REPEATS = Repeats(most=3, seconds=0.05, fewest=1, stages_up_to=0.02, runs=5)
 ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
 CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
 LIMIT = re.compile(r"time limit of ([\d.]+) s was reached|the ([\d.]+) s for this question")
@@ -57,8 +56,8 @@ def installed() -> list[str]:
     return found
 
 
-def measure(names: Sequence[str], database: str, limit: float) -> None:
-    """A run with ladders of each engine, and one of the facts, recorded; says how long each took."""
+def measure(names: Sequence[str], database: str, facts: str, limit: float) -> None:
+    """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took."""
     for name in names:
         begin = time.perf_counter()
         theirs: dict[str, Any] = {}
@@ -66,7 +65,7 @@ def measure(names: Sequence[str], database: str, limit: float) -> None:
             theirs = {"limit": limit, "patience": limit, "every_setting": False, "repeats": REPEATS}
         document = tracker.run(sweep=True, engine=name, workers=2, **theirs)
         tracker.record(document, database)
-        measure_facts([name], database)
+        measure_facts([name], facts)
         outcomes = Counter(sample.outcome for sample in document.samples)
         told = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in outcomes.most_common())
         print(f"{name}: {time.perf_counter() - begin:.0f} s; {told}", flush=True)
@@ -79,29 +78,25 @@ def measure_facts(names: Sequence[str], database: str) -> None:
 
 
 def without_a_run(names: Sequence[str], database: str) -> list[str]:
-    """Those of which the database has no run with ladders, at the version that is installed."""
+    """Those of which the database has no run at the version that is installed."""
     with session_on(database) as session:
         known = {(run.engine.name, run.engine.version) for run in _newest(tracker.History(session)).values()}
     return [name for name in names if (name, find.find(name).build_info.version) not in known]
 
 
-def _newest(history: tracker.History, facts: bool = False) -> dict[str, Any]:
-    """The newest run of each engine that was asked for the facts, or for all else."""
-    return {run.engine.name: run for run in history.runs() if _of_facts(history, run) == facts}
+def _newest(history: tracker.History) -> dict[str, Any]:
+    """The newest run of each engine."""
+    return {run.engine.name: run for run in history.runs()}
 
 
-def _of_facts(history: tracker.History, run: Any) -> bool:
-    return all(key.startswith(FACT) for key in history.samples(run.id))
-
-
-def page(database: str) -> str:
+def page(database: str, of_facts: str = "") -> str:
     """The page in Markdown, from the newest run of each engine."""
     with session_on(database, readonly=True) as session:
         history = tracker.History(session)
         newest = _newest(history)
         runs = {name: newest[name] for name in sorted(newest, key=lambda name: (name != OURS, name))}
         samples = {name: history.samples(run.id) for name, run in runs.items()}
-        facts = {name: history.samples(run.id) for name, run in _newest(history, facts=True).items()}
+    facts = _recorded_facts(of_facts) if of_facts else {}
     if OURS not in runs:
         raise SystemExit(f"{database} has no run of ours to set the others beside")
     machine = runs[OURS].machine
@@ -116,17 +111,27 @@ def page(database: str) -> str:
         "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
         f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
+        "Whoever is missing was not installed: `pip install 'spook-tracker[mujoco,exudyn,drake,dart,pybullet]'` and "
+        f"`npm install {' '.join(find.NODE.values())}` bring all.",
         "",
         *READING,
         "",
         *_choice(races),
-        *_facts({name: facts[name] for name in sorted(facts, key=lambda name: (name != OURS, name))}),
+        *_facts(facts),
         *_gates(samples),
         *_rungs(samples, runs),
         *_first(races),
         *_behind(races, causes()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _recorded_facts(database: str) -> dict[str, ranks.Samples]:
+    with session_on(database) as session:
+        history = tracker.History(session)
+        newest = _newest(history)
+        names = sorted(newest, key=lambda name: (name != OURS, name))
+        return {name: history.samples(newest[name].id) for name in names}
 
 
 def causes() -> Causes:
@@ -342,11 +347,12 @@ def main(arguments: list[str]) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--db", default="sqlite:///build/engines.db")
+    parser.add_argument("--facts-db", default="sqlite:///build/engine-facts.db")
     parser.add_argument("--page", default=str(PAGE))
     parser.add_argument(
         "--limit",
         type=float,
-        default=1.0,
+        default=0.5,
         help="s of one simulation of another engine, and of a ladder's together",
     )
     parser.add_argument("--missing", action="store_true", help="ask only whom the database has no run of")
@@ -360,10 +366,11 @@ def main(arguments: list[str]) -> int:
     asked: Any = parser.parse_args(arguments)
     names = [] if asked.only_page else asked.engines or installed()
     if asked.facts:
-        measure_facts(names, asked.db)
+        measure_facts(names, asked.facts_db)
     else:
-        measure(without_a_run(names, asked.db) if asked.missing else names, asked.db, asked.limit)
-    Path(asked.page).write_text(page(asked.db), encoding="utf-8")
+        names = without_a_run(names, asked.db) if asked.missing else names
+        measure(names, asked.db, asked.facts_db, asked.limit)
+    Path(asked.page).write_text(page(asked.db, asked.facts_db), encoding="utf-8")
     print(f"wrote {asked.page}")
     return 0
 

@@ -28,6 +28,7 @@ from spook_tracker.engine.observe import (
     ConstraintForce,
     ContactCount,
     ContactForce,
+    ContactPoints,
     JointCoordinate,
     Observable,
     Penetration,
@@ -40,7 +41,13 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 
 RIGID = 1e-8  # m/N or rad/(N m): a softer row is a spring, which an engine must be able to hold as such
-_FROM_ENGINE: tuple[type[Quantity], ...] = (ConstraintForce, ContactForce, ContactCount, Penetration)
+_FROM_ENGINE: tuple[type[Quantity], ...] = (
+    ConstraintForce,
+    ContactForce,
+    ContactCount,
+    ContactPoints,
+    Penetration,
+)
 
 
 class NotSupported(EngineError):
@@ -268,7 +275,7 @@ def run(
         samples=wanted_samples(observe, count),
         configuration=chosen,
         constraint_forces=ConstraintForce in asked,
-        contacts=not {ContactForce, ContactCount, Penetration}.isdisjoint(asked),
+        contacts=not {ContactForce, ContactCount, ContactPoints, Penetration}.isdisjoint(asked),
         time_limit=time_limit,
     )
     return _result(task, adapter.record(task), observe)
