@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contacts/pivot_solver.hpp"
+#include "linear/six.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
@@ -26,6 +27,39 @@ constexpr double near_enough = 1e-6;             // a residual, of the speeds, t
 constexpr int max_jumps = 10;                    // without half the residual
 constexpr int max_losses = 3;                    // of the path, sought again
 constexpr double back = 10.0;                    //   so many blurs away
+
+/// M⁻¹ from its factor: good enough for directions, which are refined.
+Mat6 inverse_six(const Mat6& factor) noexcept {
+    Mat6 inverse{};
+    for (int i = 0; i < 6; ++i) {
+        Vec6 column{};
+        column[i] = 1.0;
+        solve_six(factor, column);
+        for (int j = 0; j < 6; ++j) inverse[6 * i + j] = column[j];
+    }
+    return inverse;
+}
+
+/// out += Gᵀ K G' of a unit of N rows.
+template <int N> void add_stiffness(const double* k, const Vec6* to, const Vec6* from, double* out) noexcept {
+    Six image[N];  // K G'
+    for (int i = 0; i < N; ++i) {
+        image[i] = Six::zero();
+        for (int j = 0; j < N; ++j) image[i].add(k[N * i + j], Six::load(from[j].data()));
+    }
+    for (int a = 0; a < 6; ++a) {
+        Six row = Six::load(out + 6 * a);
+        for (int i = 0; i < N; ++i) row.add(to[i][a], image[i]);
+        row.store(out + 6 * a);
+    }
+}
+
+/// x += Gᵀ z of one body's N rows.
+template <int N> void add_push(const Vec6* rows, const double* z, double* x) noexcept {
+    Six sum = Six::load(x);
+    for (int i = 0; i < N; ++i) sum.add(z[i], Six::load(rows[i].data()));
+    sum.store(x);
+}
 
 }  // namespace
 
@@ -61,7 +95,11 @@ void ConeNewton::read(const RowBlock& given, int row, const FrictionPoint* frict
 void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& points) {
     const std::size_t bodies = system.mass.size();
     mass_factor_.resize(bodies);
-    for (std::size_t b = 0; b < bodies; ++b) mass_factor_[b] = factor_six(system.mass[b]);
+    mass_inverse_.resize(bodies);
+    for (std::size_t b = 0; b < bodies; ++b) {
+        mass_factor_[b] = factor_six(system.mass[b]);
+        mass_inverse_[b] = inverse_six(mass_factor_[b]);
+    }
     std::vector<const FrictionPoint*> friction(system.rows.size(), nullptr);
     for (const FrictionPoint& point : points) friction[point.block] = &point;
     units_.clear();
@@ -146,24 +184,15 @@ bool ConeNewton::step(const MixedSystem& system, double blur) {
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
     for (ConeUnit& unit : units_) {
         unit.linearise({blur, hold_});
-        const int n = unit.size;
         for (const bool column : {true, false}) {
             if ((column ? unit.first : unit.second) < 0) continue;
             const Vec6* from = column ? unit.first_row : unit.second_row;
-            double t[18];  // K G
-            for (int i = 0; i < n; ++i)
-                for (int a = 0; a < 6; ++a) {
-                    double sum = 0.0;
-                    for (int j = 0; j < n; ++j) sum += unit.k[n * i + j] * from[j][a];
-                    t[6 * i + a] = sum;
-                }
             for (const bool row : {true, false}) {
                 if ((row ? unit.first : unit.second) < 0) continue;
                 const Vec6* to = row ? unit.first_row : unit.second_row;
                 double* out = block(unit, row, column);
-                for (int i = 0; i < n; ++i)
-                    for (int a = 0; a < 6; ++a)
-                        for (int b = 0; b < 6; ++b) out[6 * a + b] += to[i][a] * t[6 * i + b];
+                if (unit.size == 3) add_stiffness<3>(unit.k, to, from, out);
+                else add_stiffness<1>(unit.k, to, from, out);
             }
         }
     }
@@ -185,7 +214,7 @@ bool ConeNewton::find_directions(double blur) {
 bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du) {
     double asked = 0.0;
     for (ConeUnit& unit : units_) {
-        unit.*dz = {};
+        unit.*dz = unit.*du = {};
         asked += unit.square(unit.lack);
     }
     double before = asked;
@@ -196,55 +225,52 @@ bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* 
             push(unit, unit.c, image_);
         }
         matrix_.solve(image_[0].data());
+        change_.assign(mass_factor_.size(), Vec6{});
         for (ConeUnit& unit : units_) {
             const ConeUnit::Vec turn = along(unit, image_);
-            for (int i = 0; i < unit.size; ++i) {
-                double sum = unit.c[i];
-                for (int j = 0; j < unit.size; ++j) sum -= unit.k[unit.size * i + j] * turn[j];
-                unit.c[i] = sum;
-            }
+            for (int i = 0; i < unit.size; ++i)
+                for (int j = 0; j < unit.size; ++j) unit.c[i] -= unit.k[unit.size * i + j] * turn[j];
+            push(unit, unit.c, change_);
         }
-        velocities_of([](const ConeUnit& unit) { return unit.c; }, image_);
+        for (std::size_t b = 0; b < change_.size(); ++b)
+            image(mass_inverse_[b].data(), Six::load(change_[b].data())).store(change_[b].data());
         double left = 0.0;
         for (ConeUnit& unit : units_) {
-            const ConeUnit::Vec change = unit.law(unit.c, speed_along(unit, image_, unit.c));
+            unit.turn = speed_along(unit, change_, unit.c);
+            const ConeUnit::Vec change = unit.law(unit.c, unit.turn);
             for (int i = 0; i < unit.size; ++i) unit.lack[i] -= change[i];
             left += unit.square(unit.lack);
         }
         if (!std::isfinite(left)) return false;
         if (round > 0 && !(left < before)) break;
         for (ConeUnit& unit : units_)
-            for (int i = 0; i < unit.size; ++i) (unit.*dz)[i] += unit.c[i];
+            for (int i = 0; i < unit.size; ++i) (unit.*dz)[i] += unit.c[i], (unit.*du)[i] += unit.turn[i];
         if (left <= refined * asked) break;
         before = left;
     }
-    velocities_of([dz](const ConeUnit& unit) { return unit.*dz; }, change_);
-    for (ConeUnit& unit : units_) unit.*du = speed_along(unit, change_, unit.*dz);
     return true;
-}
-
-/// v ← M⁻¹ Gᵀ z, with z of each unit.
-template <class Multiplier> void ConeNewton::velocities_of(const Multiplier& z, std::vector<Vec6>& v) const {
-    v.assign(mass_factor_.size(), Vec6{});
-    for (const ConeUnit& unit : units_) push(unit, z(unit), v);
-    for (std::size_t b = 0; b < v.size(); ++b) solve_six(mass_factor_[b], v[b]);
 }
 
 /// to += Gᵀ z of one unit.
 void ConeNewton::push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to) {
-    for (int i = 0; i < unit.size; ++i)
-        for (int a = 0; a < 6; ++a) {
-            if (unit.first >= 0) to[unit.first][a] += unit.first_row[i][a] * z[i];
-            if (unit.second >= 0) to[unit.second][a] += unit.second_row[i][a] * z[i];
-        }
+    for (const bool first : {true, false}) {
+        const int body = first ? unit.first : unit.second;
+        if (body < 0) continue;
+        const Vec6* rows = first ? unit.first_row : unit.second_row;
+        if (unit.size == 3) add_push<3>(rows, z.data(), to[body].data());
+        else add_push<1>(rows, z.data(), to[body].data());
+    }
 }
 
 /// G v of one unit.
 ConeUnit::Vec ConeNewton::along(const ConeUnit& unit, const std::vector<Vec6>& v) {
     ConeUnit::Vec sum{};
-    for (int i = 0; i < unit.size; ++i) {
-        if (unit.first >= 0) sum[i] += dot(unit.first_row[i], v[unit.first]);
-        if (unit.second >= 0) sum[i] += dot(unit.second_row[i], v[unit.second]);
+    for (const bool first : {true, false}) {
+        const int body = first ? unit.first : unit.second;
+        if (body < 0) continue;
+        const Vec6* rows = first ? unit.first_row : unit.second_row;
+        const Six speed = Six::load(v[body].data());
+        for (int i = 0; i < unit.size; ++i) sum[i] += speed.dot(Six::load(rows[i].data()));
     }
     return sum;
 }

@@ -72,7 +72,6 @@ private:
     void move(const MixedSystem& system, const Search& found);
     bool find_directions(double blur);
     bool answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du);
-    template <class Multiplier> void velocities_of(const Multiplier& z, std::vector<Vec6>& v) const;
     static void push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to);
     static ConeUnit::Vec along(const ConeUnit& unit, const std::vector<Vec6>& v);
     static ConeUnit::Vec speed_along(const ConeUnit& unit, const std::vector<Vec6>& v,
@@ -86,7 +85,7 @@ private:
     std::vector<std::pair<int, int>> pairs_, needed_;  // analysed, and those of this system
     int bodies_ = -1;
     std::vector<ConeUnit> units_;
-    std::vector<Mat6> mass_factor_;
+    std::vector<Mat6> mass_factor_, mass_inverse_;
     std::vector<Vec6> velocity_, change_, image_;
     std::vector<std::pair<ConeUnit::Vec, ConeUnit::Vec>> best_;  // z and u of every unit
     double speed_ = 0.0, hold_ = 0.0, near_ = 1.0;

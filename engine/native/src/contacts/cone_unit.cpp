@@ -61,8 +61,10 @@ void ConeUnit::linearise_row(const Aid& aid) {
 
 void ConeUnit::linearise(const Aid& aid) {
     const double blur = aid.blur, hold = aid.hold;
-    natural(z, u, aid, map.data());
-    if (size == 1) return linearise_row(aid);
+    if (size == 1) {
+        natural(z, u, aid, map.data());
+        return linearise_row(aid);
+    }
     const double over = 1.0 / root, rho = root * root, mu = friction;
     const double w1 = root * mu * u[1], w2 = root * mu * u[2];
     const double rounded = kink(blur), sliding = std::sqrt(w1 * w1 + w2 * w2 + rounded * rounded);
@@ -71,6 +73,7 @@ void ConeUnit::linearise(const Aid& aid) {
     const double a0 = y0 - (root * u[0] + sliding - rounded) - hold * (y0 - held[0]);
     const Spectrum s = project(a0, y1 - w1 - hold * (y1 - held[1]), y2 - w2 - hold * (y2 - held[2]), blur);
     t1 = s.t1, t2 = s.t2;
+    map = {y0 - s.value[0], y1 - s.value[1] * t1, y2 - s.value[1] * t2};
     double ratio[3], image[3];
     for (int i = 0; i < 3; ++i) {
         slope[i] = s.slope[i], rest[i] = s.rest[i] + hold * s.slope[i];

@@ -34,7 +34,7 @@ struct ConeUnit {
     double t1 = 1.0, t2 = 0.0;           //   the direction of their frame,
     double s1 = 0.0, s2 = 0.0;           //   that of the slip,
     double k[9] = {}, g[9] = {};         //   K = −dz/d(G v), and (1 + K₀ Sig)⁻¹
-    Vec lack{}, c{};                     // what is to be answered, and respond()'s answer
+    Vec lack{}, c{}, turn{};             // what is to be answered, respond()'s answer, and the u of that
 
     /// How the map is changed on the way to its root.
     struct Aid {

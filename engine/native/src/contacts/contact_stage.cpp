@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contacts/contact_geometry.hpp"
 #include "linear/regularisation.hpp"
+#include "run/quantities.hpp"
 
 namespace spook {
 
@@ -305,6 +307,7 @@ ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point
     touch.impulse = normal * n + along + point.impact_impulse;
     touch.tangent[0] = dot(along, point.tangent);
     touch.tangent[1] = dot(along, cross(n, point.tangent));
+    touch.friction = point.material.friction;
     touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
     return touch;
 }
@@ -372,6 +375,20 @@ double ContactStage::penetration() const noexcept {
     double depth = 0.0;
     for (const Touch& touch : touches_) depth = std::max(depth, -touch.contact.point.gap);
     return depth;
+}
+
+void ContactStage::points(int most, double* out) const noexcept {
+    double* const end = out + CONTACT_NUMBERS * most;
+    for (const Touch& touch : touches_) {
+        if (out == end) break;
+        if (!touch.active) continue;
+        put(out, touch.contact.point.position);
+        put(out + 3, touch.contact.point.normal);
+        put(out + 6, (1.0 / options_.time_step) * touch.impulse);
+        out[9] = touch.friction;
+        out += CONTACT_NUMBERS;
+    }
+    std::fill(out, end, std::numeric_limits<double>::quiet_NaN());
 }
 
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {

@@ -159,6 +159,7 @@ public:
         double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
         double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
         double pressed = 0.0;            // how far its bodies have pressed it in by the step's end, m
+        double friction = 0.0;           // mu of the pair
         bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
@@ -194,6 +195,9 @@ public:
     int count() const noexcept;
     /// Largest depth [m] among this step's points, at its start.
     double penetration() const noexcept;
+    /// Points that push or are closed, ten numbers each: place [m], normal onto the first body, force [N] on it,
+    /// coefficient of friction. The first `most` of them in order of bodies; NaN where there are fewer.
+    void points(int most, double* out) const noexcept;
 
     ContactCounters counters() const noexcept { return counters_; }
     BlockLdlt::Counters factor_counters() const noexcept;

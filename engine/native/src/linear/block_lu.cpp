@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "linear/pieces.hpp"
+#include "linear/six.hpp"
 
 namespace spook {
 
@@ -12,58 +13,72 @@ namespace {
 
 constexpr std::int64_t operations_a_piece = 50'000;  // of blocks: some milliseconds
 
+constexpr double only_k[6][6] = {{1}, {0, 1}, {0, 0, 1}, {0, 0, 0, 1}, {0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 1}};
+constexpr double not_k[6][6] = {{0, 1, 1, 1, 1, 1}, {1, 0, 1, 1, 1, 1}, {1, 1, 0, 1, 1, 1},
+                                {1, 1, 1, 0, 1, 1}, {1, 1, 1, 1, 0, 1}, {1, 1, 1, 1, 1, 0}};
+
 /// C −= A B.
 inline void subtract_product(const double* a, const double* b, double* c) noexcept {
-    for (int i = 0; i < 6; ++i) {
-        double row[6];
-        for (int j = 0; j < 6; ++j) row[j] = c[6 * i + j];
-        for (int k = 0; k < 6; ++k)
-            for (int j = 0; j < 6; ++j) row[j] -= a[6 * i + k] * b[6 * k + j];
-        for (int j = 0; j < 6; ++j) c[6 * i + j] = row[j];
+    const Six b0 = Six::load(b), b1 = Six::load(b + 6), b2 = Six::load(b + 12);
+    const Six b3 = Six::load(b + 18), b4 = Six::load(b + 24), b5 = Six::load(b + 30);
+    for (int i = 0; i < 36; i += 6) {
+        Six row = Six::load(c + i);
+        row.subtract(a[i], b0), row.subtract(a[i + 1], b1), row.subtract(a[i + 2], b2);
+        row.subtract(a[i + 3], b3), row.subtract(a[i + 4], b4), row.subtract(a[i + 5], b5);
+        row.store(c + i);
     }
 }
 
 /// A ← A B.
 inline void multiply(double* a, const double* b) noexcept {
-    for (int i = 0; i < 6; ++i) {
-        double row[6] = {0, 0, 0, 0, 0, 0};
-        for (int k = 0; k < 6; ++k)
-            for (int j = 0; j < 6; ++j) row[j] += a[6 * i + k] * b[6 * k + j];
-        for (int j = 0; j < 6; ++j) a[6 * i + j] = row[j];
+    const Six b0 = Six::load(b), b1 = Six::load(b + 6), b2 = Six::load(b + 12);
+    const Six b3 = Six::load(b + 18), b4 = Six::load(b + 24), b5 = Six::load(b + 30);
+    for (int i = 0; i < 36; i += 6) {
+        Six row = Six::zero();
+        row.add(a[i], b0), row.add(a[i + 1], b1), row.add(a[i + 2], b2);
+        row.add(a[i + 3], b3), row.add(a[i + 4], b4), row.add(a[i + 5], b5);
+        row.store(a + i);
     }
 }
 
 inline void subtract_image(const double* a, const double* x, double* y) noexcept {
-    for (int i = 0; i < 6; ++i) {
-        double sum = 0.0;
-        for (int j = 0; j < 6; ++j) sum += a[6 * i + j] * x[j];
-        y[i] -= sum;
-    }
+    const Six change = image(a, Six::load(x));
+    Six sum = Six::load(y);
+    sum.a -= change.a, sum.b -= change.b, sum.c -= change.c;
+    sum.store(y);
 }
 
-/// A ← A⁻¹ by Gauss and Jordan with row pivots; false if it has none.
+/// A ← A⁻¹ by Gauss and Jordan in place, with row pivots; false if it has none.
 bool invert(double* a) noexcept {
-    double inverse[36] = {};
-    for (int i = 0; i < 6; ++i) inverse[7 * i] = 1.0;
+    int swapped[6];
     for (int k = 0; k < 6; ++k) {
         int best = k;
         for (int i = k + 1; i < 6; ++i)
             if (std::abs(a[6 * i + k]) > std::abs(a[6 * best + k])) best = i;
-        if (best != k)
-            for (int j = 0; j < 6; ++j)
-                std::swap(a[6 * best + j], a[6 * k + j]),
-                    std::swap(inverse[6 * best + j], inverse[6 * k + j]);
+        swapped[k] = best;
+        if (best != k) std::swap_ranges(a + 6 * k, a + 6 * k + 6, a + 6 * best);
         const double over = 1.0 / a[7 * k];
         if (!std::isfinite(over)) return false;
-        for (int j = 0; j < 6; ++j) a[6 * k + j] *= over, inverse[6 * k + j] *= over;
+        // Column k gives its place to that of the inverse: by masks, since writing one number of a row that is read
+        // as pairs right after is slow.
+        const Six others = Six::load(not_k[k]);
+        Six own = Six::load(a + 6 * k);
+        own.multiply(others);
+        own.add(1.0, Six::load(only_k[k]));
+        own.scale(over);
         for (int i = 0; i < 6; ++i) {
             if (i == k) continue;
             const double share = a[6 * i + k];
-            for (int j = 0; j < 6; ++j)
-                a[6 * i + j] -= share * a[6 * k + j], inverse[6 * i + j] -= share * inverse[6 * k + j];
+            Six row = Six::load(a + 6 * i);
+            row.multiply(others);
+            row.subtract(share, own);
+            row.store(a + 6 * i);
         }
+        own.store(a + 6 * k);
     }
-    std::copy_n(inverse, 36, a);
+    for (int k = 5; k >= 0; --k)
+        if (swapped[k] != k)
+            for (int i = 0; i < 36; i += 6) std::swap(a[i + k], a[i + swapped[k]]);
     return true;
 }
 
@@ -146,11 +161,7 @@ void BlockLu::solve(double* x) const noexcept {
         double* own = place(k);
         for (std::int64_t r = column_start_[k]; r < column_start_[k + 1]; ++r)
             subtract_image(upper_.data() + 36 * r, place(column_rows_[r]), own);
-        double image[6] = {0, 0, 0, 0, 0, 0};
-        const double* pivot = pivot_.data() + 36 * static_cast<std::size_t>(k);
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6; ++j) image[i] += pivot[6 * i + j] * own[j];
-        std::copy_n(image, 6, own);
+        image(pivot_.data() + 36 * static_cast<std::size_t>(k), Six::load(own)).store(own);
     }
 }
 
