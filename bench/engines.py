@@ -2,7 +2,9 @@
 
     python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md
     python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md --only-page
+    python bench/engines.py --db sqlite:///build/engines.db --missing
 
+Each engine's runs are recorded as soon as it has answered, so that an interrupted night goes on with --missing.
 Why another engine is first stands in docs/engine-causes.toml, by hand: a cause is found, not measured. Where there is
 none, the page says so.
 """
@@ -24,13 +26,19 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
 import spook_tracker.tracker.judge.rank as ranks
-from spook_tracker.tracker.document.wording import number, quantity, seconds, version
+from spook_tracker.tracker.document.wording import instant, number, quantity, seconds, version
+from spook_tracker.tracker.measure.timing import Repeats
 from spook_tracker.tracker.store.database import session_on
 
 OURS = "spook"
+FACTS = "bench.engine_facts:FACTS"
+FACT_LIMIT = 5.0  # s of one simulation
+# Of another engine: short runs are timed three times, what takes longer than this many seconds once; most of the time goes
+# into models that are built anew for each.
+REPEATS = Repeats(most=3, seconds=0.05, fewest=1, stages_up_to=0.02, runs=5)
 ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
 CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
-LIMIT = re.compile(r"time limit of ([\d.]+) s was reached")
+LIMIT = re.compile(r"time limit of ([\d.]+) s was reached|the ([\d.]+) s for this question")
 PAGE = Path(__file__).parents[1] / "docs" / "engines.md"
 Causes = Mapping[tuple[str, str], tuple[str, str]]  # (test, engine): (cause, what would mend it)
 
@@ -48,24 +56,47 @@ def installed() -> list[str]:
     return found
 
 
-def measure(names: Sequence[str], database: str, limit: float) -> None:
-    """A run with ladders of each engine, recorded; says how long each took."""
+def measure(names: Sequence[str], database: str, facts: str, limit: float) -> None:
+    """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took."""
     for name in names:
         begin = time.perf_counter()
-        document = tracker.run(sweep=True, engine=name, workers=2, limit=None if name == OURS else limit)
+        theirs: dict[str, Any] = {}
+        if name != OURS:
+            theirs = {"limit": limit, "patience": limit, "every_setting": False, "repeats": REPEATS}
+        document = tracker.run(sweep=True, engine=name, workers=2, **theirs)
         tracker.record(document, database)
+        measure_facts([name], facts)
         outcomes = Counter(sample.outcome for sample in document.samples)
         told = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in outcomes.most_common())
         print(f"{name}: {time.perf_counter() - begin:.0f} s; {told}", flush=True)
 
 
-def page(database: str) -> str:
+def measure_facts(names: Sequence[str], database: str) -> None:
+    """The facts alone."""
+    for name in names:
+        tracker.record(tracker.run(engine=name, workers=2, catalogue=FACTS, limit=FACT_LIMIT), database)
+
+
+def without_a_run(names: Sequence[str], database: str) -> list[str]:
+    """Those of which the database has no run at the version that is installed."""
+    with session_on(database) as session:
+        known = {(run.engine.name, run.engine.version) for run in _newest(tracker.History(session)).values()}
+    return [name for name in names if (name, find.find(name).build_info.version) not in known]
+
+
+def _newest(history: tracker.History) -> dict[str, Any]:
+    """The newest run of each engine."""
+    return {run.engine.name: run for run in history.runs()}
+
+
+def page(database: str, of_facts: str = "") -> str:
     """The page in Markdown, from the newest run of each engine."""
     with session_on(database, readonly=True) as session:
         history = tracker.History(session)
-        newest = {run.engine.name: run for run in history.runs()}
+        newest = _newest(history)
         runs = {name: newest[name] for name in sorted(newest, key=lambda name: (name != OURS, name))}
         samples = {name: history.samples(run.id) for name, run in runs.items()}
+    facts = _recorded_facts(of_facts) if of_facts else {}
     if OURS not in runs:
         raise SystemExit(f"{database} has no run of ours to set the others beside")
     machine = runs[OURS].machine
@@ -80,14 +111,27 @@ def page(database: str) -> str:
         "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
         f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
-        "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts.",
+        "Whoever is missing was not installed: `pip install 'spook-tracker[mujoco,exudyn,drake,dart,pybullet]'` and "
+        f"`npm install {' '.join(find.NODE.values())}` bring all.",
         "",
+        *READING,
+        "",
+        *_choice(races),
+        *_facts(facts),
         *_gates(samples),
-        *_rungs(samples),
+        *_rungs(samples, runs),
         *_first(races),
         *_behind(races, causes()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _recorded_facts(database: str) -> dict[str, ranks.Samples]:
+    with session_on(database) as session:
+        history = tracker.History(session)
+        newest = _newest(history)
+        names = sorted(newest, key=lambda name: (name != OURS, name))
+        return {name: history.samples(newest[name].id) for name in names}
 
 
 def causes() -> Causes:
@@ -122,29 +166,139 @@ def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
     ]
 
 
-def _rungs(samples: Mapping[str, ranks.Samples]) -> list[str]:
+def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Any]) -> list[str]:
     """How much of the ladders below was had of each engine, and what stopped the rest."""
     rows = []
     for name, told in samples.items():
         found = [sample for definition, sample in told.values() if definition.kind == "ladder"]
         outcomes = Counter(sample.outcome for sample in found)
-        late = {m[1] for sample in found if (m := LIMIT.search(sample.failure))}
+        late = {m[1] or m[2] for sample in found if (m := LIMIT.search(sample.failure))}
         bound = ", ".join(f"{seconds} s" for seconds in sorted(late, key=float))
         others = len(found) - outcomes["value"] - outcomes["timed_out"] - outcomes["not_supported"]
+        took = _minutes(runs[name])
         rows.append(
-            (name, outcomes["value"], outcomes["timed_out"], bound or "-", others, outcomes["not_supported"])
+            (
+                name,
+                outcomes["value"],
+                outcomes["timed_out"],
+                bound or "-",
+                others,
+                outcomes["not_supported"],
+                took,
+            )
         )
     return [
-        "## Rungs of the ladders",
+        "## Rungs of the ladders, and what was left out",
         "",
-        "A rung that takes longer than the time limit is out of time, and so are the finer ones after it: a front may",
-        "end there where patience would lead it on.",
+        "Of another engine a simulation may take so long, of the processor's time, and where the simulations of one ladder",
+        "in one setting have taken as long together its finer rungs are not tried: a front may end there where patience",
+        "would lead it on. Ladders are asked in every setting, the gates in the one that the engine names first. A run",
+        "beyond 50 ms is timed once, a shorter one three times; while run times are taken nothing else runs.",
         "",
-        "| engine | values | out of time | time limit | diverged or else failed | not supported |",
-        "|---|---|---|---|---|---|",
+        "| engine | rungs with a value | out of time | limit | diverged or else failed | not supported | whole night |",
+        "|---|---|---|---|---|---|---|",
         *(f"| {' | '.join(map(str, row))} |" for row in rows),
         "",
     ]
+
+
+def _minutes(run: Any) -> str:
+    begun, ended = instant(run.started), instant(run.finished)
+    return "-" if begun is None or ended is None else f"{(ended - begun).total_seconds() / 60.0:.1f} min"
+
+
+READING = (
+    "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts. A *scene*",
+    "is one quantity of one scalar test, its *error* the distance from a closed form or a reference of known accuracy, its",
+    "*run time* that of the engine's own steps in one thread, models built before. *First* is who comes within an error",
+    "soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
+    "supported, by name, and no mark against it.",
+)
+
+
+def _choice(races: Sequence[ranks.Race]) -> list[str]:
+    """Engine by engine: how many places it reaches, in how many it is first or near, and at which errors."""
+    engines = sorted(
+        {name for race in races for _, name in race.order}, key=lambda name: (name != OURS, name)
+    )
+    rows = []
+    for name in engines:
+        here = [
+            (race.error, race.order[0][0], time) for race in races for time, who in race.order if who == name
+        ]
+        first = sum(time <= best for _, best, time in here)
+        near = sum(best < time <= 10.0 * best for _, best, time in here)
+        reached = [sum(error == one for error, _, _ in here) for one in ranks.ERRORS]
+        rows.append((name, first, near, *reached))
+    return [
+        "## Which engine comes how far",
+        "",
+        f"Of {len(races)} places (a scene at an error that somebody reaches): how often an engine is first, how often it",
+        "takes up to ten times as long as the first, and on how many scenes it comes within each error at all.",
+        "",
+        "| engine | first | within ten times | "
+        + " | ".join(f"reaches {error:g}" for error in ranks.ERRORS)
+        + " |",
+        "|---|---|---|" + "---|" * len(ranks.ERRORS),
+        *(f"| {' | '.join(map(str, row))} |" for row in rows),
+        "",
+    ]
+
+
+def _facts(samples: Mapping[str, ranks.Samples]) -> list[str]:
+    """The facts, a row for each setting of each engine."""
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    columns: dict[str, str] = {}
+    for name, told in samples.items():
+        for definition, sample in told.values():
+            assert definition.time_step is not None
+            place = f"{definition.test} {definition.time_step:g}"
+            steps = (
+                f", h = 1/{round(1.0 / definition.time_step)} s" if definition.test == "fact_chain" else ""
+            )
+            columns.setdefault(place, f"{HEADS[definition.test]}{steps}")
+            setting = definition.configuration if name != OURS else "plain"
+            answered = sample.outcome in ("value", "unsettled", "out_of_limit")
+            said = "-" if sample.outcome == "not_supported" else sample.outcome.replace("_", " ")
+            cells.setdefault((name, setting), {})[place] = number(sample.value, 2) if answered else said
+    if not cells:
+        return []
+    rows = [
+        f"| {name} ({setting}) | " + " | ".join(row.get(place, "-") for place in columns) + " |"
+        for (name, setting), row in cells.items()
+        if set(row.values()) != {"-"}
+    ]
+    return [
+        "## What kinds of engines do",
+        "",
+        *KINDS,
+        "",
+        "| engine (setting) | " + " | ".join(columns.values()) + " |",
+        "|---|" + "---|" * len(columns),
+        *rows,
+        "",
+    ]
+
+
+HEADS = {
+    "fact_chain": "chain of 26: energy gained [%]",
+    "fact_door": "door on 10 hinges: unevenness",
+    "fact_beam": "80 boxes: sag in 0.5 s [m]",
+    "fact_creep": "box held by friction: creep in 10 s [m]",
+    "fact_digits": "uniform motion: relative error",
+}
+KINDS = (
+    "Five questions whose answers follow from how an engine is made, in every setting (`bench/engine_facts.py` states them):",
+    "",
+    "- **A chain of 26 links** gains energy, or comes apart, in joint coordinates with semi-implicit Euler at 1/60 s and",
+    "  1/240 s; rods held as constraints do not, nor does Runge-Kutta of order 4.",
+    "- **A door on ten hinges** is held by many splits of its load. That of least norm is even; sweeps and joint coordinates",
+    "  give others, whose forces across are off by as much as the largest of them, or by several times that.",
+    "- **A beam of 80 locked boxes** on two piles falls between them where sweeps or springs hold the locks (free fall is",
+    "  1.2 m in half a second); a direct solve or merged bodies hold it.",
+    "- **A box** on a slope of 0.3 with a friction of 0.5 stands; regularised friction lets it creep.",
+    "- **Uniform motion** needs no method: what is lost in 1000 steps is rounding, far more in single precision than in double.",
+)
 
 
 def _first(races: Sequence[ranks.Race]) -> list[str]:
@@ -193,16 +347,30 @@ def main(arguments: list[str]) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--db", default="sqlite:///build/engines.db")
+    parser.add_argument("--facts-db", default="sqlite:///build/engine-facts.db")
     parser.add_argument("--page", default=str(PAGE))
-    parser.add_argument("--limit", type=float, default=5.0, help="s of one simulation of another engine")
+    parser.add_argument(
+        "--limit",
+        type=float,
+        default=0.5,
+        help="s of one simulation of another engine, and of a ladder's together",
+    )
+    parser.add_argument("--missing", action="store_true", help="ask only whom the database has no run of")
+    parser.add_argument(
+        "--facts", action="store_true", help="ask for what kinds of engines do, and nothing else"
+    )
     parser.add_argument(
         "--only-page", action="store_true", help="measure nothing, write the page of what is recorded"
     )
     parser.add_argument("engines", nargs="*", help="by default all that are installed")
     asked: Any = parser.parse_args(arguments)
-    if not asked.only_page:
-        measure(asked.engines or installed(), asked.db, asked.limit)
-    Path(asked.page).write_text(page(asked.db), encoding="utf-8")
+    names = [] if asked.only_page else asked.engines or installed()
+    if asked.facts:
+        measure_facts(names, asked.facts_db)
+    else:
+        names = without_a_run(names, asked.db) if asked.missing else names
+        measure(names, asked.db, asked.facts_db, asked.limit)
+    Path(asked.page).write_text(page(asked.db, asked.facts_db), encoding="utf-8")
     print(f"wrote {asked.page}")
     return 0
 

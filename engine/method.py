@@ -19,7 +19,9 @@ class Method:
     corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step; each takes an
                        order of the violation, and closed loops with redundant joints move without compliance
     correction_cap     largest curvature correction, as a fraction of the rest length or of a joint's arms, or rad
-    half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out
+    half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out. Order 2, with contacts as long
+                       as they last on flat ground: rolling, sliding in a line, gripping; or without friction on round
+                       ground. A slide that turns, rolling over round ground, what opens or closes: order 1 as in plain
     string_stiffness   treat the transverse stiffness of taut links, the geometric one of loaded joints, implicitly
     substeps           steps of h/substeps per reported step
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
@@ -35,7 +37,8 @@ class Method:
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1)
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
-                       law, its impulse against where a step of projection would put it
+                       law, its impulse against where a step of projection would put it; so does one that stopped early
+                       and left bodies sunk into each other by a fiftieth of the smaller one's radius
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
     force_stages       stages to keep although the scene does not need them, to measure what they cost

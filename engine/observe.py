@@ -16,6 +16,9 @@ Quantities (per sample)                         shape            unit
   Momentum, AngularMomentum(about)              (3,)             N s, kg m²/s
   ContactForce (body, other or all)             (3,)             N, on `body`, sum over the contact points
   ContactCount, Penetration                     ()               1; largest penetration depth, m
+  ContactPoints (most)                          (most, 10)       place [m], normal onto the first body of the pair,
+                                                                 force [N] on that body, coefficient of friction [1];
+                                                                 in order of bodies, NaN where there are fewer points
   JointCoordinate (joint)                       ()               m or rad, free coordinate of an axial joint;
                                                                  a hinge counts its turns
 
@@ -30,6 +33,8 @@ from dataclasses import dataclass
 
 from spook_tracker.engine.check import Vector, vector
 from spook_tracker.engine.errors import MethodError, SceneError
+
+MOST_POINTS = 100_000  # of one observation: 8 MB a sample
 
 
 def _point(field: str, value: object) -> Vector:
@@ -130,6 +135,17 @@ class ContactCount(Quantity):
 @dataclass(frozen=True, slots=True)
 class Penetration(Quantity):
     pass
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPoints(Quantity):
+    most: int
+
+    def __post_init__(self) -> None:
+        if isinstance(self.most, bool) or not isinstance(self.most, int) or not 1 <= self.most <= MOST_POINTS:
+            raise MethodError(
+                f"observe: {self!r} must ask for a whole number of points, from 1 to {MOST_POINTS}"
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 
 from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
@@ -27,19 +28,26 @@ from spook_tracker.engine.observe import (
     ConstraintForce,
     ContactCount,
     ContactForce,
+    ContactPoints,
     JointCoordinate,
     Observable,
     Penetration,
     Quantity,
     Violation,
 )
-from spook_tracker.engine.recording import Recording, needs_every_step, observed
+from spook_tracker.engine.recording import Recording, needs_every_step, observed, wanted_samples
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 
 RIGID = 1e-8  # m/N or rad/(N m): a softer row is a spring, which an engine must be able to hold as such
-_FROM_ENGINE: tuple[type[Quantity], ...] = (ConstraintForce, ContactForce, ContactCount, Penetration)
+_FROM_ENGINE: tuple[type[Quantity], ...] = (
+    ConstraintForce,
+    ContactForce,
+    ContactCount,
+    ContactPoints,
+    Penetration,
+)
 
 
 class NotSupported(EngineError):
@@ -90,10 +98,13 @@ class Task:
     time_step: float  # s
     steps: int
     every_step: bool  # else only the start and the end
+    samples: npt.NDArray[
+        np.int64
+    ]  # steps something is read at, with the start and the end: all that must be kept
     configuration: Configuration
     constraint_forces: bool  # whether they are wanted
     contacts: bool  # whether contact forces, counts or depths are wanted
-    time_limit: float | None  # s of wall time
+    time_limit: float | None  # s, of the processor where the adapter can tell, else of wall time
 
 
 @runtime_checkable
@@ -261,9 +272,10 @@ def run(
         time_step=float(time_step),
         steps=count,
         every_step=needs_every_step(observe, count),
+        samples=wanted_samples(observe, count),
         configuration=chosen,
         constraint_forces=ConstraintForce in asked,
-        contacts=not {ContactForce, ContactCount, Penetration}.isdisjoint(asked),
+        contacts=not {ContactForce, ContactCount, ContactPoints, Penetration}.isdisjoint(asked),
         time_limit=time_limit,
     )
     return _result(task, adapter.record(task), observe)

@@ -16,6 +16,7 @@ from spook_tracker.engine.observe import (
     ConstraintForce,
     ContactCount,
     ContactForce,
+    ContactPoints,
     Energy,
     JointCoordinate,
     KineticEnergy,
@@ -92,6 +93,8 @@ def _request(quantity: Quantity, scene: Scene) -> tuple[_core.QuantityRequest, S
     if isinstance(quantity, ContactForce):
         other = -1 if quantity.other is None else _body(scene, quantity.other)
         return _ask("contact_force", _body(scene, quantity.body), other=other), (3,)
+    if isinstance(quantity, ContactPoints):
+        return _ask("contact_points", quantity.most), (quantity.most, 10)
     if isinstance(quantity, JointCoordinate):
         index = _constraint(scene, quantity.joint)
         if not isinstance(scene.constraints[index], AxialJoint):

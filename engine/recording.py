@@ -42,7 +42,7 @@ from spook_tracker.engine.observe import (
     Velocity,
     Violation,
 )
-from spook_tracker.engine.recorded_joints import turned, turned_back
+from spook_tracker.engine.recorded_joints import cross, turned, turned_back
 from spook_tracker.engine.result import Array, Status
 from spook_tracker.engine.scene import Scene
 
@@ -67,6 +67,19 @@ class Recording:
     failure: str = ""
 
 
+def wanted_samples(observe: Mapping[str, Observable], steps: int) -> npt.NDArray[np.int64]:
+    """The steps at which something is read, with the start and the end, ascending."""
+    wanted = np.zeros(steps + 1, dtype=bool)
+    wanted[[0, steps]] = True
+    for what in observe.values():
+        last = steps if what.last is None else min(what.last, steps)
+        if isinstance(what, Final):
+            wanted[max(last, 0)] = True
+        else:
+            wanted[what.first : last + 1 : what.every if isinstance(what, Trace) else 1] = True
+    return np.flatnonzero(wanted)
+
+
 def needs_every_step(observe: Mapping[str, Observable], steps: int) -> bool:
     """Whether something is read between the start and the end."""
     return any(not isinstance(what, Final) or what.last not in (None, steps) for what in observe.values())
@@ -87,7 +100,7 @@ def observed(
         last = recording.samples[-1] if what.last is None else what.last
         kept = np.flatnonzero((recording.samples >= what.first) & (recording.samples <= last))
         if isinstance(what, Trace):
-            kept = kept[:: what.every]
+            kept = kept[(recording.samples[kept] - what.first) % what.every == 0]
             times[name] = np.asarray(recording.samples[kept] * time_step, dtype=np.float64)
         found[name] = _reduced(what, series[kept])
     return found, times
@@ -126,7 +139,7 @@ def quantity(scene: Scene, recording: Recording, asked: Quantity) -> Array:
         if not isinstance(asked, Position | Velocity) or not any(asked.point):
             return states[:, index]
         arm = turned(recording.orientations[:, index], np.broadcast_to(asked.point, states[:, index].shape))
-        moved = np.cross(recording.angular_velocities[:, index], arm) if isinstance(asked, Velocity) else arm
+        moved = cross(recording.angular_velocities[:, index], arm) if isinstance(asked, Velocity) else arm
         return np.asarray(states[:, index] + moved)
     if isinstance(asked, KineticEnergy):
         return _kinetic(scene, recording)
@@ -230,7 +243,7 @@ def _potential(scene: Scene, recording: Recording) -> Array:
 
 def _angular_momentum(scene: Scene, recording: Recording, about: Array) -> Array:
     arms = recording.positions - about
-    orbit = np.einsum("n,snk->sk", _masses(scene), np.cross(arms, recording.velocities))
+    orbit = np.einsum("n,snk->sk", _masses(scene), cross(arms, recording.velocities))
     inertias = _inertias(scene)
     if not inertias.any():
         return np.asarray(orbit)

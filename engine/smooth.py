@@ -79,23 +79,27 @@ def check_wide_rows(scene: Scene, method: Method) -> None:
 def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
     """What rigid bodies cannot do beyond plain SPOOK; `touching`: whether surfaces may ever meet."""
     composed = method.composition != "none"
-    wanted = (
-        f"composition {method.composition!r}"
-        if composed
-        else "half_step_velocities"
-        if method.half_step_velocities
-        else f"corrections={method.corrections}"
-        if method.corrections
-        else "string_stiffness"
-        if method.string_stiffness
-        else None
-    )
-    if wanted is None:
+    asked = [f"composition {method.composition!r}"] if composed else []
+    asked += ["half_step_velocities"] if method.half_step_velocities else []
+    asked += [f"corrections={method.corrections}"] if method.corrections else []
+    asked += ["string_stiffness"] if method.string_stiffness else []
+    if not asked:
         return
-    if touching:
+    wanted = asked[0]
+    beyond = next((w for w in asked if w != "half_step_velocities"), None)
+    if touching and beyond is not None:
         raise MethodError(
-            f"method: {wanted} needs a smooth scene, but surfaces may touch here, and a contact that opens or closes "
-            f"within a step leaves order 1, that of the plain method; leave it out, or give Scene contacts=False"
+            f"method: {beyond} needs a smooth scene, but surfaces may touch here, and a contact that opens or closes "
+            f"within a step leaves order 1; use half_step_velocities, of order 2 while contacts last, or give Scene "
+            f"contacts=False"
+        )
+    bouncing = next(
+        (b.name for b in scene.bodies if isinstance(b, RigidBody) and b.material.restitution), None
+    )
+    if touching and bouncing is not None:
+        raise MethodError(
+            f"method: {wanted} is for contacts that last, but {bouncing!r} has a restitution, and blows leave order 1, "
+            f"that of the plain method; leave one of them out, or give Scene contacts=False"
         )
     if method.solver != "direct":
         raise MethodError(f"method: {wanted} needs the direct solver")

@@ -34,6 +34,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "edge_roll": "edge_roll",
     "overhang": "overhang",
     "leaning_cards": "leaning_cards",
+    "card_house": "card_house",
     "rotating_box": "rotating_box",
     "swinging_door": "swinging_door",
     "lock_ring": "lock_ring",

@@ -182,6 +182,9 @@ TEST = ScalarTest(
                 Configuration(name="direct", method=PLAIN, expected_order=1.0),
                 Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+                Configuration(  # exact, for constant forces
+                    name="half-step velocities", method=Method(half_step_velocities=True), expected_order=None
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import msgspec
 
-from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.json_form import Number, encode
 from spook_tracker.tracker.document.run_document import (
     Curve,
     DrawnLink,
@@ -20,10 +19,12 @@ from spook_tracker.tracker.document.run_document import (
     FigureData,
     Machine,
     MapData,
+    Point,
     RunDocument,
     Sample,
     SceneDrawing,
     SeriesDefinition,
+    SeriesHistory,
     StageChoice,
     TestCard,
     Timing,
@@ -272,41 +273,34 @@ def _maps(worse: bool) -> Iterable[MapData]:
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Point:
-    run: RunDocument
-    sample: Sample
-    test_version: str
-
-    def __iter__(self) -> Any:
-        return iter((self.run, self.sample, self.test_version))
-
-
-@dataclass(frozen=True)
-class _Series:
-    definition: SeriesDefinition
-    points: tuple[_Point, ...]
-
-
 class DocumentHistory:
     """The reading interface of `tracker.store.history.History` over documents in memory, oldest first."""
 
     def __init__(self, documents: Sequence[RunDocument]) -> None:
         self.documents = {d.id: d for d in documents}
+        made = {id(d.samples): d for d in documents}  # many nights may have the same
+        self.made = {
+            samples: hashlib.sha256(encode((d.series, d.samples))).hexdigest() for samples, d in made.items()
+        }
+
+    def content(self, run_id: str) -> str:
+        return self.made[id(self.documents[run_id].samples)]
 
     def runs(self, engine: str | None = None) -> list[RunDocument]:
         return [d for d in self.documents.values() if engine in (None, d.engine.name)]
 
-    def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, _Series]:
-        points: dict[str, list[_Point]] = {}
+    def series(
+        self, keys: Iterable[str] | None = None, *, evidence: bool = True
+    ) -> Mapping[str, SeriesHistory]:
+        points: dict[str, list[Point]] = {}
         newest: dict[str, SeriesDefinition] = {}
         for run in self.documents.values():
             newest |= {d.key: d for d in run.series}
             for found in run.samples:
                 points.setdefault(found.series, []).append(
-                    _Point(run, found, newest[found.series].test_version)
+                    Point(run, found, newest[found.series].test_version)
                 )
-        return {key: _Series(newest[key], tuple(points[key])) for key in sorted(points)}
+        return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(points)}
 
     def samples(self, run_id: str) -> dict[str, tuple[SeriesDefinition, Sample]]:
         run = self.documents[run_id]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,12 +14,15 @@ from spook_tracker.engine import (
     Compound,
     ContactCount,
     ContactForce,
+    ContactPoints,
     Energy,
     Final,
     Material,
     MaximumAbsolute,
     Method,
+    MethodError,
     Part,
+    Particle,
     Penetration,
     Plane,
     Position,
@@ -104,6 +108,57 @@ def test_each_contact_of_a_stack_carries_what_stands_on_it() -> None:
         np.testing.assert_allclose(result[str(i)], [0.0, 0.0, (20 - i) * GRAVITY], rtol=0.0, atol=2e-8)
     assert result["moved"].max() < 1e-9
     assert float(result["energy"]) < 1e-6
+
+
+SLOPE = math.radians(20.0)
+TILTED = (math.cos(SLOPE / 2), 0.0, math.sin(SLOPE / 2), 0.0)  # about y: the slope falls along x
+NORMAL = np.array([math.sin(SLOPE), 0.0, math.cos(SLOPE)])
+
+
+def test_the_points_of_a_box_on_a_slope_hold_it() -> None:
+    """Four corners on the plane, each force in its cone; together they carry the weight, and so its torque."""
+    slope = replace(ground(Material(friction=0.25)), orientation=TILTED)
+    box = body(Box((1.0, 0.6, 0.4)), 0.0, orientation=TILTED, material=Material(friction=1.0))
+    box = replace(box, position=tuple(0.2 * NORMAL))
+    points, force = (Final(quantity=q) for q in (ContactPoints(6), ContactForce("body")))
+    result = simulate(
+        Scene(bodies=(slope, box), gravity=DOWN), time_step=1e-3, steps=20,
+        observe={"points": points, "force": force, "position": Final(quantity=Position("body"))},
+    )  # fmt: skip
+    found = result["points"]
+
+    assert found.shape == (6, 10)
+    assert np.isnan(found[4:]).all()
+    where, normal, pushes, friction = found[:4, :3], found[:4, 3:6], found[:4, 6:9], found[:4, 9]
+    np.testing.assert_allclose(where @ NORMAL, 0.0, atol=1e-12)
+    np.testing.assert_allclose(normal, np.tile(-NORMAL, (4, 1)), atol=1e-12)  # the ground is the first
+    np.testing.assert_allclose(-pushes.sum(axis=0), result["force"], atol=1e-9)
+    pressed = (pushes * normal).sum(axis=1)
+    slips = np.linalg.norm(pushes - pressed[:, None] * normal, axis=1)
+    assert np.all(slips <= friction * pressed * (1 + 1e-9))
+    np.testing.assert_allclose(friction, 0.5)  # the geometric mean of both surfaces
+    arms = where - result["position"]
+    np.testing.assert_allclose(np.cross(arms, -pushes).sum(axis=0), 0.0, atol=1e-8)  # it does not tip
+
+
+def test_points_beyond_those_asked_for_are_left_out_and_none_is_no_number() -> None:
+    scene = Scene(bodies=(ground(), body(Box((1.0, 0.6, 0.4)), 0.2)), gravity=DOWN)
+    two = simulate(scene, time_step=H, steps=2, observe={"p": Trace(quantity=ContactPoints(2))})["p"]
+    flying = Scene(bodies=(body(Sphere(0.3), 9.0),), gravity=DOWN)
+    none = simulate(flying, time_step=H, steps=2, observe={"p": Final(quantity=ContactPoints(3))})["p"]
+    dust = Scene(bodies=(Particle(name="dust", position=(0, 0, 0), mass=1.0),), gravity=DOWN)
+    dusty = simulate(dust, time_step=H, steps=2, observe={"p": Final(quantity=ContactPoints(3))})["p"]
+
+    assert two.shape == (3, 2, 10)
+    assert np.isnan(two[0]).all(), "no step has ended yet"
+    assert np.isfinite(two[1:]).all()
+    assert np.isnan(none).all() and np.isnan(dusty).all()
+
+
+@pytest.mark.parametrize("most", [0, -1, 1.5, True, 10**9, "4", None])
+def test_a_number_of_points_that_is_none_is_refused(most: object) -> None:
+    with pytest.raises(MethodError, match="must ask for a whole number of points, from 1 to 100000"):
+        ContactPoints(most)  # type: ignore[arg-type]
 
 
 def test_action_and_reaction() -> None:

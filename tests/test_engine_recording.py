@@ -32,7 +32,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.joints import AxialJoint
 from spook_tracker.engine.observe import ContactCount, ContactForce, Observable, Quantity
-from spook_tracker.engine.recording import Recording, needs_every_step, observed
+from spook_tracker.engine.recording import Recording, needs_every_step, observed, wanted_samples
 from tests import particle_scenes, rigid_scenes
 
 STEPS = 40
@@ -172,3 +172,25 @@ def test_only_a_value_between_start_and_end_needs_every_step() -> None:
     assert not needs_every_step({}, 9)
     assert needs_every_step({"middle": middle}, 9)
     assert needs_every_step({"largest": Maximum(quantity=Energy())}, 9)
+
+
+def test_only_the_samples_that_something_reads_are_kept_and_say_the_same() -> None:
+    scene = particle_scenes.chain(np.random.default_rng(6))
+    observe = {
+        "some": Trace(quantity=Position("p0"), first=2, every=3),
+        "late": Maximum(quantity=Position("p0"), first=8),
+        "one": Final(quantity=Position("p0"), last=4, from_start=True),
+    }
+    whole = recorded(scene, particle_scenes.TIME_STEP)
+    steps = int(whole.samples[-1])
+    wanted = wanted_samples(observe, steps)
+    parts = ("samples", "positions", "orientations", "velocities", "angular_velocities")
+    few = replace(whole, **{name: getattr(whole, name)[wanted] for name in parts})
+    got, times = observed(scene, few, observe, particle_scenes.TIME_STEP)
+    right, right_times = observed(scene, whole, observe, particle_scenes.TIME_STEP)
+
+    assert set(wanted) == {0, 4, *range(2, steps + 1, 3), *range(8, steps + 1)}
+    for name in observe:
+        assert np.array_equal(got[name], right[name])
+    assert np.array_equal(times["some"], right_times["some"])
+    assert list(wanted_samples({}, 9)) == [0, 9]

@@ -68,7 +68,7 @@ FOUND = {  # in a hundred series, and how many of them
     "+10 % at 1 % noise": 1.0,
     "+3 % at .2 % noise": 1.0,
     "+3 % at 1 % noise": 0.7,
-    "+10 % on clusters 8 % apart": 0.7,
+    "+10 % on clusters 8 % apart": 0.8,
 }
 
 
@@ -93,6 +93,37 @@ def test_a_shift_that_several_nights_found_is_blamed_on_its_first_and_ends_where
             assert told[found[0]].verdict.name == "slower"
             assert "by chance once in" in told[found[0]].verdict.sentence
         assert told[-1].state == "green"
+
+
+def test_a_rate_that_fell_is_told_as_the_time_that_rose() -> None:
+    for series in range(3):
+        step = battery.step("+3 % at 1 % noise", series, 60, 12)
+        back = 1e-3 * battery.gauss(0.01)(battery.generator("back", series), 12)
+        told = judge_noisy([float(1.0 / v) for v in [*step, *back]], larger_is_better=True)
+        found = [night for night in told if night.state == "detected"]
+
+        assert found
+        assert "for the worse" in found[0].verdict.sentence
+        assert told[-1].state == "green"
+
+
+def test_two_clusters_are_told_from_one_hump_cut_in_two() -> None:
+    for series in range(5):
+        two = battery.clusters(0.3, 1.08)(battery.generator("two", series), 60)
+        low, high = shifts.clusters(two) or (0.0, 0.0)
+        assert abs(low - 1.0) < 0.01
+        assert abs(high - 1.08) < 0.01
+        for name in ("Gauss 1 %", "Gauss 5 %", "lognormal 5 %", "AR(1) .5, 2 %"):
+            assert shifts.clusters(battery.noise(name, series, 60)) is None
+    assert shifts.clusters(np.array([*np.full(58, 1.0), 1.5, 1.5])) is None  # spikes are no cluster
+
+
+def test_a_night_in_the_other_cluster_is_no_shift_away_from_both() -> None:
+    nights = battery.clusters(0.5, 1.08)(battery.generator("more", 0), 60)
+    slow = 1.08 * battery.gauss(0.01)(battery.generator("more", 1), 6)
+
+    assert shifts._apart_from_clusters(nights, slow) is None
+    assert shifts._apart_from_clusters(nights, 1.1 * slow) is not None
 
 
 def test_red_nights_do_not_become_usual() -> None:

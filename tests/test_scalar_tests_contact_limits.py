@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 
 from spook_tracker.engine import RigidBody
 from spook_tracker.scalar_tests import (
+    card_house,
     hanging_cable,
     masonry_arch,
     rocking_block,
@@ -179,3 +180,33 @@ def test_every_link_of_the_hanging_cable_is_balanced(count: int, time_step: floa
     assert c.horizontal(400) == pytest.approx(c.catenary(), rel=1e-5)
     tension = math.hypot(pull, 0.5 * c.MASS * c.GRAVITY)
     assert tension * time_step**2 / (c.MASS / count * c.LENGTH / count) < 0.15
+
+
+def least_friction_of_a_house(storeys: int) -> float:
+    """The least friction for which any forces hold every storey: a linear programme in friction, pushes, decks."""
+    board, deck = 2.0 * 9.81, 1.0 * 9.81  # N
+    angle, rail, end = math.radians(25.0), 0.9, 0.01
+    out, up = rail * math.sin(angle), rail * math.cos(angle)
+    bounded, limits, moments, turning = [], [], [], []
+    for k in range(storeys):
+        above = (storeys - 1 - k) * (board + 0.5 * deck)  # on each of the two boards
+        push, held = 1 + 2 * k, 2 + 2 * k  # places of this storey's unknowns; the first is the friction
+        for sides, carried in (((push, held), board + above), ((held,), above)):
+            for sign in (1.0, -1.0):
+                row = np.zeros(1 + 2 * storeys)
+                row[list(sides)], row[0] = sign, -carried
+                bounded.append(row)
+                limits.append(0.0)
+        row = np.zeros(1 + 2 * storeys)
+        row[push], row[held] = end + up, 2.0 * end + up
+        moments.append(row)
+        turning.append((0.5 * board + above) * out)
+    free = [(0.0, None), *[(0.0, None), (None, None)] * storeys]  # tops push each other, they do not pull
+    aim = [1.0, *[0.0] * (2 * storeys)]
+    found = linprog(aim, A_ub=bounded, b_ub=limits, A_eq=moments, b_eq=turning, bounds=free)
+    return float(found.fun)
+
+
+@pytest.mark.parametrize("storeys", [1, 2, 3, 5, 12])
+def test_a_house_of_cards_needs_the_friction_that_no_sharing_of_forces_undercuts(storeys: int) -> None:
+    assert card_house.need(storeys) == pytest.approx(least_friction_of_a_house(storeys), rel=1e-9)

@@ -34,6 +34,11 @@ def corrected(place: int, value: float | None = None, **changes: object) -> list
     return [*NIGHTS[:place], replace(run, **changes), *NIGHTS[place + 1 :]]
 
 
+def with_sample(place: int, **changes: object) -> list[RunDocument]:
+    """The nights with the value of one of them changed in what stands behind it only."""
+    return corrected(place, samples=(replace(NIGHTS[place].samples[0], **changes),))
+
+
 def last_with(**changes: object) -> list[RunDocument]:
     return [*NIGHTS[:-1], replace(NIGHTS[-1], series=(replace(NIGHTS[-1].series[0], **changes),))]
 
@@ -53,6 +58,13 @@ def last_with(**changes: object) -> list[RunDocument]:
         pytest.param(
             NIGHTS, corrected(4, 0.31), (), id="a run removed and imported again with another value"
         ),
+        pytest.param(
+            NIGHTS, with_sample(4, state_hash="c3d4"), (), id="a run imported again with other state bits"
+        ),
+        pytest.param(
+            NIGHTS, with_sample(4, counters={"steps": 7}), (), id="a run imported again with other work"
+        ),
+        pytest.param(NIGHTS, with_sample(4, failure="why"), (), id="a run imported again with other words"),
         pytest.param(NIGHTS, [*NIGHTS, *map(other_engine, range(3))], (), id="another engine"),
         pytest.param(NIGHTS, last_with(test_version="v2"), (), id="the definition changed"),
         pytest.param(NIGHTS, last_with(description="other words"), (), id="the words changed"),

@@ -93,6 +93,31 @@ def test_a_replay_shows_where_the_engine_put_the_body(driver, site, recorded):
     assert complaints(driver) == []
 
 
+def test_a_friction_cone_stands_at_each_contact_point_and_says_whether_it_slides(driver, site, recorded):
+    """Two points with mu = .5: one force leans by .2 of its normal, the other by as much as friction bears."""
+    replay(driver, site)
+    shown = driver.execute_script(
+        "const p = document.getElementById('replay').player, n = p.movie.count;"
+        "const each = (v) => Float32Array.from({length: n * v.length}, (_, i) => v[i % v.length]);"
+        "p.use({...p.movie, cones: {point: each([1, 2, 0, 3, 2, 0]), axis: each([0, 0, 1, 0, 0, 1]),"
+        " force: each([2, 0, 10, 5, 0, 10]), friction: each([0.5, 0.5])}});"
+        "p.seek(3); const c = p.view.cones, m = c.mesh, same = (i, k) => {"
+        "  const t = new THREE.Color(); t.fromArray(m.instanceColor.array, 3 * i); return t.getHex() === k.getHex(); };"
+        "const of = (i) => [...m.instanceMatrix.array.slice(16 * i, 16 * i + 16)];"
+        "const before = [m.count, of(0), of(1), same(0, p.view.holding), same(1, p.view.sliding)];"
+        "p.tools.querySelector('[data-tool=cones] input').click();"
+        "return [...before, m.count]"
+    )
+
+    count, first, second, holds, slides, hidden = shown
+    assert (count, holds, slides, hidden) == (2, True, True, 0)
+    for matrix, x in ((first, 1.0), (second, 3.0)):
+        wide, high = matrix[0], matrix[10]
+        assert wide == pytest.approx(0.5 * high)
+        assert matrix[12:15] == pytest.approx([x, 2.0, high / 2])  # the apex at the point
+    assert complaints(driver) == []
+
+
 def test_the_time_slider_moves_by_keyboard_and_stands_in_the_address(driver, site):
     replay(driver, site)
     driver.execute_script(

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
-from spook_tracker.tracker.measure.timing import MOST_RUNS, Stopwatch, interleaved, once
+from spook_tracker.tracker.measure.timing import MOST_RUNS, Repeats, Stopwatch, interleaved, once
 
 
 class Clockwork:
@@ -55,6 +55,16 @@ def test_long_runs_are_repeated_less_often_but_never_once():
 
     assert len(long.seconds) == len(long.calibration) == 2
     assert len(engine.calls) == 2, "the first one counts, too"
+
+
+def test_where_patience_is_short_long_runs_are_timed_once_and_stages_are_left_out():
+    engine = Clockwork()
+    (long, short) = interleaved(
+        runs(a=0.1, b=1e-4), engine, Repeats(most=3, seconds=0.05, fewest=1, stages_up_to=1e-3, runs=7)
+    )
+
+    assert (long.seconds, long.stage_seconds) == ((0.1,), {})
+    assert (len(short.seconds), short.runs_per_repeat, set(short.stage_seconds)) == (3, 7, {"solve_path"})
 
 
 def test_an_engine_without_a_clock_for_stages_is_not_asked_for_them_again():

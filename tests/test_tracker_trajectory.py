@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import spook_tracker.tracker.measure.trajectory as motion
-from spook_tracker.engine import Particle, Scene, simulate
+from spook_tracker.engine import Box, ContactPoints, Material, Particle, Plane, RigidBody, Scene, simulate
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests.case import Example
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.run_document import Trajectory
@@ -101,3 +102,48 @@ def test_scenes_of_the_catalogue_move_within_the_budget(name):
     assert len(moved.body_of_solid) == len(moved.solids)
     assert all(c.width * moved.count == values_of(c, moved.count).size for c in moved.channels)
     assert msgspec.json.decode(msgspec.json.encode(moved), type=Trajectory) == moved
+
+
+SLOPE = 0.4  # the ratio of gravity along the ground to that into it
+
+
+def on_rough_ground(friction: float) -> Example:
+    """A box under tilted gravity: it stands where friction is more than the slope, else it slides."""
+    rough = Material(friction=friction)
+    ground = RigidBody(
+        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
+    box = RigidBody(
+        name="box", mass=1.0, shape=Box((1.0, 1.0, 0.2)), position=(0.0, 0.0, 0.1), material=rough
+    )
+    scene = Scene(bodies=(ground, box), gravity=(SLOPE * GRAVITY, 0.0, -GRAVITY))
+    return Example(scene=scene, time_step=0.01, duration=0.2)
+
+
+@pytest.mark.parametrize(("friction", "lean"), [(0.9, SLOPE), (0.25, 0.25)], ids=["stands", "slides"])
+def test_the_cones_of_a_box_stand_at_its_corners_with_what_they_carry(friction, lean):
+    moved = trajectory("box", Named(lambda: on_rough_ground(friction)), simulate)
+    points, forces = of(moved, "cone_point").reshape(-1, 4, 3), of(moved, "cone_force").reshape(-1, 4, 3)
+    axes, coefficients = of(moved, "cone_axis").reshape(-1, 4, 3), of(moved, "cone_friction")
+
+    assert np.isnan(points[0]).all(), "no step has ended yet"
+    np.testing.assert_allclose(coefficients[1:], friction, atol=1e-12)
+    np.testing.assert_allclose(
+        axes[1:], np.broadcast_to((0.0, 0.0, 1.0), (moved.count - 1, 4, 3)), atol=1e-12
+    )
+    np.testing.assert_allclose(points[1:, :, 2], 0.0, atol=1e-5)  # stored in sixteen bits
+    carried = forces[1:].sum(axis=1)
+    np.testing.assert_allclose(carried[:, 2], GRAVITY, rtol=1e-3)
+    np.testing.assert_allclose(carried[:, 0], -lean * GRAVITY, rtol=1e-3)
+
+
+def test_an_engine_that_keeps_its_contact_points_to_itself_still_moves():
+    def silent(scene, **options):
+        if any(isinstance(what.quantity, ContactPoints) for what in options["observe"].values()):
+            raise NotSupported("silent cannot be asked the observable contact points")
+        return simulate(scene, **options)
+
+    moved = trajectory("box", Named(lambda: on_rough_ground(0.9)), silent)
+
+    assert {c.name for c in moved.channels} >= {"position", "contact_force"}
+    assert not any(c.name.startswith("cone") for c in moved.channels)

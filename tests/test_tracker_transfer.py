@@ -320,6 +320,7 @@ def test_check_finds_nothing_wrong_with_a_history(session):
         (update(models.EngineVersion).values(git_hash="0" * 40), "engine version"),
         (delete(models.SeriesListItem), "entries"),
         (update(models.Figure).values(body=b"junk"), "cannot be read"),
+        (update(models.Sample).values(value=0.25), "was changed after"),
         (text("CREATE TABLE mine (x INTEGER)"), "differ from the models"),
     ],
 )

@@ -31,7 +31,7 @@ def run(
     """Put the questions (all, or those named) to the engine; nothing is recorded.
 
     `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
-    tracker.measure.run.Questions (catalogue, engine, limit, limits).
+    tracker.measure.run.Questions (catalogue, engine, limit, patience, every_setting, limits).
     """
     from spook_tracker.tracker.measure.run import run as measure
 
@@ -52,11 +52,14 @@ def time_again(
     return timed_again(source, request, document, tests, watch or (lambda progress: None))
 
 
+WHERE = ("catalogue", "engine", "limit", "patience", "every_setting", "limits")  # fields of Questions
+
+
 def _asked(tests: Iterable[str], asked: dict[str, Any]) -> tuple[Any, Any]:
     """What is asked of whom: fields of a Request, and those of Questions, told apart."""
     from spook_tracker.tracker.measure.run import Questions, Request
 
-    where = {name: asked[name] for name in ("catalogue", "engine", "limit", "limits") if name in asked}
+    where = {name: asked[name] for name in WHERE if name in asked}
     rest = {name: value for name, value in asked.items() if name not in where}
     return Questions(**where), Request(**{"tests": tuple(tests), **rest})
 

@@ -38,7 +38,7 @@ from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, pairs_apart, solid
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned
+from spook_tracker.engine.recorded_joints import cross, joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
@@ -311,9 +311,7 @@ class _Run:
                 value: Any = float(force @ arm / np.linalg.norm(arm)) if sample else 0.0
             else:
                 sign = 1.0 if tie.between[1] == name else -1.0
-                value = (
-                    sign * np.concatenate([force, torque - np.cross(arm, force)]) if sample else np.zeros(6)
-                )
+                value = sign * np.concatenate([force, torque - cross(arm, force)]) if sample else np.zeros(6)
             keep.forces.setdefault(tie.name, []).append(value)
 
     def _read_contacts(self, keep: Kept, row: int) -> None:

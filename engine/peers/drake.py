@@ -8,6 +8,7 @@ at 1/60 s a box that slides is off the ground at every other step. Central gravi
 
 from __future__ import annotations
 
+import logging
 import time
 from importlib.metadata import version
 from typing import Any
@@ -24,6 +25,10 @@ from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+
+logging.getLogger("drake").setLevel(
+    logging.ERROR
+)  # it warns of contact of soft bodies, which nobody asks for
 
 
 class Drake:

@@ -23,7 +23,7 @@ from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactF
 from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, model
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned
+from spook_tracker.engine.recorded_joints import cross, joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
@@ -173,7 +173,7 @@ class _Run:
         keep.positions[place] = where = d.xpos[self.ids]
         keep.orientations[place] = d.xquat[self.ids]
         keep.spins[place] = spin
-        keep.velocities[place] = d.cvel[self.ids, 3:] + np.cross(spin, where - d.subtree_com[self.roots])
+        keep.velocities[place] = d.cvel[self.ids, 3:] + cross(spin, where - d.subtree_com[self.roots])
 
     def _read_constraints(self, keep: Kept, sample: int) -> None:
         scene, m, d = self.task.scene, self.model, self.data
@@ -206,7 +206,7 @@ class _Run:
             rod = anchor - d.xpos[body]
             return float(force @ rod / np.linalg.norm(rod))
         at = self._carried(constraint, child)
-        torque = torque + np.cross(d.subtree_com[self.model.body_rootid[body]] - at, force)
+        torque = torque + cross(d.subtree_com[self.model.body_rootid[body]] - at, force)
         return np.concatenate([force, torque]) * (1.0 if second else -1.0)
 
     def _of_equality(self, constraint: Distance | Joint, rows: list[Array]) -> Any:
@@ -225,7 +225,7 @@ class _Run:
         total = np.zeros(6)
         for row, arm in zip(rows, arms, strict=True):
             if len(row):  # MuJoCo leaves out an equality that no joint can break
-                total += np.concatenate([row, np.cross(arm, row)])
+                total += np.concatenate([row, cross(arm, row)])
         return sign * total
 
     def _carried(self, joint: Joint, name: str) -> Array:

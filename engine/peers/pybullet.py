@@ -25,7 +25,7 @@ from spook_tracker.engine.peers.joint_tree import (
 from spook_tracker.engine.peers.pybullet_model import HALF_HINGE, Model
 from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, Task
-from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned
+from spook_tracker.engine.recorded_joints import conjugate, cross, joint_point, product, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
@@ -159,7 +159,7 @@ class _Run(Model):
             return float(force @ (anchor - where) / np.linalg.norm(anchor - where))
         if child is not None:
             at = turned(moved, joint_point(self.scene, constraint) - np.array(body.position))
-            torque = torque - np.cross(at, force)
+            torque = torque - cross(at, force)
         sign = 1.0 if constraint.between[1] == body.name else -1.0
         return sign * np.concatenate([force, torque])
 
@@ -170,7 +170,7 @@ class _Run(Model):
         if len(forces) == 1:
             return forces[0], np.zeros(3)
         arm = HALF_HINGE * turned(moved, np.array(constraint.axis))
-        return forces.sum(axis=0), np.cross(arm, forces[1] - forces[0])
+        return forces.sum(axis=0), cross(arm, forces[1] - forces[0])
 
     def _read_contacts(self, keep: Kept, row: int) -> None:
         names = {ids: name for name, ids in self.ids.items()}

@@ -142,6 +142,7 @@ class Player {
     this.tool("speed", make("label", {}, "speed ", this.select([["0.1", "× 0.1"], ["0.25", "× 0.25"], ["1", "× 1"], ["4", "× 4"]], "1", (v) => { this.speed = Number(v); })));
     this.tool("ghost", this.check("ghost", true, (on) => { this.view.shown.ghost = on; this.view.show(this.sample); }));
     this.tool("forces", this.check("contact forces", true, (on) => { this.view.shown.forces = on; this.view.show(this.sample); }));
+    this.tool("cones", this.check("friction cones (orange: sliding)", true, (on) => { this.view.shown.cones = on; this.view.show(this.sample); }));
     this.worst = this.tool("worst", make("button", { type: "button", class: "button" }, "Largest error"));
     this.worst.addEventListener("click", () => this.toWorst());
     this.use(movie);
@@ -175,6 +176,7 @@ class Player {
     tools.ghost.hidden = !movie.ghost;
     tools.ghost.lastChild.textContent = ` ghost: ${movie.ghost ? movie.ghost.name : ""}`;
     tools.forces.hidden = !movie.contact;
+    tools.cones.hidden = !movie.cones;
     const given = [];
     if (movie.ghost) { movie.error = apart(movie.position, movie.ghost.position, movie.bodies, movie.count); given.push([`distance from ${movie.ghost.name}`, "m", [{ values: movie.error, colour: 1 }]]); }
     if (movie.rows) { movie.largest = largestEach(movie.violation, movie.rows, movie.count); given.push(["largest violation", movie.violationUnit || "m", [{ values: movie.largest, colour: 1 }]]); }

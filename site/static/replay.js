@@ -28,6 +28,7 @@ async function movieOf(data) {
     step: data.step, count: data.count, bodies: data.bodies, solids: data.solids, links: data.links, rows: data.rows,
     gravity: data.gravity, attractors: data.attractors, position: channels.position,
     orientation: channels.orientation || null, violation: channels.violation || null, contact: channels.contact_force || null,
+    cones: channels.cone_point ? { point: channels.cone_point, axis: channels.cone_axis, force: channels.cone_force, friction: channels.cone_friction } : null,
     energy: channels.energy || null, penetration: channels.penetration || null,
     ghost: channels.exact_position
       ? { name: data.exact, position: channels.exact_position, orientation: channels.exact_orientation || null } : null,

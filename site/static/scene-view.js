@@ -5,6 +5,8 @@
 
 const WORLD_BODY = -1;
 const MOST_ARROWS = 400;
+const DOUBLE_SIDE = 2, WIDEST_CONE = 3;  // three.js' name for both sides of a surface; mu from which a cone is drawn no wider
+const SLIDES = 0.999;  // share of the friction bound from which a point is shown as sliding
 
 // --- arithmetic on flat arrays: no object is made while a scene moves ---
 function turnInto(out, q, x, y, z) {
@@ -128,7 +130,7 @@ class SceneView {
     this.controls.addEventListener("change", () => this.draw());
     this.watch = new ResizeObserver(() => this.resize());
     this.watch.observe(host);
-    this.shown = { ghost: true, forces: true };
+    this.shown = { ghost: true, forces: true, cones: true };
     this.sample = 0;
     this.load(movie);
   }
@@ -226,6 +228,7 @@ class SceneView {
       const tip = new THREE.ConeGeometry(1, 1, 12).rotateX(Math.PI / 2);
       this.arrows = { shaft: this.mesh(rod.clone(), MOST_ARROWS), tip: this.mesh(tip, MOST_ARROWS), largest: this.usualForce() };
     } else { this.arrows = null; }
+    this.cones = this.movie.cones ? this.buildCones(rod) : null;
     for (const centre of this.movie.attractors) {
       const star = new THREE.Mesh(new THREE.SphereGeometry(2 * this.dot, 24, 16), new THREE.MeshLambertMaterial());
       star.position.set(...centre);
@@ -233,6 +236,19 @@ class SceneView {
       this.world.add(star);
     }
     this.violationScale = (this.movie.violation || []).reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0);
+  }
+
+  // One cone and one arrow for each contact point: the apex at the point, as wide as friction lets a force lean.
+  buildCones(rod) {
+    const width = this.movie.cones.friction.length / this.movie.count;
+    const cone = new THREE.ConeGeometry(1, 1, 28, 1, true).rotateX(-Math.PI / 2);  // opens along z
+    const mesh = this.mesh(cone, width, { transparent: true, opacity: 0.4, depthWrite: false, side: DOUBLE_SIDE });
+    mesh.setColorAt(0, new THREE.Color(1, 1, 1));
+    mesh.renderOrder = 2;
+    const { force } = this.movie.cones, sizes = [];
+    for (let i = 0; i < force.length; i += 3) { const f = Math.hypot(force[i], force[i + 1], force[i + 2]); if (f > 0) { sizes.push(f); } }
+    const usual = sizes.sort((a, b) => a - b)[Math.floor(sizes.length / 2)] || 0;
+    return { mesh, width, usual, arrows: this.mesh(rod.clone(), width, { depthTest: false }) };
   }
 
   // The scale of the arrows: impacts are far larger than what rests, so the middle of the samples decides.
@@ -288,6 +304,9 @@ class SceneView {
     for (const part of this.solids) { part.mesh.material.color = colour(part.colour); }
     this.world.traverse((part) => { if (part.userData.colour) { part.material.color = colour(part.userData.colour); } });
     if (this.arrows) { this.arrows.shaft.material.color = this.arrows.tip.material.color = colour("--c3"); }
+    if (this.cones) { this.cones.arrows.material.color = colour("--c3"); }
+    this.holding = colour("--c2");
+    this.sliding = colour("--watch-fill");
     this.kept = colour("--pass-fill");
     this.broken = colour("--fail-fill");
     this.elastic = colour("--c4");
@@ -313,6 +332,7 @@ class SceneView {
     if (this.rods) { this.showLinks(this.rods, 0.34 * this.dot); }
     if (this.joints) { this.showLinks(this.joints, 0.55 * this.dot); }
     if (this.arrows) { this.showForces(); }
+    if (this.cones) { this.showCones(); }
     this.draw();
   }
 
@@ -357,6 +377,27 @@ class SceneView {
       used += 1;
     }
     for (const mesh of [shaft, tip]) { mesh.count = used; mesh.instanceMatrix.needsUpdate = true; }
+  }
+
+  showCones() {
+    const { mesh, arrows, width, usual } = this.cones, { point, axis, force, friction } = this.movie.cones;
+    const high = 0.09 * this.size * Math.min(1, Math.sqrt(16 / width)), thin = 0.16 * this.dot, first = width * Math.round(this.sample);
+    let used = 0;
+    for (let i = first; this.shown.cones && i < first + width; i += 1) {
+      const mu = friction[i];
+      if (!(mu > 0)) { continue; }
+      const at = [point[3 * i], point[3 * i + 1], point[3 * i + 2]], n = [axis[3 * i], axis[3 * i + 1], axis[3 * i + 2]];
+      const f = [force[3 * i], force[3 * i + 1], force[3 * i + 2]];
+      const pressed = f[0] * n[0] + f[1] * n[1] + f[2] * n[2], along = Math.hypot(f[0] - pressed * n[0], f[1] - pressed * n[1], f[2] - pressed * n[2]);
+      const wide = high * Math.min(mu, WIDEST_CONE);
+      placeInto(mesh.instanceMatrix.array, 16 * used, at.map((v, k) => v + (n[k] * high) / 2), aim(...n, Math.hypot(...n)), wide, wide, high);
+      mesh.setColorAt(used, pressed > 0 && along >= SLIDES * mu * pressed ? this.sliding : this.holding);
+      const length = Math.hypot(...f), shown = usual > 0 ? Math.min(1.6, length / usual) * high : 0;
+      if (shown > 0) { placeInto(arrows.instanceMatrix.array, 16 * used, at.map((v, k) => v + (f[k] / length) * shown / 2), aim(...f, length), thin, thin, shown); } else { arrows.instanceMatrix.array.fill(0, 16 * used, 16 * used + 16); }
+      used += 1;
+    }
+    for (const part of [mesh, arrows]) { part.count = used; part.instanceMatrix.needsUpdate = true; }
+    if (mesh.instanceColor) { mesh.instanceColor.needsUpdate = true; }
   }
 
   resize() {

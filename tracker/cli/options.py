@@ -98,7 +98,7 @@ def limit_option(command: Command) -> Command:
         "--limit",
         metavar="SECONDS",
         type=click.FloatRange(min=0.0, min_open=True),
-        help="Wall time of one simulation; by default 10 s for another engine.",
+        help="Time of one simulation; by default 10 s for another engine.",
     )(command)
 
 

@@ -7,6 +7,7 @@ are made here and nowhere else, so that whoever judges a history judges them, to
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any, Protocol
 
 import msgspec
@@ -137,10 +138,14 @@ def histories(
     found: dict[str, SeriesHistory] = {}
     for key, stored in records.series(keys, evidence=False).items():
         points = []
-        for run, sample, version in stored.points:
-            if run.id in place:
-                evidence = recent.get(run.id, {}).get(key)
-                points.append(Point(place[run.id], evidence[1] if evidence else sample, version))
+        for point in stored.points:
+            run = place.get(point.run.id)
+            if run is None:
+                continue
+            evidence = recent[run.id].get(key) if run.id in recent else None
+            if evidence is not None or run is not point.run:
+                point = Point(run, evidence[1] if evidence else point.sample, point.test_version)
+            points.append(point)
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
     found = with_missing(found, [run for run in runs if run.id in recent or _says(run)], recent)
@@ -203,8 +208,12 @@ def with_missing(
     forgotten. What is read off the clock is not missed: a machine may be too busy for it.
     """
     place = {run.id: i for i, run in enumerate(runs)}
-    asked = [asked_for(run, measured.get(run.id, {})) for run in runs]
-    whole = [asked_whole(run) for run in runs]
+    ids = [run.id for run in runs]
+
+    @cache
+    def asked(i: int) -> dict[str, set[str]]:
+        return asked_for(runs[i], measured.get(ids[i], {}))
+
     told = {}
     for key, series in found.items():
         definition = series.definition
@@ -214,14 +223,15 @@ def with_missing(
         points = list(series.points)
         answered = {point.run.id for point in points}
         first = place.get(points[0].run.id, -1)
-        for i in range(first + 1, len(runs)):
-            if runs[i].id in answered or runs[i].engine.name != points[0].run.engine.name:
+        silent = [i for i in range(first + 1, len(runs)) if ids[i] not in answered]
+        for i in silent:
+            if runs[i].engine.name != points[0].run.engine.name:
                 continue
             family = FAMILIES[definition.kind]
-            if family not in asked[i]:
+            if family not in asked(i):
                 continue
-            gone = definition.test not in asked[i][family]
-            if gone and not (whole[i] and definition.role == "gate"):
+            gone = definition.test not in asked(i)[family]
+            if gone and not (asked_whole(runs[i]) and definition.role == "gate"):
                 continue
             why = "removed from the catalogue" if gone else "asked for and not answered"
             lost = Sample(

@@ -333,10 +333,9 @@ class _Walk:
         nights = [*self.level_since, *suspects]
         last = nights[-min(SPANS) :]
         near = sum(worse_by(level, self.values[i], self.larger_is_better) for i in last) / len(last)
-        if near < LEAST or near < deviation:
+        if near < LEAST:
             return None  # most nights: nothing to count
-        sign = -1.0 if self.larger_is_better else 1.0
-        found = shift([sign * self.values[i] for i in nights])
+        found = shift([self._cost(self.values[i]) for i in nights], clusters_only=near < deviation)
         if found is None:
             return None
         self.level_since, nights = nights[: -found.span], nights[-found.span :]
@@ -350,6 +349,12 @@ class _Walk:
         return self._red(
             Verdict(word="regressed", sentence=words, name="slower", decades=math.log10(1.0 + found.change))
         )
+
+    def _cost(self, value: float) -> float:
+        """A value of which larger is worse, and a change as many per cent: a rate gives the time of one."""
+        if not self.larger_is_better:
+            return value
+        return 1.0 / value if value else math.inf
 
     def _spread(self) -> tuple[float, float]:
         """Level and noise of the nights that are usual."""

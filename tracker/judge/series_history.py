@@ -132,13 +132,12 @@ def judge_history(
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
+    names = list(map(lane, history))
+    if len(set(names)) == 1:  # mostly
+        return [list(range(len(names)))]
     lanes: dict[Hashable, list[int]] = {}
-    before: Hashable = None
-    here: list[int] = []
-    for place, night in enumerate(history):
-        if (name := lane(night)) != before:  # nights of one lane mostly stand together
-            here, before = lanes.setdefault(name, []), name
-        here.append(place)
+    for place, name in enumerate(names):
+        lanes.setdefault(name, []).append(place)
     return list(lanes.values())
 
 
@@ -285,9 +284,9 @@ def red_class(own: Class, sample: Sample) -> Class:
 
 
 def _repeats(before: Point, after: Point) -> bool:
-    """The same bits of the same state under the same definition: nothing to judge."""
+    """The same bits of the same state under the same definition: nothing to judge. Both are of one lane."""
     old, new = before.sample, after.sample
-    return (
+    return (old is new and old.value == new.value) or (
         old.value == new.value
         and same_bits(before.value, after.value)
         and old.outcome == new.outcome

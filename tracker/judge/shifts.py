@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
@@ -31,6 +31,10 @@ CLIP = 6.0  # noises: what lies further out counts as if it lay there
 GRID = 300  # steps between the smallest and the largest value
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CHANCE = 2.6  # standard deviations of an autocorrelation that is none
+APART = (
+    5.0  # standard deviations inside two clusters between their middles; noise of one hump cut in two shows 3
+)
+FEWEST_CLUSTER, SMALLEST_CLUSTER = 6, 0.1  # nights, and share of all, in the smaller cluster
 MEMORY = (1, 5)  # lags, nights, at which nights that remember each other are noticed
 
 
@@ -43,10 +47,11 @@ class Shift:
     probability: float
 
 
-def shift(values: Sequence[float]) -> Shift | None:
+def shift(values: Sequence[float], clusters_only: bool = False) -> Shift | None:
     """The most probable shift for the worse of the last nights, None if there is none. Worse is larger.
 
-    Values are positive, of one level until the shift, oldest first.
+    Values are positive, of one level until the shift, oldest first. `clusters_only`: the last nights lie inside the
+    spread of all, so that only the smaller noise inside clusters can tell.
     """
     import numpy as np
 
@@ -55,10 +60,44 @@ def shift(values: Sequence[float]) -> Shift | None:
         base, last = values[-BASE - span : -span], values[-span:]
         if len(base) < FEWEST_BASE or min(last) <= min(base):
             continue
-        tried = _tried(np.array(base), np.array(last))
-        if tried is not None and (found is None or tried.probability < found.probability):
-            found = tried
+        old, new = np.array(base), np.array(last)
+        every = None if clusters_only else _tried(old, new)
+        for tried in (every, _apart_from_clusters(old, new)):
+            if tried is not None and (found is None or tried.probability < found.probability):
+                found = tried
     return found
+
+
+def _apart_from_clusters(base: Values, last: Values) -> Shift | None:
+    """The same where the nights before lie in two clusters: of how far each night lies off the nearer of them.
+
+    Which cluster a night falls into is chance and says nothing; a change moves both, and what is left is small noise.
+    """
+    import numpy as np
+
+    split = clusters(base)
+    if split is None:
+        return None
+    low, high = split
+    near = [nights / np.where(nights - low < high - nights, low, high) for nights in (base, last)]
+    tried = _tried(near[0], near[1])
+    change = float(np.mean(last) / np.mean(base)) - 1.0
+    return replace(tried, change=change) if tried is not None and change > LEAST else None
+
+
+def clusters(base: Values) -> tuple[float, float] | None:
+    """The middles of two clusters of nights, parted by their widest gap; None if they are not clearly two."""
+    import numpy as np
+
+    ordered = np.sort(base)
+    fewest = max(FEWEST_CLUSTER, math.ceil(SMALLEST_CLUSTER * len(ordered)))
+    if len(ordered) < 2 * fewest:
+        return None
+    split = fewest + int(np.argmax(np.diff(ordered[fewest - 1 : len(ordered) - fewest + 1])))
+    low, high = ordered[:split], ordered[split:]
+    inside = math.sqrt((float(np.var(low)) * len(low) + float(np.var(high)) * len(high)) / len(ordered))
+    middles = float(np.median(low)), float(np.median(high))
+    return middles if middles[1] - middles[0] > APART * inside else None
 
 
 def _tried(base: Values, last: Values) -> Shift | None:

@@ -23,7 +23,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 from spook_tracker.tracker.measure.question import Witness, ask, series_key
-from spook_tracker.tracker.measure.timing import Timed, interleaved, once, stage_seconds
+from spook_tracker.tracker.measure.timing import Repeats, Timed, interleaved, once, stage_seconds
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
 ORDER_BAND = 0.1
@@ -84,7 +84,7 @@ def timed_series(
     tests: Mapping[str, ScalarTest],
     errors: Mapping[tuple[str, int, int], ErrorPoints],
     simulate: Simulate,
-    repeats: int,
+    repeats: int | Repeats,
 ) -> list[Pair]:
     """Every ladder's series with timings, and the scalars read off them; run alone on the machine."""
     pairs: list[Pair] = []
@@ -98,7 +98,7 @@ def timed_series(
 
 
 def _timings(
-    ladder: Ladder, measured: list[ErrorPoints], simulate: Simulate, repeats: int
+    ladder: Ladder, measured: list[ErrorPoints], simulate: Simulate, repeats: int | Repeats
 ) -> list[list[Timing | None]]:
     """Timings by configuration and rung; rungs without a value are not timed."""
     places = [

@@ -19,13 +19,21 @@ from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric, ScalarT
 
 
 def asked_of(
-    tests: Mapping[str, ScalarTest], configurations: Sequence[Configuration], gating: bool
+    tests: Mapping[str, ScalarTest],
+    configurations: Sequence[Configuration],
+    gating: bool,
+    every_setting: bool = True,
 ) -> dict[str, ScalarTest]:
-    """The catalogue as another engine is asked it: no figures and no stability studies, they are SPOOK's."""
+    """The catalogue as another engine is asked it: no figures and no stability studies, they are SPOOK's.
+
+    Single values are asked in each configuration, or in the first alone; ladders in each.
+    """
     return {
         name: replace(
             test,
-            measurements=tuple(_measurements(test, configurations, gating)),
+            measurements=tuple(
+                _measurements(test, configurations if every_setting else configurations[:1], gating)
+            ),
             ladders=tuple(_ladder(ladder, one) for ladder in test.ladders for one in configurations),
             figures=(),
             stability=(),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import spook_tracker.tracker.measure.catalogues as catalogues
@@ -13,8 +14,9 @@ import spook_tracker.tracker.measure.others as others
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.measure.question import NoAnswer
 
-PEER_TIME_LIMIT = 10.0  # s of wall time per simulation of an engine that is only shown
+PEER_TIME_LIMIT = 10.0  # s per simulation of an engine that is only shown
 
 
 class RunError(TrackerError):
@@ -27,16 +29,27 @@ class Questions:
 
     catalogue: str = catalogues.STANDARD  # as `catalogues.find` knows it
     engine: str = "spook"  # as `engine.find` knows it
-    limit: float | None = None  # s of wall time for one simulation; None leaves it to the test
+    limit: float | None = None  # s for one simulation; None leaves it to the test
+    patience: float | None = None  # s after which a piece of work begins no further simulation
+    every_setting: bool = True  # whether single values are asked in each setting of another engine
     limits: limits.Limits = ()  # a team's own, by series
 
     def tests(self) -> Mapping[str, ScalarTest]:
+        """What is asked, by name; found once."""
+        return self._tests
+
+    @cached_property
+    def _tests(self) -> Mapping[str, ScalarTest]:
         found = catalogues.find(self.catalogue)
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
         if configurations:
-            found = others.asked_of(found, configurations, engine.gating)
+            found = others.asked_of(found, configurations, engine.gating, self.every_setting)
         return limits.held_to(found, self.limits) if self.limits else found
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what was found: another process finds it itself."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def module(self) -> Any:
         """The engine: simulate, build_info, and its configurations if it is not ours."""
@@ -54,10 +67,24 @@ class Questions:
         limit = self.limit
         if limit is None and hasattr(module, "configurations"):
             limit = PEER_TIME_LIMIT
-        return simulate if limit is None else partial(_limited, simulate, limit)
+        if limit is None and self.patience is None:
+            return simulate
+        return _Limited(simulate, limit, self.patience)
 
 
-def _limited(simulate: Simulate, limit: float, scene: Any, **options: Any) -> Any:
-    """Simulate for at most `limit` seconds of wall time."""
-    options["time_limit"] = min(limit, options.get("time_limit") or limit)
-    return simulate(scene, **options)
+class _Limited:
+    """Simulates for so many seconds at a time, and begins nothing once so many are over in all."""
+
+    def __init__(self, simulate: Simulate, limit: float | None, patience: float | None) -> None:
+        self.simulate, self.limit, self.patience, self.spent = simulate, limit, patience, 0.0
+
+    def __call__(self, scene: Any, **options: Any) -> Any:
+        if self.patience is not None and self.spent >= self.patience:
+            raise NoAnswer("timed_out", f"not tried: the {self.patience:g} s for this question are over")
+        if self.limit is not None:
+            options["time_limit"] = min(self.limit, options.get("time_limit") or self.limit)
+        began = time.process_time()
+        result = self.simulate(scene, **options)
+        # Whichever is known: an engine in a process of its own takes none of this one's time.
+        self.spent += max(time.process_time() - began, result.seconds)
+        return result

@@ -51,6 +51,7 @@ from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME
 from spook_tracker.tracker.measure.questions import Questions as Questions
 from spook_tracker.tracker.measure.questions import RunError as RunError
 from spook_tracker.tracker.measure.renames import with_aliases
+from spook_tracker.tracker.measure.timing import Repeats
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
@@ -68,7 +69,7 @@ class Request:
     workers: int = 2  # processes, each watched; 0: in this one, where nothing can be ended
     time_limit: float = crew.Limits.seconds  # s for one piece of work
     memory_limit: int = crew.Limits.memory  # bytes for one piece of work
-    repeats: int = 5  # of each timing
+    repeats: int | Repeats = 5  # of each timing
     executor: str = executors.PROCESS  # where values are measured, as `executors.answers` knows it
 
 
@@ -283,10 +284,11 @@ Errors = Mapping[tuple[str, int, int], ladders.ErrorPoints]
 Timed = tuple[list[tuple[SeriesDefinition, Sample]], Mapping[str, Mapping[str, float]]]
 
 
-def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int]) -> Timed:
+def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int | Repeats]) -> Timed:
     """Run times of every ladder, and what leaving stages out saves, in this process."""
     names, errors, repeats = piece
-    tests, simulate = select(source.tests(), names), source.simulate()
+    tests = select(source.tests(), names)
+    simulate = replace(source, patience=None).simulate()  # what gave a value is worth its time
     timed = ladders.timed_series(tests, errors, simulate, repeats)
     stages_can_be_forced = not hasattr(source.module(), "configurations")  # ours only
     return timed, ladders.saved_by_leaving_out(tests, simulate) if stages_can_be_forced else {}

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Simulate
@@ -29,6 +29,16 @@ FEWEST_REPEATS = 2
 STAGES_UP_TO = 0.2  # s: longer runs are not run again only to see their stages
 
 Timed = Callable[[Simulate], Any]
+
+
+class Repeats(NamedTuple):
+    """How often a run is timed: so often where all that takes no more than `seconds`, and so often at least."""
+
+    most: int = 5
+    seconds: float = POINT_BUDGET
+    fewest: int = FEWEST_REPEATS
+    stages_up_to: float = STAGES_UP_TO  # s
+    runs: int = MOST_RUNS  # in one repeat, where each costs a model that is built anew
 
 
 @dataclass
@@ -96,12 +106,13 @@ def _both(
     return watch.seconds, watch.cpu
 
 
-def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list[Timing | None]:
+def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int | Repeats) -> list[Timing | None]:
     """A timing of each run, None for those that fail; instructions and stages where they can be had.
 
     The first run of each warms the caches and tells how often it can be repeated; one that takes longer than all
     its repeats should has no cold caches to speak of, and counts as the first of them.
     """
+    often = Repeats(repeats) if isinstance(repeats, int) else repeats
     lanes: list[_Lane | None] = []
     for run in runs:
         kernel = calibrate()
@@ -110,16 +121,16 @@ def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list
             lanes.append(None)
             continue
         grain = max(first[0], 1e-9)
-        affordable = int(POINT_BUDGET / max(grain, RESOLVED))
+        affordable = int(often.seconds / max(grain, RESOLVED))
         fresh = _Lane(
             run=run,
-            runs=min(MOST_RUNS, max(1, math.ceil(RESOLVED / grain))),
-            repeats=max(FEWEST_REPEATS, min(repeats, affordable)),
+            runs=min(often.runs, max(1, math.ceil(RESOLVED / grain))),
+            repeats=max(often.fewest, min(often.most, affordable)),
         )
         lanes.append(fresh)
-        if grain > POINT_BUDGET:
+        if grain > often.seconds:
             fresh.keep(kernel, [first])
-    for _ in range(repeats):
+    for _ in range(often.most):
         for lane in lanes:
             if lane is not None and len(lane.kernel) < lane.repeats:
                 kernel = calibrate()
@@ -127,8 +138,10 @@ def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int) -> list
     clock = True  # until a run comes without one: an engine has it for all its stages or for none
     timings: list[Timing | None] = []
     for lane in lanes:
-        timings.append(_timing(lane, simulate, clock) if lane and lane.seconds else None)
-        clock = clock and (timings[-1] is None or not _short(lane) or bool(timings[-1].stage_seconds))
+        timings.append(_timing(lane, simulate, clock, often.stages_up_to) if lane and lane.seconds else None)
+        clock = clock and (
+            timings[-1] is None or not _short(lane, often.stages_up_to) or bool(timings[-1].stage_seconds)
+        )
     return timings
 
 
@@ -138,12 +151,12 @@ def _undisturbed(seconds: Sequence[float]) -> float:
     return sum(faster) / len(faster)
 
 
-def _short(lane: _Lane | None) -> bool:
-    return lane is not None and bool(lane.seconds) and min(lane.seconds) <= STAGES_UP_TO
+def _short(lane: _Lane | None, bound: float) -> bool:
+    return lane is not None and bool(lane.seconds) and min(lane.seconds) <= bound
 
 
-def _timing(lane: _Lane, simulate: Simulate, clock: bool) -> Timing:
-    short = _short(lane)
+def _timing(lane: _Lane, simulate: Simulate, clock: bool, bound: float) -> Timing:
+    short = _short(lane, bound)
     return Timing(
         seconds=tuple(lane.seconds),
         runs_per_repeat=lane.runs,

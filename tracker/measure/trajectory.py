@@ -21,6 +21,7 @@ from spook_tracker.engine.forces import CentralGravity, Spring
 from spook_tracker.engine.joints import Distance, Joint
 from spook_tracker.engine.observe import (
     ContactForce,
+    ContactPoints,
     Energy,
     Observable,
     Orientation,
@@ -30,6 +31,7 @@ from spook_tracker.engine.observe import (
     Trace,
     Violation,
 )
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.scalar_tests.case import Example, ScalarTest, Simulate
@@ -42,6 +44,7 @@ SAMPLES = 241  # of a trajectory at most; between them the page interpolates
 MOST_STEPS = 60_000
 MOST_BYTES = 120_000  # of one trajectory, compressed; halving the samples gets it there
 MOST_ROWS, MOST_CONTACTS = 120, 120  # constraints and bodies whose violations and forces are traced
+MOST_POINTS = 60  # contact points whose friction cones are drawn
 TIME_LIMIT = 20.0  # s of wall time; what is there until then is shown
 FINER = 16
 CODES = 65_534  # 65535 is no value
@@ -58,7 +61,10 @@ def _recorded(name: str, example: Example, simulate: Simulate) -> Trajectory | N
     bodies = scene.bodies[:MOST_SOLIDS]
     steps = min(MOST_STEPS, max(1, round(example.duration / example.time_step)))
     every = max(1, math.ceil(steps / (SAMPLES - 1)))
-    result = _run(simulate, example, scene, steps - steps % every, every, 1)
+    try:
+        result = _run(simulate, example, scene, steps - steps % every, every, 1, cones=True)
+    except NotSupported:  # by an engine that keeps its contact points to itself
+        result = _run(simulate, example, scene, steps - steps % every, every, 1)
     positions = np.asarray(result.partial["position"])
     if len(positions) < 2:
         return None
@@ -91,7 +97,15 @@ def _recorded(name: str, example: Example, simulate: Simulate) -> Trajectory | N
     )
 
 
-def _run(simulate: Simulate, example: Example, scene: Scene, steps: int, every: int, finer: int) -> Result:
+def _run(
+    simulate: Simulate,
+    example: Example,
+    scene: Scene,
+    steps: int,
+    every: int,
+    finer: int,
+    cones: bool = False,
+) -> Result:
     """The scene with everything a replay shows traced, at a time step `finer` times smaller."""
     quantities: dict[str, Quantity] = {"position": Position()}
     if any(isinstance(body, RigidBody) for body in scene.bodies):
@@ -107,6 +121,8 @@ def _run(simulate: Simulate, example: Example, scene: Scene, steps: int, every: 
             if touching:
                 quantities["penetration"] = Penetration()
             moving = [b.name for b in touching if b.motion == "dynamic"]
+            if cones and any(body.material.friction for body in touching):
+                quantities["contacts"] = ContactPoints(MOST_POINTS)
             for body in moving[:MOST_CONTACTS]:
                 quantities[f"force {body}"] = ContactForce(body)
     observe: dict[str, Observable] = {
@@ -174,7 +190,32 @@ def _channels(seen: Mapping[str, Any], scene: Scene, bodies: int) -> list[Channe
             if body.name in forces:
                 table[:, i] = forces[body.name]
         found.append(channel("contact_force", "N", table.reshape(count, -1)))
+    if "contacts" in seen:
+        found += _cones(np.asarray(seen["contacts"], dtype=np.float64), np.asarray(scene.gravity))
     return found
+
+
+def _cones(points: Array, gravity: Array) -> list[Channel]:
+    """Places, axes, forces and coefficients of the points with friction, if there is any: what the upper body feels.
+
+    `points` has the shape (samples, points, 10), as the engine observes them.
+    """
+    points = np.where((points[..., 9:] > 0.0), points, np.nan)
+    downward = (points[..., 3:6] @ gravity > 0.0)[..., None]
+    points[..., 3:9] = np.where(downward, -points[..., 3:9], points[..., 3:9])
+    used = np.flatnonzero(np.isfinite(points[..., 9]).any(axis=0))
+    if not used.size:
+        return []
+    parts = (
+        ("cone_point", "m", 0, 3),
+        ("cone_axis", "1", 3, 6),
+        ("cone_force", "N", 6, 9),
+        ("cone_friction", "1", 9, 10),
+    )
+    return [
+        channel(name, unit, points[:, : used[-1] + 1, first:end].reshape(len(points), -1))
+        for name, unit, first, end in parts
+    ]
 
 
 def channel(name: str, unit: str, values: Array) -> Channel:

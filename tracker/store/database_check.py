@@ -85,6 +85,8 @@ def _documents(session: Session) -> Iterator[str]:
     history = History(session)
     for run in history.runs():
         try:
-            checked(history.document(run.id))
+            document = checked(history.document(run.id))
+            if run.content not in ("", rows.content_of(document)):
+                yield f"what was measured in the run {run.id!r} was changed after it was stored"
         except (TrackerError, ValueError, OSError) as error:
             yield f"the run {run.id!r} cannot be read: {error!s:.200}"

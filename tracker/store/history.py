@@ -47,6 +47,7 @@ RUN = (
     "key",
     "gates",
     "gates_passed",
+    "content",
 )
 SAMPLE = "s.run_key, s.series_id, s.definition_id, s.value, s.special, s.outcome, s.passed, s.set_point_held"
 EVIDENCE = """, e.failure, e.state_hash, e.counters, t.seconds, t.runs_per_repeat, t.instructions, t.stage_seconds,
@@ -96,6 +97,10 @@ class History:
             raise UnknownName(f"there is no run {run_id!r}; list them with: tracker db stats")
         return self._by_id[run_id]
 
+    def content(self, run_id: str) -> str:
+        """A hash of all that was measured in a run; empty where it is not known."""
+        return self.run(run_id).content
+
     def resolve(self, name: str) -> RunInfo:
         """The run `name` stands for: see tracker/store/versions.py. UnknownName if none or several."""
         return resolve(self._runs, name, lambda tag: git.commit(self.repository, tag))
@@ -140,19 +145,22 @@ class History:
             return self._gathered(where, evidence)
 
     def _gathered(self, where: str, evidence: bool) -> dict[str, SeriesHistory]:
-        gathered: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {}
+        gathered: dict[str, dict[int, tuple[SeriesDefinition, Sample]]] = {}
+        place = {run.key: i for i, run in enumerate(self._runs)}
         for run, series_id, definition, sample in self._read_samples(where, {}, evidence):
             key = self._canonical.get(series_id, definition.key)
             points = gathered.setdefault(key, {})
-            if run.id not in points or definition.key == key:
-                points[run.id] = definition, sample
+            here = place[run.key]
+            if here not in points or definition.key == key:
+                points[here] = definition, sample
         result = {}
         for key in sorted(gathered):
             points = gathered[key]
-            ordered = [(run, *points[run.id]) for run in self._runs if run.id in points]
-            result[key] = SeriesHistory(
-                ordered[-1][1], tuple(Point(run, sample, d.test_version) for run, d, sample in ordered)
-            )
+            ordered = sorted(points)
+            told = [
+                Point(self._runs[i], sample, d.test_version) for i in ordered for d, sample in (points[i],)
+            ]
+            result[key] = SeriesHistory(points[ordered[-1]][0], tuple(told))
         return result
 
     def figures(self, run_id: str) -> tuple[document.FigureData, ...]:
@@ -307,11 +315,15 @@ class History:
         stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
         definitions = self._read_definitions(row[2] for row in stored)
         runs = {run.key: run for run in self._runs}
+        made: dict[Any, Sample] = {}  # what says the same night after night is one object
         found = []
         for row in stored:
             if row[0] not in runs:  # recorded by another process since
                 continue
             definition = definitions[row[2]]
+            if not evidence and (read := made.get(row[2:8])) is not None:
+                found.append((runs[row[0]], row[1], definition, read))
+                continue
             more: dict[str, Any] = {}
             if evidence and row[8] is not None:
                 more = {"failure": row[8], "state_hash": row[9], "counters": rows.counters_of(row[10])}
@@ -325,6 +337,8 @@ class History:
                 set_point_held=bool(row[7]),
                 **more,
             )
+            if not evidence:
+                made[row[2:8]] = read
             found.append((runs[row[0]], row[1], definition, read))
         return found
 

@@ -233,6 +233,9 @@ class Run(Base):
     gates_passed: Mapped[int] = mapped_column(
         BigInteger, comment="gate samples inside their limit that night"
     )
+    content: Mapped[str] = _text(
+        "hash of all samples and their definitions; empty for runs recorded before there was one"
+    )
 
 
 class Sample(Base):

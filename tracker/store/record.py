@@ -106,6 +106,7 @@ def _store(session: Session, run: RunDocument, there: Present) -> bool:
             "series_list_id": list_id,
             "gates": len(gate_samples),
             "gates_passed": sum(sample.passed for sample in gate_samples),
+            "content": rows.content_of(run),
         },
     )
     place = {"started_at": started_at, "run_key": run_key}
@@ -177,6 +178,8 @@ def add_again(session: Session, run: RunDocument) -> None:
             session.execute(
                 update(table).filter_by(**here, again="").values(again=rows.json_of(sample.timing.again))
             )
+    content = update(models.Run).where(models.Run.id == run.id).values(content=rows.content_of(run))
+    session.execute(content)
     session.commit()
 
 

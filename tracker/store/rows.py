@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import zlib
 from collections.abc import Mapping
@@ -139,6 +140,12 @@ def definition_of(body: str) -> document.SeriesDefinition:
     return decode(body, document.SeriesDefinition)
 
 
+def content_of(run: document.RunDocument) -> str:
+    """A hash of all values of a run, with what stands behind them and their definitions."""
+    definitions = [definition_row(definition)["id"] for definition in run.series]
+    return hashlib.sha256(encode((definitions, run.samples))).hexdigest()[:16]
+
+
 def asked_text(asked: document.Asked | None) -> str:
     return "" if asked is None else json_of(asked)
 
@@ -202,5 +209,6 @@ def timing_of(
     )
 
 
+@lru_cache(maxsize=20_000)
 def counters_of(text: str) -> dict[str, int]:
     return _COUNTERS.decode(text)

@@ -42,6 +42,7 @@ class RunInfo:
     gates: int  # gate samples in this run
     gates_passed: int
     asked: document.Asked | None = None  # None: not known
+    content: str = ""  # hash of what was measured; empty: not known
 
     @property
     def green(self) -> bool:

@@ -96,7 +96,8 @@ def comparisons(
 
     verdicts = judged_in(told, [night.id for night in nights])
     words = json.dumps([titles, descriptions])
-    facts = {run: digest(words.encode(), *_facts(found)) for run, found in verdicts.items()}
+    content = {night.id: night.content.encode() for night in nights}
+    facts = {run: digest(words.encode(), content[run], *_facts(found)) for run, found in verdicts.items()}
     pairs: dict[str, Any] = {}
     made_from: dict[str, str] = {}
     for before in nights:

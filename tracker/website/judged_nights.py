@@ -143,8 +143,10 @@ def file_stem(chapter: Chapter, book: Book) -> str:
 
 
 def _values(chapter: Chapter) -> list[array[float]]:
-    """Every value of each night: a run may be taken out, and come back under its name with others."""
+    """Every value of each night of which nothing else is known to say what was measured."""
     found = [array("d") for _ in chapter.nights]
+    if all(night.content for night in chapter.nights):
+        return found
     for test in chapter.tests:
         for trend in test.trends:
             for place, value in zip(trend.nights, trend.values, strict=True):
@@ -162,12 +164,14 @@ def files(history: Records, book: Book) -> Iterator[tuple[str, bytes, Callable[[
             nights = chapter.nights[number : number + BLOCK]
             facts = [
                 (
-                    night.id,
+                    night.id,  # a run may be taken out, and come back under its name with other values
                     night.started,
                     night.trigger,
-                    repr(night.asked),
+                    night.asked,
+                    night.engine,
+                    night.machine,
                     marks.get(night.id),
-                    values[night.index].tobytes(),
+                    night.content or values[night.index].tobytes(),
                 )
                 for night in nights
             ]

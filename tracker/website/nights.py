@@ -49,6 +49,7 @@ class Night:
     engine: EngineVersion
     machine: Machine
     asked: Any = None  # tracker.document.run_document.Asked; None: not known
+    content: str = ""  # hash of what was measured; empty: not known
 
     @cached_property
     def label(self) -> str:
@@ -178,6 +179,7 @@ class Records(Protocol):
     def samples_of(
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
     ) -> Mapping[str, Mapping[str, tuple[SeriesDefinition, Sample]]]: ...
+    def content(self, run_id: str) -> str: ...
     def cards(self, run_id: str) -> Sequence[TestCard]: ...
     def figures(self, run_id: str) -> Sequence[FigureData]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
@@ -201,7 +203,7 @@ def _chapter(
     nights = [
         Night(
             index, run.id, run.started, run.finished, run.trigger, run.ci_address, run.tracker_version,
-            run.engine, run.machine, getattr(run, "asked", None),
+            run.engine, run.machine, getattr(run, "asked", None), history.content(run.id),
         )
         for index, run in enumerate(runs)
     ]  # fmt: skip

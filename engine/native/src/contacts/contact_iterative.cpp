@@ -105,7 +105,10 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     counters_.unsettled += !report.converged;
 
     std::vector<double> share;
-    if (unsettled_body_ >= 0) shorten_unsettled(system, system.rows.size(), share);
+    if (!report.converged) {
+        if (unsettled_body_ < 0) blame_sunk();
+        shorten_unsettled(system, system.rows.size(), share);
+    }
     mark_held(system);  // by joints; of contacts those that push
     touches_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {

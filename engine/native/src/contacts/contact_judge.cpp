@@ -21,6 +21,9 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
 
 namespace {
 
+constexpr double sunk = 0.02;     // of the smaller body's radius: an overlap that a solve has left
+constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
+
 /// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds. At most
 /// |w|, so no more is asked where that is `enough`.
 double bounded_residual(const MixedSystem& system, const RowBlock& block, int i, double enough) {
@@ -88,6 +91,23 @@ void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPo
     if (report.converged && options_.solver == SolverKind::direct) return;
     const RowBlock& block = system.rows[worst.row];
     blame(worst.residual, std::max(block.first, block.second));
+    if (unsettled_body_ < 0 && !report.converged) blame_sunk();
+}
+
+/// Sweeps that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
+/// load is not carried. What parting could not lift again shows it.
+void ContactStage::blame_sunk() {
+    double worst = sunk;
+    for (const Point& point : points_) {
+        if (point.strike >= 0.0 || point.before < 0.0) continue;
+        const auto given = given_.find(point.contact.key >> feature_bits);
+        const double known = explained_depth(point) + (given == given_.end() ? 0.0 : given->second);
+        const double share = (-point.contact.point.gap - known) / moving_size(point.contact);
+        if (!(share > worst)) continue;
+        worst = share;
+        unsettled_by_ = residual_;
+        unsettled_body_ = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+    }
 }
 
 /// Takes down who is off by more than the method allows.

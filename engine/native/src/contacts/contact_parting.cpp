@@ -4,16 +4,17 @@
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
 #include "linear/regularisation.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
 constexpr double joint_give = 1e-6;  // of a row's own inertia: what a joint yields while overlaps are parted
-constexpr double contact_give = 1e-3;  // and what a contact of jointed bodies does
-constexpr double closed = 1e-9;        // of the larger body's radius: a depth that is rounding
-constexpr double around = 4.0;         // of the deepest overlap: gaps that parting may close
-constexpr int feature_bits = 16;       // of a contact's key; the rest is the pair
+constexpr double contact_give = 1e-3;   // and what a contact of jointed bodies does
+constexpr double around = 4.0;          // of the deepest overlap: gaps that parting may close
+constexpr int feature_bits = 16;        // of a contact's key; the rest is the pair
+constexpr unsigned pairs_a_look = 256;  // between two looks at the clock
 
 }  // namespace
 
@@ -94,10 +95,11 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
         return norm(poses[b].position - poses_[b].position) + (turned > 0.0 ? 3.0 * turned * radius[b] : 0.0);
     };
     double deepest = 0.0;
+    unsigned seen = 0;
     for (std::size_t from = 0, end = 0; from < touches_.size(); from = end) {
         const std::uint64_t key = touches_[from].contact.key >> feature_bits;
         const int a = touches_[from].contact.first, b = touches_[from].contact.second;
-        const double rounding = closed * size(touches_[from].contact);
+        const double rounding = slack(touches_[from].contact);
         double most_pressed = 0.0;
         bool overlapped = false;
         for (; end < touches_.size() && touches_[end].contact.key >> feature_bits == key; ++end) {
@@ -105,6 +107,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             overlapped = overlapped || touches_[end].contact.point.gap < -rounding;
         }
         if (margin == 0.0 && !overlapped && moved(a) + moved(b) < 0.1 * rounding) continue;
+        if (++seen % pairs_a_look == 0) Watch::look();
         scratch_.clear();
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
         detection_.touch(pair, poses[a], poses[b], margin, scratch_);
@@ -240,6 +243,17 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie
         if (impulse != 0.0) ties.push_back({unknown_[contact.first], unknown_[contact.second]});
     }
     return true;
+}
+
+void ContactStage::pay(int island, Vec3 momentum) noexcept {
+    for (Touch& touch : touches_) {
+        const int first = unknown_[touch.contact.first], second = unknown_[touch.contact.second];
+        if (std::min(first, second) >= 0 || parting_.islands.of_body[std::max(first, second)] != island)
+            continue;
+        if (!(touch.normal > 0.0 || touch.impact > 0.0)) continue;
+        touch.impulse += first >= 0 ? -momentum : momentum;
+        return;
+    }
 }
 
 }  // namespace spook

@@ -2,17 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contacts/contact_geometry.hpp"
 #include "linear/regularisation.hpp"
+#include "run/quantities.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;     // of the larger body's radius: a depth that is rounding
-constexpr double rounding = 1e-15;  // of a place and of a size: four roundings
-constexpr int late_rounds = 3;      // of solves that set others in motion towards a third
+constexpr double slack_share = 1e-10;  // of the smaller body's radius
+constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
+constexpr int late_rounds = 3;         // of solves that set others in motion towards a third
 
 }  // namespace
 
@@ -149,7 +151,20 @@ double ContactStage::time_left(const Point& point) const noexcept {
 }
 
 double ContactStage::explained_depth(const Point& point) const noexcept {
-    return point.pressed_before + closed * size(point.contact);
+    return point.pressed_before + slack(point.contact);
+}
+
+/// The radius of the smaller of two bodies, of those that move by themselves, m.
+double ContactStage::moving_size(const Contact& contact) const noexcept {
+    const std::vector<double>& radius = detection_.radius();
+    const int a = contact.first, b = contact.second;
+    if (unknown_[a] < 0) return radius[b];
+    return unknown_[b] < 0 ? radius[a] : std::min(radius[a], radius[b]);
+}
+
+/// A depth that is rounding: it may come back as a speed, which gives a billionth of a body's height at most.
+double ContactStage::slack(const Contact& contact) const noexcept {
+    return slack_share * moving_size(contact);
 }
 
 /// A gap no larger than the rounding of the places it was found at is none. Answered with a speed it would come back
@@ -249,7 +264,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         order_points();
     }
     judge(system, friction, report);
-    if (unsettled_body_ >= 0) {
+    if (!report.converged) {
         std::vector<double> share;
         shorten_unsettled(system, joints, share);
         for (std::size_t k = joints; k < system.rows.size(); ++k)
@@ -301,6 +316,7 @@ ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point
     touch.impulse = normal * n + along + point.impact_impulse;
     touch.tangent[0] = dot(along, point.tangent);
     touch.tangent[1] = dot(along, cross(n, point.tangent));
+    touch.friction = point.material.friction;
     touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
     return touch;
 }
@@ -368,6 +384,20 @@ double ContactStage::penetration() const noexcept {
     double depth = 0.0;
     for (const Touch& touch : touches_) depth = std::max(depth, -touch.contact.point.gap);
     return depth;
+}
+
+void ContactStage::points(int most, double* out) const noexcept {
+    double* const end = out + CONTACT_NUMBERS * most;
+    for (const Touch& touch : touches_) {
+        if (out == end) break;
+        if (!touch.active) continue;
+        put(out, touch.contact.point.position);
+        put(out + 3, touch.contact.point.normal);
+        put(out + 6, (1.0 / options_.time_step) * touch.impulse);
+        out[9] = touch.friction;
+        out += CONTACT_NUMBERS;
+    }
+    std::fill(out, end, std::numeric_limits<double>::quiet_NaN());
 }
 
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {

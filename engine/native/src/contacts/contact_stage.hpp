@@ -44,7 +44,7 @@
 // v₊ = v + k + M⁻¹ Gᵀ z and q₊ = q + h v₊ follows E₊ − E = z·G v₊ − ½ |v₊ − v|²_M. Of rigid contacts z·G v₊ = z·r
 // with r <= 0 but for rounding, friction takes (beta·D v₊ <= 0), and parting pays for what it lifts. So r has no
 // Ups C v for a rigid contact that opens: it would push a body after its own speed, up to ½ Ups² |k|²_M a step.
-// A solve that has not settled proves nothing: its impulses z are shortened, island by island, to the largest s z for
+// A solve that stopped early proves nothing: its impulses z are shortened, island by island, to the largest s z for
 // which E₊ <= E. It exists: s = 0 is free fall, E₊ − E = −½ |k|²_M, and E₊ is convex in s.
 #pragma once
 
@@ -142,6 +142,10 @@ public:
     /// `again` when the bodies are displaced: what is linear in the displacement is not all.
     bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
 
+    /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse of
+    /// what does not move by itself: forces keep adding up to the momentum.
+    void pay(int island, Vec3 momentum) noexcept;
+
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
     bool held(int unknown) const noexcept { return held_[unknown] != 0; }
 
@@ -155,6 +159,7 @@ public:
         double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
         double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
         double pressed = 0.0;            // how far its bodies have pressed it in by the step's end, m
+        double friction = 0.0;           // mu of the pair
         bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
@@ -190,6 +195,9 @@ public:
     int count() const noexcept;
     /// Largest depth [m] among this step's points, at its start.
     double penetration() const noexcept;
+    /// Points that push or are closed, ten numbers each: place [m], normal onto the first body, force [N] on it,
+    /// coefficient of friction. The first `most` of them in order of bodies; NaN where there are fewer.
+    void points(int most, double* out) const noexcept;
 
     ContactCounters counters() const noexcept { return counters_; }
     BlockLdlt::Counters factor_counters() const noexcept;
@@ -267,6 +275,7 @@ private:
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
     void blame(double residual, int unknown);
+    void blame_sunk();
     void shorten_unsettled(MixedSystem& system, std::size_t joints, std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
     // contact_parting.cpp
@@ -281,6 +290,8 @@ private:
     bool is_supplied(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
+    double moving_size(const Contact& contact) const noexcept;
+    double slack(const Contact& contact) const noexcept;
     double size(const Contact& contact) const noexcept;
     double gap(const Contact& contact) const noexcept;
     bool is_closed(const Contact& contact) const noexcept;

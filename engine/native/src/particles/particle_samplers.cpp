@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "particles/particle_program.hpp"
@@ -21,6 +23,10 @@ Sampler sampler_of(ParticleSystem& system, const QuantityRequest& request) {
         case Quantity::angular_velocity:
             return one_or_all(index, bodies, 3, [](int, double* out) { put(out, {}); });
         case Quantity::contact_force: return {3, [](double* out) { put(out, {}); }};
+        case Quantity::contact_points:
+            return {CONTACT_NUMBERS * index, [index](double* out) {
+                        std::fill_n(out, CONTACT_NUMBERS * index, std::numeric_limits<double>::quiet_NaN());
+                    }};
         case Quantity::contact_count:
         case Quantity::penetration: return {1, [](double* out) { *out = 0.0; }};
         case Quantity::violation:

@@ -204,12 +204,15 @@ bool RigidSystem::part_island(int island, double share) {
     }
     if (now <= limit) return true;
     const double left = std::sqrt(limit / now);
+    Vec3 lost;
     for (const int k : members) {
         BodyState& s = live_.bodies[tied_[k]];
+        lost += (1.0 - left) * constants_[tied_[k]].mass * s.velocity;
         s.velocity *= left;
         s.angular_momentum *= left;
         if (!constants_[tied_[k]].particle) refresh(constants_[tied_[k]], s);
     }
+    if (parting_ != &leading_) contacts_->pay(island, lost);
     return true;
 }
 

@@ -97,6 +97,8 @@ Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
         case Quantity::contact_force:
             return {3, [s, index, other](double* out) { put(out, s->contact_force(index, other)); }};
         case Quantity::contact_count: return {1, [s](double* out) { *out = s->contact_count(); }};
+        case Quantity::contact_points:
+            return {CONTACT_NUMBERS * index, [s, index](double* out) { s->contact_points(index, out); }};
         case Quantity::penetration: return {1, [s](double* out) { *out = s->penetration(); }};
     }
     throw std::invalid_argument("rigid bodies have no quantity " + request.kind);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "rigid/joint_set.hpp"
 #include "rigid/joint_tree.hpp"
 #include "rigid/locked_tree.hpp"
+#include "run/quantities.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
 #include "run/stages.hpp"
@@ -108,6 +110,10 @@ public:
         return contacts_ ? contacts_->force(body, other) : Vec3{};
     }
     int contact_count() const noexcept { return contacts_ ? contacts_->count() : 0; }
+    void contact_points(int most, double* out) const noexcept {
+        if (contacts_) contacts_->points(most, out);
+        else std::fill_n(out, CONTACT_NUMBERS * most, std::numeric_limits<double>::quiet_NaN());
+    }
     double penetration() const noexcept { return contacts_ ? contacts_->penetration() : 0.0; }
 
 private:
@@ -172,6 +178,7 @@ private:
 
     // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
     void start_half_step();
+    void start_half_step_touching();
     void read_half_step();
     void find_bias(double* bias) const;
     bool move_all(double h);

@@ -11,15 +11,17 @@ namespace spook {
 
 SPOOK_NAMED_ENUM(Quantity, position, velocity, orientation, angular_velocity, kinetic_energy,
                  potential_energy, energy, momentum, angular_momentum, violation, constraint_force,
-                 joint_coordinate, contact_force, contact_count, penetration)
+                 joint_coordinate, contact_force, contact_count, penetration, contact_points)
 
 /// A quantity by its name.
 struct QuantityRequest {
     std::string kind;
-    int index = -1;  // of a body, row or joint; −1: all
+    int index = -1;  // of a body, row or joint; −1: all; of contact points, how many at most
     Vec3 point;      // centre of an angular momentum; of a body, its axes, from the centre of mass, m
     int other = -1;  // the other body of a contact force; −1: all
 };
+
+constexpr int CONTACT_NUMBERS = 10;  // of a contact point: place, normal, force, coefficient of friction
 
 inline void put(double* out, Vec3 v) noexcept {
     out[0] = v.x;

@@ -1,0 +1,158 @@
+"""Five facts about kinds of engines, as questions put to every engine in every setting: FACTS, a catalogue.
+
+    tracker run --engine mujoco --catalogue bench.engine_facts:FACTS
+
+`bench/engines.py` puts them with all the others, and its page has a table of the answers. None is a gate: each shows what
+comes of a choice that an engine's makers made.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from spook_tracker.engine import Energy, Final, Particle, Position, Result, RigidBody, Scene, Trace
+from spook_tracker.scalar_tests.beam.scene import COUNT as BOXES
+from spook_tracker.scalar_tests.beam.scene import scene as beam
+from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.chain import level_chain
+from spook_tracker.scalar_tests.door.scene import forces, least_norm_forces
+from spook_tracker.scalar_tests.inclined_plane.scene import scene as slope
+
+TIME_STEP = 1.0 / 60.0  # s
+LINKS, SWING = 26, 22.0  # s, as long as the thesis lets its chain swing
+HINGES = 10
+FALL_STEPS = 30  # half a second
+STANDING, STAND = 0.3, 10.0  # slope, below the friction coefficient of 0.5; s
+FLIGHT, FLIGHT_STEPS = 10.0, 1000  # m, in one second
+
+
+def energy_gain(simulate: Simulate, time_step: float) -> dict[str, float]:
+    """Largest gain of energy of a chain that falls from the level, of what the fall to hanging sets free [%]."""
+    built = level_chain(LINKS, time_step)
+    seen = {"energy": Trace(quantity=Energy(), every=max(1, round(TIME_STEP / time_step)), from_start=True)}
+    energy = simulate(built, time_step=time_step, duration=SWING, observe=seen)["energy"]
+    fallen = sum(
+        b.mass * float(np.linalg.norm(built.gravity)) * float(np.linalg.norm(b.position))
+        for b in built.bodies
+        if isinstance(b, Particle)
+    )
+    return {"energy_gain": 100.0 * float(np.max(energy)) / fallen}
+
+
+def unevenness(simulate: Simulate) -> dict[str, float]:
+    """How far the hinges' forces across are from those of least norm, of the largest of those."""
+    held, right = (
+        forces(simulate, steps=200, count=HINGES, damping=2.0 * TIME_STEP)[-1],
+        least_norm_forces(HINGES),
+    )
+    return {"unevenness": float(np.abs(held[:, 0] - right[:, 0]).max() / np.abs(right[:, 0]).max())}
+
+
+def sag(simulate: Simulate) -> dict[str, float]:
+    """How far the lowest box is below its place after half a second [m]; in free fall it is 1.2 m."""
+    seen = {"place": Final(quantity=Position(), from_start=True)}
+    moved = simulate(beam(time_step=TIME_STEP), time_step=TIME_STEP, steps=FALL_STEPS, observe=seen)["place"]
+    return {"sag": float(-moved[:BOXES, 2].min())}
+
+
+def creep(simulate: Simulate) -> dict[str, float]:
+    """How far a box slides in ten seconds on a slope that its friction holds [m]."""
+    seen = {"place": Final(quantity=Position("box"), from_start=True)}
+    moved = simulate(slope(STANDING), time_step=TIME_STEP, duration=STAND, observe=seen)["place"]
+    return {"creep": float(np.hypot(moved[0], moved[1]))}
+
+
+def lost_digits(simulate: Simulate) -> dict[str, float]:
+    """Error of a uniform motion, of its way: no method has one, rounding alone decides."""
+    built = Scene(bodies=(_flying(),), gravity=(0.0, 0.0, 0.0))
+    seen = {"place": Final(quantity=Position("ball"))}
+    end: Result = simulate(built, time_step=1.0 / FLIGHT_STEPS, steps=FLIGHT_STEPS, observe=seen)
+    return {"lost_digits": abs(float(end["place"][0]) / FLIGHT - 1.0)}
+
+
+def _flying() -> RigidBody:
+    return RigidBody(
+        name="ball", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0), velocity=(FLIGHT, 0.0, 0.0)
+    )
+
+
+def _fact(
+    title: str,
+    name: str,
+    unit: str,
+    tells: str,
+    measure: object,
+    example: object,
+    steps: tuple[float, ...] = (TIME_STEP,),
+) -> ScalarTest:
+    metric = Metric(name=name, description=tells, unit=unit, role="reported")
+    return ScalarTest(
+        title=title,
+        question=f"{title}?",
+        why="It shows what comes of a choice that the makers of an engine made.",
+        model=tells,
+        parameters=(("time step", ", ".join(f"1/{round(1.0 / h)} s" for h in steps)),),
+        theory=(),
+        reference="0",
+        conclusion="Shown, not judged.",
+        source="known of kinds of engines",
+        measurements=tuple(
+            Measurement(
+                configuration="plain",
+                time_step=h,
+                metrics=(metric,),
+                measure=partial(measure, time_step=h) if len(steps) > 1 else measure,  # type: ignore[arg-type]
+                note="",
+            )
+            for h in steps
+        ),
+        example=example,  # type: ignore[arg-type]
+    )
+
+
+FACTS = {
+    "fact_chain": _fact(
+        f"Does a chain of {LINKS} links gain energy",
+        "energy_gain",
+        "%",
+        f"largest gain of energy of a chain of {LINKS} links that falls from the level, {SWING:g} s",
+        energy_gain,
+        lambda: Example(scene=level_chain(LINKS, TIME_STEP), time_step=TIME_STEP),
+        (TIME_STEP, 1.0 / 240.0),
+    ),
+    "fact_door": _fact(
+        f"Do {HINGES} hinges share a door's weight evenly",
+        "unevenness",
+        "1",
+        "how far forces across are from those of least norm, of the largest",
+        unevenness,
+        lambda: Example(scene=slope(STANDING), time_step=TIME_STEP),
+    ),
+    "fact_beam": _fact(
+        f"Does a beam of {BOXES} boxes hold",
+        "sag",
+        "m",
+        "how far the lowest box is below its place after half a second; in free fall 1.2 m",
+        sag,
+        lambda: Example(scene=beam(time_step=TIME_STEP), time_step=TIME_STEP),
+    ),
+    "fact_creep": _fact(
+        "Does a box creep where friction holds it",
+        "creep",
+        "m",
+        "how far a box slides in 10 s at a slope of 0.3 with a friction coefficient of 0.5",
+        creep,
+        lambda: Example(scene=slope(STANDING), time_step=TIME_STEP),
+    ),
+    "fact_digits": _fact(
+        "How many digits does an engine reckon with",
+        "lost_digits",
+        "1",
+        "error of a uniform motion after 1000 steps, of its way: rounding alone",
+        lost_digits,
+        lambda: Example(scene=Scene(bodies=(_flying(),)), time_step=1.0 / FLIGHT_STEPS),
+        (1.0 / FLIGHT_STEPS,),
+    ),
+}
