@@ -186,8 +186,7 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     parting.rows.assign(system.rows.begin(), system.rows.begin() + static_cast<std::ptrdiff_t>(joints));
     hold_joints(parting);
     std::vector<Islands::Tie> ties;
-    const bool by_sweeps = options_.solver == SolverKind::iterative && !resists_turning_;
-    if (!(by_sweeps ? part_by_sweeps(parting, ties, again) : part_directly(parting, ties, again)))
+    if (!(parts_by_sweeps() ? part_by_sweeps(parting, ties, again) : part_directly(parting, ties, again)))
         return false;
     note_parted(parting, ties);
     if (!again) note_given();

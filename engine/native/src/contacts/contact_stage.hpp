@@ -136,6 +136,10 @@ public:
         double deepest = 0.0;  // overlap that nothing explains, m
     };
     const Parting& parting() const noexcept { return parting_; }
+    /// Whether displacements come by sweeps: cheap, and as exact as the next step will need.
+    bool parts_by_sweeps() const noexcept {
+        return options_.solver == SolverKind::iterative && !resists_turning_;
+    }
 
     /// Looks among the pairs of this step's points for overlaps with the bodies at `poses`, where the step ends, and
     /// fills parting(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
