@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from spook_tracker import engine
 from spook_tracker.engine import (
+    PLAIN,
     WORLD,
     Distance,
     Final,
@@ -87,17 +90,24 @@ def test_every_stage_has_its_reason() -> None:
 
 
 @pytest.mark.parametrize("stages", [("collision",), ("rotation",), ("collision", "rotation")])
-def test_forcing_a_stage_in_changes_the_work_and_not_the_motion(stages: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "method",
+    [PLAIN, Method(half_step_velocities=True), Method(corrections=2)],
+    ids=["plain", "half-step", "curved"],
+)
+def test_forcing_a_stage_in_changes_the_work_and_not_the_motion(
+    stages: tuple[str, ...], method: Method
+) -> None:
     pendulum = Scene(
         bodies=(Particle(name="bob", mass=1.0, position=(1.0, 0.0, 0.0)),),
         constraints=(Distance(name="rod", between=((0.0, 0.0, 0.0), "bob")),),
         gravity=GRAVITY,
     )
     observe = {"x": Final(quantity=Position("bob"))}
-    plain = simulate(pendulum, time_step=TIME_STEP, steps=300, observe=observe)
+    plain = simulate(pendulum, time_step=TIME_STEP, steps=300, observe=observe, method=method)
 
     forced = simulate(
-        pendulum, time_step=TIME_STEP, steps=300, observe=observe, method=Method(force_stages=stages)
+        pendulum, time_step=TIME_STEP, steps=300, observe=observe, method=replace(method, force_stages=stages)
     )
 
     assert ("collision" in forced.stages) == ("collision" in stages)

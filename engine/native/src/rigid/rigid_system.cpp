@@ -164,7 +164,8 @@ void RigidSystem::reset(StageClock* clock) {
     mixed_values_ = solver_ != RigidSolver::block;
     if (composed_) start_composition();
     if (stiff_) find_tensions();
-    if ((half_step_ || method_.corrections > 0) && !contacts_) start_half_step();
+    const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
+    if ((half_step_ || method_.corrections > 0) && !may_touch) start_half_step();
     if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
     mixed_.mass.assign(tied_.size(), Mat6{});
     mixed_.momentum.resize(tied_.size());
@@ -177,7 +178,7 @@ void RigidSystem::reset(StageClock* clock) {
         rows.softness = block.softness;
         mixed_.rows.push_back(rows);
     }
-    if (half_step_ && contacts_) start_half_step_touching();
+    if (half_step_ && may_touch) start_half_step_touching();
 }
 
 void RigidSystem::advance(std::int64_t steps) {
