@@ -126,8 +126,10 @@ def _to_corner(place: float, speed: float, pull: float, half: float) -> tuple[fl
 
 
 def half_period(times: np.ndarray, x: np.ndarray) -> float:
-    """Time [s] between the first two passages through the middle."""
+    """Time [s] between the first two passages through the middle; NaN if it does not come back."""
     passed = [k for k in range(1, len(x)) if x[k - 1] * x[k] < 0.0][:2]
+    if len(passed) < 2:
+        return math.nan
     first, second = (times[k - 1] + (times[k] - times[k - 1]) * x[k - 1] / (x[k - 1] - x[k]) for k in passed)
     return float(second - first)
 
