@@ -90,7 +90,7 @@ class Sleeper:
         return SimpleNamespace(
             seconds=time.perf_counter() - started,
             cpu_seconds=time.thread_time() - own,
-            completed=True,
+            status="completed",
             stage_seconds={},
         )
 
@@ -122,7 +122,7 @@ def test_the_engine_tells_its_processor_time_from_the_time_that_passes() -> None
 
 def test_an_engine_that_cannot_tell_has_no_processor_time() -> None:
     def engine(scene: Any, **options: Any) -> Any:
-        return SimpleNamespace(seconds=0.01, completed=True, stage_seconds={})
+        return SimpleNamespace(seconds=0.01, status="completed", stage_seconds={})
 
     (timing,) = interleaved([lambda simulate: simulate(None)], engine, 2)
 

@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
+from spook_tracker.tracker.document.run_document import Timing
+from spook_tracker.tracker.measure.question import Outcome
 from spook_tracker.tracker.measure.timing import MOST_RUNS, Repeats, Stopwatch, interleaved, once
 
 
@@ -22,7 +24,8 @@ class Clockwork:
         self.calls.append((scene.name, time_stages))
         return SimpleNamespace(
             seconds=scene.seconds,
-            completed=scene.name != self.failing,
+            status="diverged" if scene.name == self.failing else "completed",
+            failure="body 'b' is far away" if scene.name == self.failing else "",
             stage_seconds={"solve_path": 0.5 * scene.seconds} if time_stages else {},
         )
 
@@ -88,11 +91,26 @@ def test_runs_that_were_disturbed_do_not_count():
     assert timing.seconds == pytest.approx((1e-4, 1e-4))
 
 
-def test_a_run_that_fails_is_not_timed():
+def test_a_run_that_fails_is_not_timed_and_says_what_came_of_it():
     good, bad = interleaved(runs(a=0.01, b=0.01), Clockwork(failing="b"), 3)
 
-    assert good is not None
-    assert bad is None
+    assert isinstance(good, Timing)
+    assert bad == Outcome(None, "diverged", "body 'b' is far away")
+
+
+def test_a_run_that_fails_in_a_later_repeat_has_failed():
+    left = iter([0.1] * 3)
+
+    def engine(scene, **options):
+        if scene.name == "b" and next(left, None) is None:
+            raise MemoryError
+        return SimpleNamespace(seconds=0.1, status="completed", stage_seconds={})
+
+    asked = [lambda s, n=n: s(SimpleNamespace(name=n)) for n in ("a", "b")]
+    good, bad = interleaved(asked, engine, 5)
+
+    assert isinstance(good, Timing) and len(good.seconds) == 5
+    assert bad == Outcome(None, "crashed", "the test ran out of memory")
 
 
 def test_nothing_is_recorded_while_timing_but_the_time_limit_is_passed_on():
@@ -100,7 +118,7 @@ def test_nothing_is_recorded_while_timing_but_the_time_limit_is_passed_on():
 
     def engine(scene, **options):
         seen.update(options)
-        return SimpleNamespace(seconds=0.1, completed=True, stage_seconds={})
+        return SimpleNamespace(seconds=0.1, status="completed", stage_seconds={})
 
     assert once(lambda s: s(None), engine, time_limit=3.0) == 0.1
     assert seen == {"time_limit": 3.0}

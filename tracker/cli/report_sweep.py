@@ -9,6 +9,8 @@ import click
 
 from spook_tracker.tracker.cli.console import Column, table
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.judge.standing import NO_VALUE
+from spook_tracker.tracker.judge.vocabulary import spaced
 
 WIDE = 100  # columns; below, order and time to error are all there is room for
 Pair = tuple[SeriesDefinition, Sample]
@@ -71,6 +73,8 @@ def _reached(pair: Pair | None, parameter: str) -> str:
         return "-"
     definition, sample = pair
     value, target = sample.value, definition.parameters.get(parameter, math.nan)
+    if sample.outcome in NO_VALUE and not math.isinf(value) and sample.outcome != "missing":
+        return spaced(sample.outcome)
     if parameter == "target_error":
         return f"{seconds(value)} to {target:g}" if math.isfinite(value) else f"never {target:g}"
     return f"{value:.3g} {definition.unit} in {seconds(target)}" if math.isfinite(value) else "too slow"

@@ -2,7 +2,8 @@
 
 Errors come from runs that record, in any process; run times from separate runs with nothing recorded, alone
 and interleaved. A point that fails stays a point with its outcome class. From each configuration's points
-come the scalars that make a trend: observed order, time at a given error, error in a given time.
+come the scalars that make a trend: observed order, time at a given error, error in a given time. A rung that gave
+its error and fails while it is timed has the class of that failure: a crash is one wherever it comes.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 from spook_tracker.engine.method import STAGES_THAT_CAN_BE_FORCED
 from spook_tracker.scalar_tests.case import Configuration, Example, Ladder, ScalarTest, Simulate
@@ -22,8 +24,9 @@ from spook_tracker.tracker.document.run_document import (
     Timing,
 )
 from spook_tracker.tracker.measure.definition import definition_hash
-from spook_tracker.tracker.measure.question import Witness, ask, series_key
+from spook_tracker.tracker.measure.question import Outcome, Witness, ask, sentence, series_key
 from spook_tracker.tracker.measure.timing import Repeats, Timed, interleaved, once, stage_seconds
+from spook_tracker.tracker.measure.workers import NOWHERE, Lost, at
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
 ORDER_BAND = 0.1
@@ -80,43 +83,79 @@ def _error_point(ladder: Ladder, configuration: Configuration, h: float, simulat
     return ErrorPoint(h, error, outcome, failure, counters, witness.state_hash)
 
 
+Errors = Mapping[tuple[str, int, int], ErrorPoints]  # by test, ladder and configuration
+Place = tuple[str, int, int, int]  # of a rung: test, ladder, configuration, step
+
+
 def timed_series(
-    tests: Mapping[str, ScalarTest],
-    errors: Mapping[tuple[str, int, int], ErrorPoints],
-    simulate: Simulate,
-    repeats: int | Repeats,
+    tests: Mapping[str, ScalarTest], errors: Errors, simulate: Simulate, repeats: int | Repeats
 ) -> list[Pair]:
     """Every ladder's series with timings, and the scalars read off them; run alone on the machine."""
-    pairs: list[Pair] = []
+    found: dict[Place, Timing | Outcome] = {}
+    places = _to_be_timed(tests, errors)
     for name, test in tests.items():
         for i, ladder in enumerate(test.ladders):
-            measured = [errors[(name, i, j)] for j in range(len(ladder.configurations))]
-            timings = _timings(ladder, measured, simulate, repeats)
-            for configuration, points, timed in zip(ladder.configurations, measured, timings, strict=True):
-                pairs += _ladder_pairs(name, test, ladder, configuration, points, timed)
-    return pairs
+            here = [place for place in places if place[:2] == (name, i)]
+            runs = [_run_of(ladder, place) for place in here]
+            first = places.index(here[0]) if here else 0
+            timings = interleaved(runs, simulate, repeats, partial(_begin, first))
+            at(NOWHERE)
+            found |= zip(here, timings, strict=True)
+    return _all_pairs(tests, errors, found)
 
 
-def _timings(
-    ladder: Ladder, measured: list[ErrorPoints], simulate: Simulate, repeats: int | Repeats
-) -> list[list[Timing | None]]:
-    """Timings by configuration and rung; rungs without a value are not timed."""
-    places = [
-        (j, k)
-        for j, points in enumerate(measured)
-        for k, point in enumerate(points.points)
+def _begin(first: int, number: int) -> None:
+    at(first + number)
+
+
+def untimed_series(tests: Mapping[str, ScalarTest], errors: Errors, lost: Lost) -> list[Pair]:
+    """The same where the process that timed them was lost: told of the rung it was at, of all if that is not known."""
+    places = _to_be_timed(tests, errors)
+    if 0 <= lost.at < len(places):
+        name, i, j, k = places[lost.at]
+        ladder = tests[name].ladders[i]
+        rung = ladder.configurations[j]
+        why = f"{lost.failure}, with [{rung.name}] at h = {ladder.steps_of(rung)[k]:g} s"
+        places = [places[lost.at]]
+    else:
+        why = lost.failure
+    failed = dict.fromkeys(places, Outcome(None, lost.outcome, lost.failure))
+    return _all_pairs(tests, errors, failed, Outcome(None, lost.outcome, why))
+
+
+def _to_be_timed(tests: Mapping[str, ScalarTest], errors: Errors) -> list[Place]:
+    """The rungs that have a value, in the order in which they are timed."""
+    return [
+        (name, i, j, k)
+        for name, test in tests.items()
+        for i, ladder in enumerate(test.ladders)
+        for j in range(len(ladder.configurations))
+        for k, point in enumerate(errors[name, i, j].points)
         if point.outcome == "value"
     ]
 
-    def timed(j: int, k: int, run_simulate: Simulate) -> object:
-        configuration = ladder.configurations[j]
-        return ladder.run(run_simulate, ladder.steps_of(configuration)[k], configuration.method)
 
-    runs = [lambda s, j=j, k=k: timed(j, k, s) for j, k in places]
-    table: list[list[Timing | None]] = [[None] * len(points.points) for points in measured]
-    for (j, k), timing in zip(places, interleaved(runs, simulate, repeats), strict=True):
-        table[j][k] = timing
-    return table
+def _run_of(ladder: Ladder, place: Place) -> Timed:
+    configuration = ladder.configurations[place[2]]
+    step = ladder.steps_of(configuration)[place[3]]
+    return lambda simulate: ladder.run(simulate, step, configuration.method)
+
+
+def _all_pairs(
+    tests: Mapping[str, ScalarTest],
+    errors: Errors,
+    found: Mapping[Place, Timing | Outcome],
+    lost: Outcome | None = None,
+) -> list[Pair]:
+    """What came of every ladder; `lost`: why there are no times of it at all."""
+    pairs: list[Pair] = []
+    for name, test in tests.items():
+        for i, ladder in enumerate(test.ladders):
+            for j, configuration in enumerate(ladder.configurations):
+                points = errors[name, i, j]
+                timed = [found.get((name, i, j, k)) for k in range(len(points.points))]
+                pairs += _ladder_pairs(name, test, ladder, configuration, points, timed, lost)
+    return pairs
 
 
 def _ladder_pairs(
@@ -125,7 +164,8 @@ def _ladder_pairs(
     ladder: Ladder,
     configuration: Configuration,
     points: ErrorPoints,
-    timed: list[Timing | None],
+    timed: list[Timing | Outcome | None],
+    lost: Outcome | None,
 ) -> Iterator[Pair]:
     version = _version(ladder, configuration)
     common = _series(name, test, ladder, configuration, version)
@@ -137,6 +177,8 @@ def _ladder_pairs(
             kind="ladder",
             time_step=point.time_step,
         )
+        if isinstance(timing, Outcome):
+            point, timing = _failed_when_timed(point, timing), None
         yield (
             series,
             Sample(
@@ -151,7 +193,14 @@ def _ladder_pairs(
                 timing=timing,
             ),
         )
-    yield from _scalars(ladder, configuration, common, points, timed)
+    yield from _scalars(ladder, configuration, common, points, timed, lost)
+
+
+def _failed_when_timed(point: ErrorPoint, failed: Outcome) -> ErrorPoint:
+    """The rung as it ended; what only did not settle keeps its value."""
+    value = point.error if failed.outcome == "unsettled" else math.nan
+    words = sentence(f"while it was timed: {failed.failure}")
+    return replace(point, error=value, outcome=failed.outcome, failure=words)
 
 
 def _version(ladder: Ladder, configuration: Configuration, *more: object) -> str:
@@ -201,7 +250,8 @@ def _scalars(
     configuration: Configuration,
     common: SeriesDefinition,
     points: ErrorPoints,
-    timed: list[Timing | None],
+    timed: list[Timing | Outcome | None],
+    lost: Outcome | None,
 ) -> Iterator[Pair]:
     metric = f"ladder:{ladder.name}"
     expected = configuration.expected_order
@@ -228,8 +278,9 @@ def _scalars(
     reached = [
         (min(timing.seconds), point.error)
         for point, timing in zip(points.points, timed, strict=True)
-        if timing is not None and point.outcome == "value"
+        if isinstance(timing, Timing)
     ]
+    failed = lost or next((timing for timing in timed if isinstance(timing, Outcome)), None)
     seconds, errors = [s for s, _ in reached], [e for _, e in reached]
     if ladder.target_error is not None:
         series = replace_series(
@@ -243,7 +294,8 @@ def _scalars(
             test_version=_version(ladder, configuration, ladder.steps_of(configuration), ladder.target_error),
         )
         value = time_at_error(seconds, errors, ladder.target_error)
-        yield series, _scalar(series, value, f"no step reaches {ladder.target_error:g} {ladder.unit}")
+        why_not = f"no step reaches {ladder.target_error:g} {ladder.unit}"
+        yield series, _untimed(series, failed) or _scalar(series, value, why_not)
     if ladder.target_seconds is not None:
         series = replace_series(
             common,
@@ -256,7 +308,22 @@ def _scalars(
             ),
         )
         value = error_in_time(seconds, errors, ladder.target_seconds)
-        yield series, _scalar(series, value, f"every step takes longer than {ladder.target_seconds:g} s")
+        why_not = f"every step takes longer than {ladder.target_seconds:g} s"
+        yield series, _untimed(series, failed) or _scalar(series, value, why_not)
+
+
+def _untimed(series: SeriesDefinition, failed: Outcome | None) -> Sample | None:
+    """What is read off the clock has no value where a rung failed while it was timed: other rungs tell another."""
+    if failed is None:
+        return None
+    return Sample(
+        series=series.key,
+        value=NAN,
+        outcome=failed.outcome,
+        passed=False,
+        set_point_held=False,
+        failure=sentence(f"not timed: {failed.failure}"),
+    )
 
 
 def _scalar(

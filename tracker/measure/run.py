@@ -51,6 +51,7 @@ from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME
 from spook_tracker.tracker.measure.questions import Questions as Questions
 from spook_tracker.tracker.measure.questions import RunError as RunError
 from spook_tracker.tracker.measure.renames import with_aliases
+from spook_tracker.tracker.measure.run_times import Timed, run_times
 from spook_tracker.tracker.measure.timing import Repeats
 
 Trigger = Literal["manual", "nightly", "import", "test"]
@@ -280,18 +281,7 @@ def _place(source: Questions) -> executors.Place:
     return executors.place_of(source.module())
 
 
-Errors = Mapping[tuple[str, int, int], ladders.ErrorPoints]
-Timed = tuple[list[tuple[SeriesDefinition, Sample]], Mapping[str, Mapping[str, float]]]
-
-
-def perform_timing(source: Questions, piece: tuple[tuple[str, ...], Errors, int | Repeats]) -> Timed:
-    """Run times of every ladder, and what leaving stages out saves, in this process."""
-    names, errors, repeats = piece
-    tests = select(source.tests(), names)
-    simulate = replace(source, patience=None).simulate()  # what gave a value is worth its time
-    timed = ladders.timed_series(tests, errors, simulate, repeats)
-    stages_can_be_forced = not hasattr(source.module(), "configurations")  # ours only
-    return timed, ladders.saved_by_leaving_out(tests, simulate) if stages_can_be_forced else {}
+Errors = ladders.Errors
 
 
 def _total(tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Request) -> int:
@@ -302,26 +292,17 @@ def _total(tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Requ
 def timings(
     source: Questions, request: Request, tests: Mapping[str, ScalarTest], errors: Errors, watch: Watch
 ) -> Timed:
-    """Run times, taken by one process while no other works, test by test; without them where that one is lost."""
-    pieces = [
-        ((name,), {place: found for place, found in errors.items() if place[0] == name}, request.repeats)
-        for name in tests
-    ]
-    answers: Iterator[tuple[Any, Any]] = ((piece, perform_timing(source, piece)) for piece in pieces)
-    if request.workers:
-        ladders_each = max([1, *(len(test.ladders) for test in tests.values())])
-        limits = crew.Limits(seconds=request.time_limit * ladders_each, memory=request.memory_limit)
-        answers = crew.answers(partial(perform_timing, source), pieces, 1, limits)
-    series: list[tuple[SeriesDefinition, Sample]] = []
-    saved: dict[str, Mapping[str, float]] = {}
-    total = _total(list(_tasks(tests, request)), tests, request)
-    for done, (((name,), known, repeats), answer) in enumerate(answers, start=total - len(pieces) + 1):
-        if isinstance(answer, crew.Lost):
-            answer = ladders.timed_series({name: tests[name]}, known, _gone(answer), repeats), {}
-        series += answer[0]
-        saved |= answer[1]
+    """Run times of these tests' ladders, taken while nothing else is at work."""
+    done = len(list(_tasks(tests, request)))
+    total = done + len(tests)
+
+    def timed(name: str) -> None:
+        nonlocal done
+        done += 1
         watch(Progress(done, total, f"{name}, run times", True))
-    return series, saved
+
+    limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
+    return run_times(source, tests, errors, request.repeats, limits if request.workers else None, timed)
 
 
 def _gone(lost: crew.Lost) -> Any:

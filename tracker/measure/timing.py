@@ -20,7 +20,7 @@ from spook_tracker.scalar_tests.case import Simulate
 from spook_tracker.tracker.document.run_document import Timing
 from spook_tracker.tracker.measure.calibration import calibrate
 from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
-from spook_tracker.tracker.measure.question import ask
+from spook_tracker.tracker.measure.question import Outcome, ask, sentence
 
 RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
 MOST_RUNS = 200  # in one repeat
@@ -29,6 +29,7 @@ FEWEST_REPEATS = 2
 STAGES_UP_TO = 0.2  # s: longer runs are not run again only to see their stages
 
 Timed = Callable[[Simulate], Any]
+Taken = tuple[float, float | None]  # s of one run, and s of the processor where the engine can tell
 
 
 class Repeats(NamedTuple):
@@ -75,11 +76,13 @@ class _Lane:
     seconds: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
     kernel: list[float] = field(default_factory=list)
+    failed: Outcome | None = None  # the first failure; nothing is timed after it
 
-    def keep(self, kernel: float, taken: Sequence[tuple[float, float | None] | None]) -> None:
-        """Add a repeat; runs that failed in it do not count."""
-        whole = [both for both in taken if both is not None]
-        if whole:
+    def keep(self, kernel: float, taken: Sequence[Taken | Outcome]) -> None:
+        """Add a repeat, of at least one run; one that failed in it is what came of the whole."""
+        whole = [both for both in taken if not isinstance(both, Outcome)]
+        self.failed = next((both for both in taken if isinstance(both, Outcome)), None)
+        if self.failed is None:
             self.kernel.append(kernel)
             self.seconds.append(_undisturbed([seconds for seconds, _ in whole]))
             own = [cpu for _, cpu in whole if cpu is not None]
@@ -89,36 +92,43 @@ class _Lane:
 def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> float | None:
     """Seconds of one run, None if it failed."""
     taken = _both(run, simulate, time_limit)
-    return None if taken is None else taken[0]
+    return None if isinstance(taken, Outcome) else taken[0]
 
 
-def _both(
-    run: Timed, simulate: Simulate, time_limit: float | None = None
-) -> tuple[float, float | None] | None:
-    """Seconds of one run, and of the processor for it where the engine can tell."""
+def _both(run: Timed, simulate: Simulate, time_limit: float | None = None) -> Taken | Outcome:
+    """Seconds of one run, and of the processor for it where the engine can tell; else what came of it."""
     watch = Stopwatch(simulate, {} if time_limit is None else {"time_limit": time_limit})
     before = time.perf_counter()
     answer = ask(partial(run, watch))
-    if answer.outcome != "value" or any(not result.completed for result in watch.results):
-        return None
+    if answer.outcome != "value":
+        return answer
+    for result in watch.results:
+        if result.status != "completed":
+            return Outcome(None, result.status, sentence(result.failure))
     if not watch.results:
         return time.perf_counter() - before, None
     return watch.seconds, watch.cpu
 
 
-def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int | Repeats) -> list[Timing | None]:
-    """A timing of each run, None for those that fail; instructions and stages where they can be had.
+def interleaved(
+    runs: Sequence[Timed],
+    simulate: Simulate,
+    repeats: int | Repeats,
+    begin: Callable[[int], None] = lambda number: None,
+) -> list[Timing | Outcome]:
+    """A timing of each run, for those that fail what came of them; instructions and stages where they can be had.
 
-    The first run of each warms the caches and tells how often it can be repeated; one that takes longer than all
+    `begin` is told the number of the run whose turn it is. The first run of each warms the caches and tells how often it can be repeated; one that takes longer than all
     its repeats should has no cold caches to speak of, and counts as the first of them.
     """
     often = Repeats(repeats) if isinstance(repeats, int) else repeats
-    lanes: list[_Lane | None] = []
-    for run in runs:
+    lanes: list[_Lane] = []
+    for number, run in enumerate(runs):
+        begin(number)
         kernel = calibrate()
         first = _both(run, simulate)
-        if first is None:
-            lanes.append(None)
+        if isinstance(first, Outcome):
+            lanes.append(_Lane(run=run, runs=0, repeats=0, failed=first))
             continue
         grain = max(first[0], 1e-9)
         affordable = int(often.seconds / max(grain, RESOLVED))
@@ -131,17 +141,21 @@ def interleaved(runs: Sequence[Timed], simulate: Simulate, repeats: int | Repeat
         if grain > often.seconds:
             fresh.keep(kernel, [first])
     for _ in range(often.most):
-        for lane in lanes:
-            if lane is not None and len(lane.kernel) < lane.repeats:
+        for number, lane in enumerate(lanes):
+            if lane.failed is None and len(lane.kernel) < lane.repeats:
+                begin(number)
                 kernel = calibrate()
                 lane.keep(kernel, [_both(lane.run, simulate) for _ in range(lane.runs)])
     clock = True  # until a run comes without one: an engine has it for all its stages or for none
-    timings: list[Timing | None] = []
-    for lane in lanes:
-        timings.append(_timing(lane, simulate, clock, often.stages_up_to) if lane and lane.seconds else None)
-        clock = clock and (
-            timings[-1] is None or not _short(lane, often.stages_up_to) or bool(timings[-1].stage_seconds)
-        )
+    timings: list[Timing | Outcome] = []
+    for number, lane in enumerate(lanes):
+        if lane.failed is not None:
+            timings.append(lane.failed)
+            continue
+        begin(number)
+        timing = _timing(lane, simulate, clock, often.stages_up_to)
+        timings.append(timing)
+        clock = clock and (not _short(lane, often.stages_up_to) or bool(timing.stage_seconds))
     return timings
 
 
@@ -151,8 +165,8 @@ def _undisturbed(seconds: Sequence[float]) -> float:
     return sum(faster) / len(faster)
 
 
-def _short(lane: _Lane | None, bound: float) -> bool:
-    return lane is not None and bool(lane.seconds) and min(lane.seconds) <= bound
+def _short(lane: _Lane, bound: float) -> bool:
+    return min(lane.seconds) <= bound
 
 
 def _timing(lane: _Lane, simulate: Simulate, clock: bool, bound: float) -> Timing:

@@ -27,6 +27,7 @@ from typing import Any, Generic, Literal, TypeVar
 START_LIMIT = 120.0  # s in which a new process has read its program, on a machine however busy
 WORTH = 1.0  # s of work after which further processes are worth what they take to start
 DIED = "the engine's process died while answering"
+NOWHERE = -1  # in a piece of work that has no places, or at none of them
 
 Piece = TypeVar("Piece")
 
@@ -45,6 +46,7 @@ class Lost:
 
     outcome: Literal["crashed", "timed_out"]
     failure: str
+    at: int = NOWHERE  # the place in the piece of work where it ended, as `at` said it
 
 
 def answers(
@@ -98,7 +100,8 @@ class _Worker(Generic[Piece]):
         self.limits = limits
         self.pipe, theirs = context.Pipe()
         end, self.lifeline = context.Pipe(duplex=False)
-        arguments = (perform, theirs, end, limits.memory, os.getpid())
+        self.place = context.RawValue("i", NOWHERE)
+        arguments = (perform, theirs, end, limits.memory, os.getpid(), self.place)
         self.process = context.Process(target=_serve, args=arguments, daemon=True)
         self.process.start()
         theirs.close()
@@ -108,6 +111,7 @@ class _Worker(Generic[Piece]):
 
     def give(self, piece: Piece) -> None:
         self.piece = piece
+        self.place.value = NOWHERE
         with suppress(OSError):  # it is dead already, which the next look will find
             self.pipe.send(piece)
 
@@ -125,10 +129,11 @@ class _Worker(Generic[Piece]):
                     self.deadline = time.monotonic() + self.limits.seconds
                     return content
         except (EOFError, OSError):
-            return Lost("crashed", DIED)
+            return Lost("crashed", DIED, self.place.value)
         if time.monotonic() < self.deadline:
             return None
-        return Lost("timed_out", f"no answer within {self.limits.seconds:g} s, so its process was ended")
+        why = f"no answer within {self.limits.seconds:g} s, so its process was ended"
+        return Lost("timed_out", why, self.place.value)
 
     def end(self) -> None:
         self.process.kill()
@@ -138,10 +143,26 @@ class _Worker(Generic[Piece]):
         self.lifeline.close()
 
 
+_place: Any = None  # of this process, if it is a worker: memory its supervisor sees
+
+
+def at(place: int) -> None:
+    """Say where in its piece of work a worker is; costs a store to memory and wakes nobody, while time is taken."""
+    if _place is not None:
+        _place.value = place
+
+
 def _serve(
-    perform: Callable[[Any], Any], pipe: Connection, lifeline: Connection, memory: int, parent: int
+    perform: Callable[[Any], Any],
+    pipe: Connection,
+    lifeline: Connection,
+    memory: int,
+    parent: int,
+    place: Any,
 ) -> None:
     """The life of a worker: a piece, its answer, the next piece."""
+    global _place
+    _place = place
     _never_outlive(lifeline, parent)
     warnings.simplefilter("ignore")  # what a worker has to say, it says in samples
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides what an interruption means
@@ -155,7 +176,7 @@ def _serve(
         try:
             answer = ("answer", perform(piece))
         except MemoryError:
-            answer = ("answer", Lost("crashed", "the piece of work ran out of memory"))
+            answer = ("answer", Lost("crashed", "the piece of work ran out of memory", place.value))
         except Exception as error:
             answer = ("raised", error)
         pipe.send(answer)

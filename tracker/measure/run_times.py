@@ -1,0 +1,78 @@
+"""The run times of a run: taken test by test by one watched process, while nothing else is at work.
+
+An engine that answers and then dies, hangs or takes too much memory while it is timed has failed there: the rung it
+was at is recorded with the class of how, and what is read off the clock says why it is not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Literal
+
+import spook_tracker.tracker.measure.workers as crew
+from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.measure import ladder as ladders
+from spook_tracker.tracker.measure.questions import Questions
+from spook_tracker.tracker.measure.timing import Repeats
+
+Timed = tuple[list[ladders.Pair], Mapping[str, Mapping[str, float]]]  # s a step by test and stage left out
+
+
+@dataclass(frozen=True)
+class TimingPiece:
+    """Run times of the ladders of one test, or what leaving stages out of its example saves."""
+
+    test: str
+    kind: Literal["ladders", "stages"]
+    errors: ladders.Errors
+    repeats: int | Repeats
+
+
+def perform_timing(source: Questions, piece: TimingPiece) -> Timed:
+    """Take the times of one piece in this process."""
+    tests = {piece.test: source.tests()[piece.test]}
+    simulate = replace(source, patience=None).simulate()  # what gave a value is worth its time
+    if piece.kind == "ladders":
+        return ladders.timed_series(tests, piece.errors, simulate, piece.repeats), {}
+    return [], ladders.saved_by_leaving_out(tests, simulate)
+
+
+def run_times(
+    source: Questions,
+    tests: Mapping[str, ScalarTest],
+    errors: ladders.Errors,
+    repeats: int | Repeats,
+    limits: crew.Limits | None,
+    timed: Callable[[str], None],
+) -> Timed:
+    """Run times of every ladder, and what leaving stages out saves; `timed` is told of each test that is done.
+
+    `limits` are those of one ladder; None: in this process, where nothing can be ended. What stages save is left
+    out where its process is lost.
+    """
+    stages_can_be_forced = not hasattr(source.module(), "configurations")  # ours only
+    pieces = []
+    for name in tests:
+        known = {place: found for place, found in errors.items() if place[0] == name}
+        pieces += [TimingPiece(name, "stages", {}, 0)] if stages_can_be_forced else []
+        pieces += [TimingPiece(name, "ladders", known, repeats)]
+    answers: Iterator[tuple[TimingPiece, Any]] = ((piece, perform_timing(source, piece)) for piece in pieces)
+    if limits is not None:
+        most = max([1, *(len(test.ladders) for test in tests.values())])
+        answers = crew.answers(
+            partial(perform_timing, source), pieces, 1, replace(limits, seconds=limits.seconds * most)
+        )
+    series: list[ladders.Pair] = []
+    saved: dict[str, Mapping[str, float]] = {}
+    for piece, answer in answers:
+        if piece.kind == "stages":
+            saved |= {} if isinstance(answer, crew.Lost) else answer[1]
+            continue
+        if isinstance(answer, crew.Lost):
+            series += ladders.untimed_series({piece.test: tests[piece.test]}, piece.errors, answer)
+        else:
+            series += answer[0]
+        timed(piece.test)
+    return series, saved
