@@ -261,12 +261,11 @@ def test_space_has_no_direction_and_no_origin(name: str) -> None:
 
 
 def test_heaps_have_no_direction_and_no_origin() -> None:
-    """Two in three heaps move the same; in the others an end meets the ground a rounding earlier, and a step counts."""
+    """Whatever their rows: blows shared among more points than their motion tells apart, friction at its bounds."""
     left = np.array([left_when_turned(heap(np.random.default_rng(seed), 0.05)) for seed in range(21)])
 
-    assert np.median(left[:, 0]) < 1e-10
-    assert np.median(left[:, 1]) < 1e-8
-    assert left[:, 0].max() < 1e-4
+    assert left[:, 0].max() < 1e-10
+    assert left[:, 1].max() < 1e-8
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -299,14 +298,12 @@ def left_when_shuffled(scene: Scene) -> float:
     return float(np.abs(states(other, 30) - states(scene, 30)).max())
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if name != "heap"])
+@pytest.mark.parametrize("name", SCENES)
 def test_the_order_in_which_a_scene_is_written_does_not_matter(name: str) -> None:
     """Up to rounding."""
     assert left_when_shuffled(SCENES[name](np.random.default_rng(10))) < 1e-9
 
 
-def test_the_order_in_which_a_heap_is_written_does_not_matter() -> None:
-    """Most heaps end the same; in the others a rounding decides at which step an end meets the ground."""
-    left = [left_when_shuffled(heap(np.random.default_rng(seed), 0.05)) for seed in range(21)]
-
-    assert np.median(left) < 1e-9
+@pytest.mark.parametrize("seed", range(21))
+def test_the_order_in_which_any_heap_is_written_does_not_matter(seed: int) -> None:
+    assert left_when_shuffled(heap(np.random.default_rng(seed), 0.05)) < 1e-9

@@ -11,6 +11,11 @@ namespace {
 
 constexpr int simultaneous_rounds = 20;  // of blows that follow from blows in one step
 constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
+constexpr double blow_give =
+    1e-3;                       // of a point's own inverse inertia: what it gives way while a blow is shared
+constexpr int determined = 3;   // points of a pair whose normal impulses its motion fixes
+constexpr int most_again = 8;   // solves until the give is gone: each leaves about blow_give of it
+constexpr double left = 1e-16;  // of the fastest row: a give that is rounding
 
 }  // namespace
 
@@ -23,6 +28,54 @@ double ContactStage::kinetic_energy(const MixedSystem& system, const std::vector
             twice += momentum * velocity[b][i];
         }
     return 0.5 * twice;
+}
+
+/// A pair that meets at more points than its motion can tell apart may share a blow among them in many ways, and
+/// friction turns the bodies otherwise with each. Points that give way alike share it in one: their rows get a
+/// softness, which hit_exactly() takes back.
+void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
+                              const std::vector<std::size_t>& who) const {
+    for (std::size_t from = 0, end = 0; from < who.size(); from = end) {
+        const auto pair = [&](std::size_t j) {
+            const Contact& contact = points_[who[j]].contact;
+            return IndexPair{contact.first, contact.second};
+        };
+        while (end < who.size() && pair(end) == pair(from)) ++end;
+        if (end - from <= determined) continue;
+        for (std::size_t j = from; j < end; ++j) {
+            RowBlock& block = hit.rows[joints + j];
+            block.softness[0] = blow_give * own_inertia(hit, block, 0);
+        }
+    }
+}
+
+/// Solves a blow; where its rows are soft, again and again with their give added to what they ask, until none is left
+/// (the proximal point algorithm, Rockafellar 1976).
+void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
+                               FrictionModel model) {
+    run(hit, friction, impact_solver_, model);
+    std::vector<double> asked;
+    std::vector<char> answered(hit.rows.size(), 1);
+    double fastest = 0.0;
+    bool soft = false;
+    for (std::size_t k = joints; k < hit.rows.size(); ++k) {
+        const RowBlock& block = hit.rows[k];
+        asked.push_back(block.right[0]);
+        fastest = std::max(fastest, std::abs(row_velocity(block, 0, hit.velocity)));
+        soft = soft || block.softness[0] > 0.0;
+    }
+    for (int again = 0; soft && again < most_again; ++again) {
+        double change = 0.0;
+        for (std::size_t k = 0; k < asked.size(); ++k) {
+            RowBlock& block = hit.rows[joints + k];
+            const double right = asked[k] + block.softness[0] * block.multiplier[0];
+            change = std::max(change, std::abs(right - block.right[0]));
+            answered[joints + k] = std::abs(right - block.right[0]) <= left * fastest;
+            block.right[0] = right;
+        }
+        if (change <= left * fastest) break;
+        run(hit, friction, impact_solver_, model, &answered);
+    }
 }
 
 void ContactStage::impact(MixedSystem& system) {
@@ -64,9 +117,10 @@ void ContactStage::impact(MixedSystem& system) {
     // No step before has anything to say about a blow: the box takes this one's own normal impulses.
     const FrictionModel model =
         options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
+    share_blow(hit, joints, who);
     const MixedSystem start = hit;
     const std::vector<FrictionPoint> fresh = friction;
-    run(hit, friction, impact_solver_, model);
+    hit_exactly(hit, joints, friction, model);
 
     const double limit = kinetic_energy(hit, before);
     double share = 1.0;
@@ -75,7 +129,7 @@ void ContactStage::impact(MixedSystem& system) {
         plastic = start;
         std::vector<FrictionPoint> plastic_friction = fresh;
         for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
-        run(plastic, plastic_friction, impact_solver_, model);
+        hit_exactly(plastic, joints, plastic_friction, model);
         double low = 0.0, high = 1.0;
         std::vector<Vec6> blend(before.size());
         auto mix = [&](double s) {

@@ -14,7 +14,9 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
         const int body = first ? block.first : block.second;
         if (body < 0) continue;
         const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
-        for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
+        Vec6 x = jacobian;
+        solve_six(factor_six(system.mass[body]), x);
+        own += dot(jacobian, x);
     }
     return own;
 }

@@ -259,6 +259,9 @@ private:
     double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
                        FrictionModel model, const std::vector<char>* answered = nullptr);
+    void share_blow(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& who) const;
+    void hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
+                     FrictionModel model);
     void after_impact(const MixedSystem& system);
     void mark_held(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "contacts/friction_acceleration.hpp"
 #include "contacts/friction_sweeps.hpp"
@@ -13,6 +14,8 @@ namespace spook {
 namespace {
 
 constexpr double settled = 1e-10;  // of the largest normal impulse
+constexpr double exact = 1e-14;    // the same: an answer that another round would not better
+constexpr double falling = 0.1;    // of the residual before: worth another round
 constexpr double loosest = 1e-6;
 constexpr double reluctance =
     0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
@@ -194,12 +197,18 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     Acceleration acceleration;
     double accepted = settled;
     int lost = 0;
+    struct Answer {
+        MixedSystem system;
+        std::vector<FrictionPoint> points;
+        FrictionReport report;
+    };
+    std::optional<Answer> answer;  // accepted; the next round may find it to rounding
     std::vector<double> used(points.size()), given(points.size());
     if (model == FrictionModel::cone) solver.round_limit = effort.pivots;
     for (int round = 0; round < effort.rounds; ++round) {
         for (const FrictionPoint& point : points)
             bound_rows(system.rows[point.block], point, point.coefficient * std::max(0.0, point.normal));
-        if (!solve(same_matrix)) return false;
+        if (!solve(same_matrix) && !answer) return false;
         same_matrix = true;
 
         // Contradicting rigid contacts leave residuals that no round removes: ask less after 25 rounds.
@@ -219,7 +228,7 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             if (model == FrictionModel::cone && point.size == 2) {
                 const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
                 const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
-                                          accepted * point.coefficient * largest, reluctant, system.velocity);
+                                          exact * point.coefficient * largest, reluctant, system.velocity);
                 residual = std::max(residual, law.residual);
                 if (law.moved) same_matrix = false;
             }
@@ -227,7 +236,18 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             given[k] = point.normal = now;
         }
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
-        if (report.residual <= accepted && report.converged) return true;
+        const bool is_answer = report.residual <= accepted && report.converged;
+        if (is_answer && report.residual <= exact) return true;
+        if (answer && !(is_answer && report.residual <= falling * answer->report.residual)) {
+            if (!is_answer || report.residual > answer->report.residual) {
+                const int rounds = report.rounds, pivots = report.pivots;
+                system = std::move(answer->system), points = std::move(answer->points);
+                report = answer->report;
+                report.rounds = rounds, report.pivots = pivots;
+            }
+            return true;
+        }
+        if (is_answer) answer.emplace(Answer{system, points, report});
         lost = report.converged ? 0 : lost + 1;
         if (lost >= effort.lost) break;
         if (points.empty() || model == FrictionModel::box) {
@@ -237,6 +257,11 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         if (round < plain_rounds) continue;
         const std::vector<double> next = acceleration.next(used, given);
         for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
+    }
+    if (answer) {  // the last round's
+        points = std::move(answer->points);
+        report = answer->report;
+        return true;
     }
     report.converged = false;
     return false;
@@ -277,7 +302,8 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     MixedSystem start = system, best;
     const std::vector<FrictionPoint> start_points = points;
     report.residual = unbounded;
-    for (int turn = 0; turn <= sweep_turns && !(report.residual <= near); ++turn) {
+    const bool few = start.rows.size() <= few_blocks;
+    for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : near)); ++turn) {
         if (turn > 0) report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
         const ConeReport found = direct.newton.solve(system, points);
         report.rounds += found.iterations;
@@ -286,10 +312,11 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
             best = system;
         }
     }
-    system = best;
+    system = std::move(best);
     for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
     report.converged = report.residual <= fair;
-    if (!points.empty() && start.rows.size() <= few_blocks) {
+    if (!points.empty() && few) {
+        MixedSystem newton = system;
         FrictionReport polished;
         const bool settled = settle_by_rounds(system, points, model, direct.pivot, polish, polished);
         report.rounds += polished.rounds;
@@ -299,7 +326,7 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
             report.converged = true;
             return true;
         }
-        system = std::move(best);
+        system = std::move(newton);
         points = start_points;
         for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
     }

@@ -28,13 +28,14 @@ struct DirectSolver {
 /// s_2 + (|s|/(mu nu)) beta_2 = 0, a softness. The first slip is the one predicted without constraints,
 /// D(v + h M⁻¹ f); then the one of the last solve. A fixed point obeys the disc exactly: no direction is preferred.
 /// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
-/// 25 rounds tenfold more every five, at most 1e-6), or after `max_rounds`;
-/// then Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
+/// 25 rounds tenfold more every five, at most 1e-6), and go on while each leaves a tenth of that, down to 1e-14: where
+/// points are redundant, little in a bound is much in how they share their load. After `max_rounds` without an answer
+/// Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// Systems of contacts alone under the cone, or of more than 24 blocks without friction, get a few of these rounds,
 /// which settle exactly what rests or slides on; where they failed they wait, up to 16 solves. What is left goes to
-/// Newton's method (`contacts/cone_newton.hpp`), where that ends beyond 1e-5 of the speeds to 100 sweeps and Newton's
-/// method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best within 1e-4 of the speeds
-/// is the answer, and converged within 1e-9; else sweeps finish.
+/// Newton's method (`contacts/cone_newton.hpp`), where that ends beyond 1e-5 of the speeds (up to 24 blocks: 1e-9) to
+/// 100 sweeps and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best
+/// within 1e-4 of the speeds is the answer, and converged within 1e-9; else sweeps finish.
 /// On return FrictionPoint::normal is the normal impulse.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);

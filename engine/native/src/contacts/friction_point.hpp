@@ -42,7 +42,7 @@ struct RowsResidual {
     double residual = 0.0;
     int row = 0;  // index into MixedSystem::rows
 };
-/// About (G M⁻¹ Gᵀ + Sig) of one row: the scale between an impulse and a velocity, off-diagonal inertia left out.
+/// G M⁻¹ Gᵀ + Sig of one row: the scale between an impulse and a velocity.
 double own_inertia(const MixedSystem& system, const RowBlock& block, int i);
 
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
