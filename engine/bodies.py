@@ -11,6 +11,9 @@ from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.shapes import Plane, Shape
 from spook_tracker.engine.time_functions import TimeFunction
 
+WIDEST_FRICTION = (
+    1e6  # times, between friction along a direction and across it: a thousand for a pair of surfaces
+)
 WORLD = "world"  # the name that stands for the fixed world at one end of a constraint
 
 
@@ -39,8 +42,19 @@ class Material:
 
     Two surfaces combine: friction by the geometric mean, restitution, rolling and torsional friction by the larger,
     compliance by the sum. Viscous friction, a force c times the slip, is a slip_compliance of 1/c under a friction that
-    is never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
+    never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
     a blow that returns.
+
+    Friction may differ with the direction, as it does along a grain, on a blade or on a board with grooves: then
+    `friction` is along `friction_direction`, a direction of the body, and `friction_across` across it; both are
+    multiplied with the other surface's as usual, and only one of two surfaces that touch may have a direction. With the
+    normal force N, the slip v and its part v_d along the direction, friction takes the power
+    N √(µ_d² v_d² + µ_a² (v² − v_d²)) from what slips, the most that any force does whose parts along and across obey
+    (f_d/µ_d)² + (f_a/µ_a)² <= N²; while nothing slips the force is any inside that ellipse. So it lies on the ellipse,
+    normal to it along −v: not opposite to the slip, but it never does positive work. The same holds where the
+    direction leaves the surface; where it is normal to it, friction is `friction_across` all round. The friction models
+    box and scaled_box take the ellipse's rectangle. A slip_compliance is that of the direction of lower friction; in the
+    other one it is less, by the square of the ratio of both.
     """
 
     friction: float = 0.0  # Coulomb's mu, 1
@@ -50,6 +64,8 @@ class Material:
     slip_compliance: float = 0.0  # gamma, m/(N s): creep speed per tangential force
     rolling_friction: float = 0.0  # m: largest torque against rolling, over the normal force
     torsional_friction: float = 0.0  # m: largest torque against turning on the spot, over the normal force
+    friction_direction: Vector | None = None  # body axes; None: the same friction in all directions
+    friction_across: float | None = None  # Coulomb's mu across friction_direction, 1
 
     def __post_init__(self) -> None:
         for name in ("friction", "compliance", "slip_compliance", "rolling_friction", "torsional_friction"):
@@ -60,6 +76,31 @@ class Material:
         object.__setattr__(self, "restitution", restitution)
         if self.damping is not None:
             object.__setattr__(self, "damping", check.not_negative("material", "damping", self.damping))
+        if self.friction_direction is not None or self.friction_across is not None:
+            self._check_direction()
+
+    def _check_direction(self) -> None:
+        if self.friction_direction is None or self.friction_across is None:
+            given, other = (
+                ("friction_across", "friction_direction")
+                if self.friction_direction is None
+                else ("friction_direction", "friction_across")
+            )
+            raise SceneError(f"material: {given} says nothing without {other}; give both")
+        direction = check.direction("material", "friction_direction", self.friction_direction)
+        across = check.positive("material", "friction_across", self.friction_across)
+        if max(across, self.friction) > WIDEST_FRICTION * min(across, self.friction):
+            raise SceneError(
+                f"material: friction {self.friction:g} along and {across:g} across are too far apart; neither may be "
+                f"more than {WIDEST_FRICTION:g} times the other"
+            )
+        object.__setattr__(self, "friction_direction", direction)
+        object.__setattr__(self, "friction_across", across)
+
+    @property
+    def oriented(self) -> bool:
+        """Whether friction differs with the direction."""
+        return self.friction_across is not None and self.friction_across != self.friction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

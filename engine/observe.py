@@ -17,8 +17,9 @@ Quantities (per sample)                         shape            unit
   ContactForce (body, other or all)             (3,)             N, on `body`, sum over the contact points
   ContactCount, Penetration                     ()               1; largest penetration depth, m
   ContactPoints (most)                          (most, 10)       place [m], normal onto the first body of the pair,
-                                                                 force [N] on that body, coefficient of friction [1];
-                                                                 in order of bodies, NaN where there are fewer points
+                                                                 force [N] on that body, coefficient of friction [1],
+                                                                 along its direction if it has one; in order of
+                                                                 bodies, NaN where there are fewer points
   JointCoordinate (joint)                       ()               m or rad, free coordinate of an axial joint;
                                                                  a hinge counts its turns
 

@@ -180,6 +180,8 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "compliance of a surface"
     if body.material.rolling_friction or body.material.torsional_friction:
         yield "friction of rolling or turning"
+    if body.material.oriented:
+        yield "friction that differs with the direction"
     if any(body.surface_velocity):
         yield "a surface that moves along itself"
 

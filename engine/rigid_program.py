@@ -189,6 +189,8 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "rolling_friction": 0.0,
         "torsional_friction": 0.0,
         "surface_velocity": _ORIGIN,
+        "friction_across": 0.0,
+        "friction_direction": _ORIGIN,
     }
     if isinstance(body, Particle):
         return columns
@@ -209,6 +211,8 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "rolling_friction": material.rolling_friction,
         "torsional_friction": material.torsional_friction,
         "surface_velocity": body.surface_velocity,
+        "friction_across": material.friction_across if material.oriented else 0.0,
+        "friction_direction": material.friction_direction if material.oriented else _ORIGIN,
     }
 
 

@@ -77,6 +77,29 @@ class Scene:
         for force in self.forces:
             self._check_force(force, known)
         object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
+        self._check_directions()
+
+    def _check_directions(self) -> None:
+        """One ellipse of friction meets any surface; two that cross have no law that is generally agreed on."""
+        oriented = [
+            body
+            for body in self.bodies
+            if isinstance(body, RigidBody) and body.shape is not None and body.material.oriented
+        ]
+        if len(oriented) < 2 or not self.contacts:
+            return
+        apart = {frozenset(pair) for pair in self.no_contact}
+        apart |= {
+            frozenset(end for end in joint.between if isinstance(end, str))
+            for joint in self.constraints
+            if isinstance(joint, Distance | Joint)
+        }
+        for one, two in itertools.combinations(oriented, 2):
+            if "dynamic" in (one.motion, two.motion) and frozenset((one.name, two.name)) not in apart:
+                raise SceneError(
+                    f"rigid bodies {one.name!r} and {two.name!r} may touch, and the friction of both has a direction; "
+                    "leave it to one of them, or list them in no_contact"
+                )
 
     @staticmethod
     def _check_relation(relation: Relation, joints: Mapping[str, Constraint]) -> None:

@@ -85,7 +85,7 @@ def test_every_stage_has_its_reason() -> None:
 
     choices = engine.explain(scene, time_step=TIME_STEP)
 
-    assert len(choices) == 25
+    assert len(choices) == 26
     assert all(choice.reason for choice in choices)
 
 

@@ -2,6 +2,7 @@
 #include <random>
 
 #include "contact_world.hpp"
+#include "contacts/disc.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -204,10 +205,42 @@ void a_sliding_ball_begins_to_roll() {
     EXPECT_NEAR(world.bodies[1].spin.y * r, 15.0 / 7.0, 1e-9);
 }
 
+/// Random parts of up to a million between both scales: nothing slips inside the disc, at its edge the slip is opposite.
+void the_least_on_a_disc_obeys_the_law() {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> any(-1.0, 1.0), power(-3.0, 3.0);
+    double worst = 0.0;
+    int inside = 0, at_edge = 0;
+    for (int k = 0; k < 20000; ++k) {
+        const double p = std::pow(10.0, power(random)), r = std::pow(10.0, power(random));
+        const double own[3] = {p, 0.99 * any(random) * std::sqrt(p * r), r};
+        const double b1 = any(random), b2 = any(random), s1 = 10.0 * any(random), s2 = any(random);
+        const double bound = std::pow(10.0, power(random));
+        double z1 = 0.0, z2 = 0.0;
+        least_on_disc(own, b1, b2, s1, s2, bound, z1, z2);
+        const double t1 = s1 + own[0] * (z1 - b1) + own[1] * (z2 - b2),
+                     t2 = s2 + own[1] * (z1 - b1) + own[2] * (z2 - b2);
+        const double reach = std::hypot(z1, z2), slip = std::hypot(t1, t2);
+        const double speeds = std::hypot(s1, s2) + (own[0] + own[2]) * (reach + std::hypot(b1, b2));
+        const bool edge = reach > 0.999999 * bound;
+        ++(edge ? at_edge : inside);
+        worst =
+            std::max({worst, reach / bound - 1.0,
+                      (edge ? std::hypot(t1 + slip * z1 / reach, t2 + slip * z2 / reach) : slip) / speeds});
+    }
+    EXPECT(inside > 1000 && at_edge > 1000);
+    EXPECT_NEAR(worst, 0.0, 1e-13);
+    double z1 = 1.0, z2 = 1.0;
+    const double own[3] = {1.0, 0.0, 1.0};
+    least_on_disc(own, 1.0, 1.0, 0.0, 0.0, 0.0, z1, z2);
+    EXPECT(z1 == 0.0 && z2 == 0.0);
+}
+
 }  // namespace
 
 int main() {
     the_cone_is_round();
+    the_least_on_a_disc_obeys_the_law();
     it_sticks_below_and_slips_above();
     boxes_are_anisotropic();
     slip_compliance_creeps();

@@ -107,8 +107,10 @@ void ContactStage::impact(MixedSystem& system) {
         for (int i = 0; i < block.size; ++i) pushed_by_motion = pushed_by_motion || block.right[i] != 0.0;
         block.right[0] += std::max(0.0, -point.bounce * point.approach);
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
-        if (block.size == 3)
+        if (block.size == 3) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.material.friction, 0.0, -1.0});
+            friction.back().stretched = point.is_stretched();
+        }
         hit.rows.push_back(block);
         who.push_back(k);
     }

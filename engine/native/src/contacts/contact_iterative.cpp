@@ -24,7 +24,9 @@ void ContactStage::hand_over() {
         row.first = unknown_[point.contact.first];
         row.second = unknown_[point.contact.second];
         row.normal = point.contact.point.normal;
-        row.tangent = point.tangent;
+        row.tangent = point.stretch[0] * point.tangent;
+        row.across = point.stretch[1] * cross(row.normal, point.tangent);
+        row.stretched = point.is_stretched();
         row.first_arm = point.first_arm;
         row.second_arm = point.second_arm;
         row.softness = regularise(material.compliance, material.damping, h).softness;
@@ -32,9 +34,9 @@ void ContactStage::hand_over() {
         row.friction = material.friction;
         row.normal_before = point.before;
         row.impulse[0] = std::max(0.0, point.before);
-        std::copy_n(point.tangent_before, 2, row.impulse + 1);
+        for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangent_before[i] / point.stretch[i];
         if (conveys_ || row.first < 0 || row.second < 0) {
-            const Vec3 directions[3] = {row.normal, row.tangent, cross(row.normal, row.tangent)};
+            const Vec3 directions[3] = {row.normal, row.tangent, row.across};
             for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
             for (int i = 1; i < 3; ++i) row.right[i] -= carried(point, directions[i]);
         }
@@ -119,7 +121,8 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
             for (double& z : impulse)
                 z *= share[std::max(unknown_[point.contact.first], unknown_[point.contact.second])];
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
-        record(system, point, impulse[0], impulse[1] * point.tangent + impulse[2] * across);
+        record(system, point, impulse[0],
+               (impulse[1] * point.stretch[0]) * point.tangent + (impulse[2] * point.stretch[1]) * across);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;

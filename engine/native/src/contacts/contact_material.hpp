@@ -17,17 +17,26 @@ struct SurfaceMaterial {
     double rolling = 0.0;          // rho, m: the torque that rolling meets, over the normal force
     double torsional = 0.0;        // sigma, m: the same of turning about the normal
     Vec3 surface_velocity;  // of the surface along itself, body axes, m/s; a body's own, never combined
+    double friction_across = 0.0;  // mu across `direction`, where there is one; along it is `friction`
+    Vec3 direction;  // unit, body axes; zero: the same friction in all directions; never combined
 
+    bool is_oriented() const noexcept { return dot(direction, direction) > 0.0; }
     bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }
 };
 
 /// Friction by the geometric mean, restitution, damping, rolling and torsional friction by the larger, compliances by
 /// the sum.
 inline SurfaceMaterial combined(const SurfaceMaterial& a, const SurfaceMaterial& b) noexcept {
-    return {std::sqrt(a.friction * b.friction),    std::max(a.restitution, b.restitution),
-            a.compliance + b.compliance,           std::max(a.damping, b.damping),
-            a.slip_compliance + b.slip_compliance, std::max(a.rolling, b.rolling),
-            std::max(a.torsional, b.torsional),    {}};
+    return {std::sqrt(a.friction * b.friction),
+            std::max(a.restitution, b.restitution),
+            a.compliance + b.compliance,
+            std::max(a.damping, b.damping),
+            a.slip_compliance + b.slip_compliance,
+            std::max(a.rolling, b.rolling),
+            std::max(a.torsional, b.torsional),
+            {},
+            0.0,
+            {}};
 }
 
 }  // namespace spook

@@ -220,6 +220,7 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie
         row.second = unknown_[lap.contact.second];
         row.normal = lap.contact.point.normal;
         row.tangent = lap.tangent;
+        row.across = cross(row.normal, row.tangent);
         row.first_arm = lap.first_arm;
         row.second_arm = lap.second_arm;
         row.right[0] = parting_speed(lap, again);

@@ -33,6 +33,7 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     }
     for (const SurfaceMaterial& material : materials_) {
         conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
+        oriented_ = oriented_ || material.is_oriented();
         resists_turning_ = resists_turning_ || material.resists_turning();
     }
     const std::size_t bodies = unknown_.size();
@@ -75,8 +76,8 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
     block.first = unknown_[contact.first];
     block.second = unknown_[contact.second];
     block.size = std::min(rows, 3);
-    const Vec3 directions[3] = {contact.point.normal, point.tangent,
-                                cross(contact.point.normal, point.tangent)};
+    const Vec3 directions[3] = {contact.point.normal, point.stretch[0] * point.tangent,
+                                point.stretch[1] * cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
@@ -112,7 +113,10 @@ void ContactStage::add_friction(const Point& point, int block, std::vector<Frict
     const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
     const bool solved = point.solved && options_.friction != FrictionModel::box;
     const double normal = solved ? point.normal : point.before;
-    if (material.friction > 0.0) friction.push_back({block, material.friction, soft, normal});
+    if (material.friction > 0.0) {
+        friction.push_back({block, material.friction, soft, normal});
+        friction.back().stretched = point.is_stretched();
+    }
     if (material.rolling > 0.0) friction.push_back({block, material.rolling / scale, 0.0, normal, 3, 2});
     if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
 }
@@ -215,7 +219,8 @@ RowBlock ContactStage::resting_row(Point& point) const {
     if (material.friction > 0.0) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
         for (int i = 1; i <= 2; ++i)
-            block.multiplier[i] = point.solved ? point.tangents[i - 1] : point.tangent_before[i - 1];
+            block.multiplier[i] =
+                (point.solved ? point.tangents[i - 1] : point.tangent_before[i - 1]) / point.stretch[i - 1];
     }
     for (int i = 3; i < block.size; ++i)
         block.multiplier[i] = point.solved ? point.turning[i - 3] : point.turning_before[i - 3];
@@ -316,7 +321,7 @@ ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point
     touch.impulse = normal * n + along + point.impact_impulse;
     touch.tangent[0] = dot(along, point.tangent);
     touch.tangent[1] = dot(along, cross(n, point.tangent));
-    touch.friction = point.material.friction;
+    touch.friction = point.stretch[0] * point.material.friction;
     touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
     return touch;
 }

@@ -159,11 +159,11 @@ public:
         Vec3 impulse;                    // on the first body, impact and resting, N s
         double normal = 0.0;             // nu of the resting stage, N s
         double impact = 0.0;             // normal impulse of the impact, N s
-        double tangent[2] = {0.0, 0.0};  // of the resting stage along world tangents, for a warm start
+        double tangent[2] = {0.0, 0.0};  // of the resting stage along the tangents, for a warm start
         double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
         double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
         double pressed = 0.0;            // how far its bodies have pressed it in by the step's end, m
-        double friction = 0.0;           // mu of the pair
+        double friction = 0.0;           // mu of the pair, along its direction if it has one
         bool active = false;             // pushes, or closed
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
@@ -214,22 +214,24 @@ private:
     struct Point {
         Contact contact;  // of a strike: where it will touch, the gap along that normal
         SurfaceMaterial material;
-        Vec3 first_arm, second_arm;  // from the centres of mass, m
-        Vec3 tangent;                // first tangent along world axes, unit
-        double strike = -1.0;        // when it touches within the step, s; negative if the pair is closed
-        bool event = false;          // acts at that time, not at the start of the step
-        double meeting_gap = 0.0;    // then, m: other points of the pair may still be open
-        double approach = 0.0;       // C v, m/s, negative when closing
-        double push = 0.0;           // C (free velocity − v), m/s, negative when pressed together
-        double bounce = -1.0;        // psi' if the point takes part in the impact, else −1
-        double rounding = 0.0;       // approaches slower than this are none, m/s
-        double before = -1.0;        // normal impulse of the step before, −1 if the point is new
+        Vec3 first_arm, second_arm;      // from the centres of mass, m
+        Vec3 tangent;                    // first tangent along world axes or the material's direction, unit
+        double stretch[2] = {1.0, 1.0};  // of the tangents' rows: what makes an ellipse of friction a disc
+        double strike = -1.0;            // when it touches within the step, s; negative if the pair is closed
+        bool event = false;              // acts at that time, not at the start of the step
+        double meeting_gap = 0.0;        // then, m: other points of the pair may still be open
+        double approach = 0.0;           // C v, m/s, negative when closing
+        double push = 0.0;               // C (free velocity − v), m/s, negative when pressed together
+        double bounce = -1.0;            // psi' if the point takes part in the impact, else −1
+        double rounding = 0.0;           // approaches slower than this are none, m/s
+        double before = -1.0;            // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
         double parting_before = 0.0, pressed_before = 0.0;
         bool solved = false;  // in an earlier round of this step: these start the next
         double normal = 0.0, tangents[2] = {0.0, 0.0}, turning[3] = {0.0, 0.0, 0.0};
         double impact = 0.0;
         Vec3 impact_impulse;
+        bool is_stretched() const noexcept { return stretch[0] != stretch[1]; }
     };
     struct OpenPair {  // apart at the start of the step; they may still meet
         IndexPair pair;
@@ -238,6 +240,7 @@ private:
         double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
     };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
+    void orient(Point& point, const Pose& first, const Pose& second) const;
     void find_open();
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
@@ -310,6 +313,7 @@ private:
     std::vector<IndexPair> joints_;
     std::vector<char> jointed_;  // bodies with rows of joints
     bool conveys_ = false;       // some surface moves along itself
+    bool oriented_ = false;      // some surface has a friction that differs with the direction
     bool resists_turning_ = false;
     std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;

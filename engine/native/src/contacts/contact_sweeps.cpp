@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "contacts/contact_geometry.hpp"
+#include "contacts/disc.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
@@ -77,7 +78,8 @@ int ContactSweeps::add(const SweepContact& given) {
     c.second = given.second >= 0 ? given.second : bodies_;
     c.normal = given.normal;
     c.tangent = given.tangent;
-    c.across = cross(given.normal, given.tangent);
+    c.across = given.across;
+    c.stretched = given.stretched;
     c.first_arm = given.first_arm;
     c.second_arm = given.second_arm;
     std::copy_n(given.right, 3, c.right);
@@ -103,9 +105,11 @@ int ContactSweeps::add(const SweepContact& given) {
     c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
     c.coupling[0] = part(1, 0);
     c.coupling[1] = part(2, 0);
-    c.slip[0] = inverse_mass + part(1, 1) + c.slip_softness;
+    const double along = c.stretched ? dot(c.tangent, c.tangent) : 1.0,
+                 across = c.stretched ? dot(c.across, c.across) : 1.0;
+    c.slip[0] = inverse_mass * along + part(1, 1) + c.slip_softness;
     c.slip[1] = part(1, 2);
-    c.slip[2] = inverse_mass + part(2, 2) + c.slip_softness;
+    c.slip[2] = inverse_mass * across + part(2, 2) + c.slip_softness;
     const double largest = 0.5 * (c.slip[0] + c.slip[2]) + length(0.5 * (c.slip[0] - c.slip[2]), c.slip[1]);
     c.step = largest > 0.0 ? 1.0 / largest : 0.0;
     if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
@@ -200,7 +204,8 @@ double ContactSweeps::update(Contact& c) noexcept {
         if (model_ == FrictionModel::cone) {
             double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
             const double reach = length(z1, z2);
-            if (reach > bound) z1 *= bound / reach, z2 *= bound / reach;
+            if (c.stretched) least_on_disc(c.slip, b1, b2, s1, s2, bound, z1, z2);
+            else if (reach > bound) z1 *= bound / reach, z2 *= bound / reach;
             d1 = z1 - b1, d2 = z2 - b2;
             change = std::max(change, length(d1, d2) / c.step);
         } else {

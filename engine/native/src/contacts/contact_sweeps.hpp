@@ -13,15 +13,16 @@ namespace spook {
 /// One contact as the sweeps take it. The rows are C v₊ + Sig nu >= right[0] ⟂ nu >= 0 along the normal, and
 /// friction against the slip D v₊ + (gamma/h) beta − right[1 … 2] along the tangents.
 struct SweepContact {
-    int first = -1, second = -1;  // moving bodies, −1 for one that does not move
-    Vec3 normal, tangent;         // unit; the second tangent is their product
-    Vec3 first_arm, second_arm;   // from the centres of mass, m
-    double right[3] = {0, 0, 0};  // m/s
-    double softness = 0.0;        // Sig
-    double slip_softness = 0.0;   // gamma/h
-    double friction = 0.0;        // mu
+    int first = -1, second = -1;   // moving bodies, −1 for one that does not move
+    Vec3 normal, tangent, across;  // orthogonal; unit, but the tangents of a friction that is stretched
+    Vec3 first_arm, second_arm;    // from the centres of mass, m
+    double right[3] = {0, 0, 0};   // m/s
+    double softness = 0.0;         // Sig
+    double slip_softness = 0.0;    // gamma/h
+    double friction = 0.0;         // mu
     double normal_before = -1.0;  // nu of the step before, what the box bounds friction by; negative: unknown
     double impulse[3] = {0, 0, 0};  // nu, beta: the start, then the result
+    bool stretched = false;         // see FrictionPoint
 };
 
 /// A contact costs one reading of its two bodies and one writing per sweep: the relative velocity at the point
@@ -62,6 +63,7 @@ private:
         double coupling[2];       // between normal and tangents
         double slip[3];           // (t, t), (t, u), (u, u), with gamma/h
         double step;              // 1/lambda_max of the tangents' part
+        bool stretched;
     };
     struct Inertia {
         double inverse_mass = 0.0;

@@ -9,7 +9,7 @@
 
 namespace spook {
 
-/// cone: |beta| <= mu nu, isotropic. box: each |beta_i| <= mu nu of the step before, tangents along world axes.
+/// cone: |beta| <= mu nu, isotropic but for what ContactStage::orient() stretches. box: each |beta_i| <= mu nu of the step before, tangents along world axes.
 /// scaled_box: the box with the normal force of this step.
 SPOOK_NAMED_ENUM(FrictionModel, cone, box, scaled_box)
 
@@ -21,6 +21,8 @@ struct FrictionPoint {
     double slip_softness = 0.0;  // gamma / h, of both tangent rows
     double normal = -1.0;        // nu of the step before; then of this step, N s; negative: unknown
     int row = 1, size = 2;       // which rows: two obey a disc (or box), one an interval
+    bool stretched =
+        false;  // the two rows differ in scale: their own part is solved exactly, not by projection
 };
 
 struct FrictionReport {

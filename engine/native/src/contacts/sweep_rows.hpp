@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "contacts/disc.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/pivot_solver.hpp"
 #include "linear/elementary.hpp"
@@ -203,7 +204,12 @@ private:
         double d1 = b1 - step * residual(block, one);
         double d2 = b2 - step * residual(block, two);
         const double reach = length(d1, d2);
-        if (reach > bound) d1 *= bound / reach, d2 *= bound / reach;
+        if (point.stretched) {
+            const double own[3] = {one.own, schur(one, two), two.own};
+            least_on_disc(own, b1, b2, residual(block, one), residual(block, two), bound, d1, d2);
+        } else if (reach > bound) {
+            d1 *= bound / reach, d2 *= bound / reach;
+        }
         one.multiplier = d1;
         two.multiplier = d2;
         push(block, one, d1 - b1);

@@ -48,6 +48,7 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
             case Stage::impact:
             case Stage::tangents:
             case Stage::friction:
+            case Stage::orient_friction:
             case Stage::move_surfaces:
             case Stage::roll: return leave_out(no_contacts);
             case Stage::apply_gravity:

@@ -11,7 +11,7 @@ namespace {
 
 /// What the choice of a stage depends on.
 struct Facts {
-    bool joints, bounded, contacts, rubbing, conveying, rolling, iterative, turning, moving, loaded;
+    bool joints, bounded, contacts, rubbing, oriented, conveying, rolling, iterative, turning, moving, loaded;
     int with_surface = 0;
 };
 
@@ -25,6 +25,7 @@ Facts facts_of(const RigidScene& scene) {
         dynamic.push_back(body.motion == Motion::dynamic);
         facts.with_surface += surface[i];
         rubbing += surface[i] && body.material.friction > 0.0;
+        facts.oriented = facts.oriented || (surface[i] && body.material.is_oriented());
         facts.conveying = facts.conveying || (surface[i] && !is_zero(body.material.surface_velocity));
         facts.rolling = facts.rolling || (surface[i] && body.material.resists_turning());
         facts.moving = facts.moving || body.motion != Motion::fixed;
@@ -37,6 +38,7 @@ Facts facts_of(const RigidScene& scene) {
                                 [](const JointSpec& joint) { return can_let_go(joint); });
     facts.contacts = Detection(scene.colliders, dynamic, scene.no_contact).possible();
     facts.rubbing = facts.contacts && rubbing >= 2;
+    facts.oriented = facts.rubbing && facts.oriented;
     facts.conveying = facts.rubbing && facts.conveying;
     facts.rolling = facts.contacts && facts.rolling;
     facts.iterative = scene.method.solver == SolverKind::iterative && (facts.joints || facts.contacts);
@@ -119,6 +121,10 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                               : no_rows);
             case Stage::friction:
                 return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
+            case Stage::orient_friction:
+                return choose_if(
+                    is.oriented, "a surface has another friction along it than across",
+                    is.rubbing ? "every surface has the same friction in all directions" : smooth);
             case Stage::move_surfaces:
                 return choose_if(is.conveying, "a surface moves along itself and takes along what rubs on it",
                                  is.rubbing ? "no surface moves along itself" : smooth);

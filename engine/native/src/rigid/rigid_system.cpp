@@ -79,6 +79,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             dynamic.push_back(spec.motion == Motion::dynamic);
             materials.push_back(spec.material);
             if (!stages_.runs(Stage::friction)) materials.back().friction = 0.0;
+            if (!stages_.runs(Stage::orient_friction)) materials.back().direction = {};
             if (!stages_.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
             if (!stages_.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
         }
@@ -106,8 +107,10 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     const bool joints = !scene.joints.empty();
     if (stages_.take(Stage::collision)) {
         stages_.take(Stage::impact);
-        if (stages_.take(Stage::tangents) && stages_.take(Stage::friction))
+        if (stages_.take(Stage::tangents) && stages_.take(Stage::friction)) {
+            stages_.take(Stage::orient_friction);
             stages_.take(Stage::move_surfaces);
+        }
         stages_.take(Stage::roll);
     }
     const bool wires = stages_.take(Stage::rub_wires), tyres = stages_.take(Stage::roll_tyres);
