@@ -56,6 +56,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "conveyor": "conveyor",
     "turntable": "turntable",
     "rolling_friction": "rolling_friction",
+    "grain": "grain",
     "masonry_arch": "masonry_arch",
     "vehicle": "vehicle",
     "suspension": "suspension",

@@ -13,6 +13,7 @@ from scipy.optimize import linprog
 from spook_tracker.engine import RigidBody
 from spook_tracker.scalar_tests import (
     card_house,
+    grain,
     hanging_cable,
     masonry_arch,
     rocking_block,
@@ -32,6 +33,49 @@ def test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn() -> None:
     assert found == pytest.approx(math.atan(turn) / turn - 1.0, rel=1e-9)
     assert found == pytest.approx(-(turn**2) / 3.0, rel=1e-4)
     assert CATALOGUE["turntable"].measurements[0].metrics[0].passes(found)
+
+
+def test_friction_on_a_grain_dissipates_most_and_ends_where_integration_does() -> None:
+    g = grain
+    angles = np.linspace(0.0, 2.0 * math.pi, 20001)
+    allowed = np.stack([g.ALONG * np.cos(angles), g.ACROSS * np.sin(angles)])  # times the load
+    for slip in ((1.0, 0.0), (0.3, -0.8), (-0.2, 0.01)):
+        after = g.slid(slip, 0.01)
+        force = (np.array(after) - slip) / 0.01
+        assert force @ after == pytest.approx((np.array(after) @ allowed).min(), rel=1e-7)
+
+    def slide(_: float, state: np.ndarray) -> list[float]:
+        v, a = state[2:]
+        by = g.GRAVITY / math.hypot(g.ALONG * v, g.ACROSS * a)
+        return [v, a, -by * g.ALONG**2 * v, -by * g.ACROSS**2 * a]
+
+    def rests(_: float, state: np.ndarray) -> float:
+        return math.hypot(state[2], state[3]) - 1e-6
+
+    rests.terminal = True  # type: ignore[attr-defined]
+    run = solve_ivp(slide, (0.0, 5.0), (0.0, 0.0, *g.THROW), "DOP853", events=rests, rtol=1e-12, atol=1e-14)
+    assert run.status == 1 and run.t[-1] < 1.4
+    np.testing.assert_allclose(run.y[:2, -1], g.stop(), atol=1e-10)
+
+
+def test_a_slow_slide_on_a_grain_is_known_as_well_as_the_solver_stops() -> None:
+    """A corner's own inverse mass along both stretched rows, times its bound: what its friction does to its slip."""
+    g = grain
+    x, y, z = (0.5 * edge for edge in g.EDGE)
+    inertia = [g.MASS / 3.0 * (b * b + c * c) for b, c in ((y, z), (x, z), (x, y))]
+    rows = [np.cross((x, y, -z), axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+    own = [1.0 / g.MASS + float(row @ (row / inertia)) for row in rows]
+    low = min(g.ALONG, g.ACROSS)
+    stretched = (g.ALONG / low) ** 2 * own[0] + (g.ACROSS / low) ** 2 * own[1]
+    reach = stretched * low * g.MASS * g.GRAVITY * g.TIME_STEP / 4.0
+    slowest = min(math.hypot(*g.drift(g.SLIDES * g.least_slope(way), way)) for way in g.WAYS)
+    open_by = (
+        1e-10 * reach * max(g.ALONG, g.ACROSS) * g.GRAVITY * sum(1.0 / n for n in range(1, 31)) / slowest
+    )
+    (metric,) = [m for _, m in CATALOGUE["grain"].metrics() if m.name == "slide_error"]
+
+    assert reach == pytest.approx(0.16, abs=0.005)
+    assert isinstance(metric.limit, float) and open_by < metric.limit < 2.0 * open_by
 
 
 @pytest.mark.parametrize("motion", [rolling_coin.COIN, rolling_coin.DISK])
