@@ -55,6 +55,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "robot_arm": "robot_arm",
     "conveyor": "conveyor",
     "turntable": "turntable",
+    "sorting": "sorting",
     "rolling_friction": "rolling_friction",
     "grain": "grain",
     "masonry_arch": "masonry_arch",

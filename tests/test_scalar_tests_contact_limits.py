@@ -18,6 +18,7 @@ from spook_tracker.scalar_tests import (
     masonry_arch,
     rocking_block,
     rolling_coin,
+    sorting,
     turntable,
     vehicle,
 )
@@ -56,6 +57,36 @@ def test_friction_on_a_grain_dissipates_most_and_ends_where_integration_does() -
     run = solve_ivp(slide, (0.0, 5.0), (0.0, 0.0, *g.THROW), "DOP853", events=rests, rtol=1e-12, atol=1e-14)
     assert run.status == 1 and run.t[-1] < 1.4
     np.testing.assert_allclose(run.y[:2, -1], g.stop(), atol=1e-10)
+
+
+def test_lanes_and_thrown_boxes_of_the_sorters_by_integration() -> None:
+    """Ways of the method's own steps go to the closed form and to a tight integration; its circle grows as is said."""
+    s = sorting
+    for friction in s.SORTS:
+        coarse, fine = (s.ride(0.0, s.SLIP, friction, 0.0, h, round(2.0 / h))[-1] for h in (1e-3, 5e-4))
+        assert 2.0 * fine - coarse == pytest.approx(s.lane(friction), abs=1e-6)
+        assert coarse - s.lane(friction) == pytest.approx(-0.5e-3 * s.SLIP, abs=2e-6)
+
+    friction, start = s.SHARES[0] * s.LEAST, complex(s.RADIUS)
+
+    def slide(_: float, state: np.ndarray) -> list[float]:
+        x, v = complex(state[0], state[1]), complex(state[2], state[3])
+        slip = v - 1j * s.RATE * x
+        by = -friction * s.GRAVITY * (slip / abs(slip) if slip else 1.0)  # it begins outwards
+        return [v.real, v.imag, by.real, by.imag]
+
+    time = s.TABLE_STEP * s.TABLE_STEPS
+    run = solve_ivp(
+        slide, (0.0, time), (s.RADIUS, 0.0, 0.0, s.RATE * s.RADIUS), "DOP853", rtol=1e-10, atol=1e-12
+    )
+    places = [s.ride(start, 1j * s.RATE * start, friction, s.RATE, time / n, n)[-1] for n in (4000, 8000)]
+    assert 2.0 * places[1] - places[0] == pytest.approx(complex(*run.y[:2, -1]), abs=1e-6)
+
+    grown = abs(1.0 + 1j * s.RATE * s.TABLE_STEP) ** s.TABLE_STEPS - 1.0
+    assert grown == pytest.approx(0.009, abs=5e-4) and grown < min(x for x in s.SHARES if x > 1.0) - 1.0
+    (study,) = CATALOGUE["sorting"].stability
+    assert study.expected is not None
+    assert study.expected[1] / s.LEAST == pytest.approx((1.0 + grown) ** 0.5 + 1e-3, abs=5e-4)
 
 
 def test_a_slow_slide_on_a_grain_is_known_as_well_as_the_solver_stops() -> None:
