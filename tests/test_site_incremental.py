@@ -10,6 +10,10 @@ from msgspec.structs import replace
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.library import record
+from spook_tracker.tracker.store.database import session_on
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.remove import remove
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import DocumentHistory, engine
 from tests.test_tracker_one_judge import night, one
@@ -79,6 +83,38 @@ def test_what_changed_is_written_again(
     publish(DocumentHistory(after), anew, levels)
 
     assert files(grown) == files(anew)
+
+
+def test_what_a_team_says_of_its_site_is_written_again(tmp_path: Path) -> None:
+    grown, anew = tmp_path / "grown", tmp_path / "anew"
+    said = {"title": "Another name", "home_page": "https://example.org/engine"}
+    publish(DocumentHistory(NIGHTS), grown)
+    publish(DocumentHistory(NIGHTS), grown, **said)
+    publish(DocumentHistory(NIGHTS), anew, **said)
+
+    assert files(grown) == files(anew)
+
+
+def test_a_database_that_grew_and_shrank_gives_the_site_of_what_it_holds(tmp_path: Path) -> None:
+    """Night by night, a run removed, put back with another value, and one more night: each time as from nothing."""
+    url, grown = f"sqlite:///{tmp_path / 'tracker.db'}", tmp_path / "grown"
+
+    def published(step: str) -> None:
+        with History.open(url) as history:
+            publish(history, grown)
+            publish(history, tmp_path / step)
+        assert files(grown) == files(tmp_path / step), step
+
+    for number, run in enumerate(NIGHTS[:-1]):
+        record(run, url)
+        published(f"night {number}")
+    with session_on(url) as session:
+        remove(session, History(session).run(NIGHTS[LATE].id))
+    published("removed")
+    record(corrected(LATE, 0.31)[LATE], url)
+    published("put back with another value")
+    record(NIGHTS[-1], url)
+    published("one more night")
 
 
 def test_the_first_bad_run_imported_late_is_blamed_on_the_page_of_comparisons(tmp_path: Path) -> None:

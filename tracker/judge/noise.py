@@ -14,10 +14,9 @@ median of the last nights against those at the last release, and is red until ha
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from statistics import median
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from spook_tracker.tracker.judge.shifts import (
     BASE,
@@ -57,8 +56,7 @@ LONGER = 2  # times its longest visit, and it is no visit any more
 State = Literal["green", "detected", "accepted", "recovered", "suspected"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Noisy:
+class Noisy(NamedTuple):
     """One night's verdict; `against`, `first_bad`, `last_good` are places in the sequence."""
 
     verdict: Verdict
@@ -83,7 +81,7 @@ def judge_noisy(
     accepted = accepted or [False] * len(values)
     found = [walk.night(place, releases[place], accepted[place]) for place in range(len(values))]
     levels = [*walk.levels[1:], walk.usual_now()] if found else []
-    return [replace(night, usual=after) for night, after in zip(found, levels, strict=True)]
+    return [night._replace(usual=after) for night, after in zip(found, levels, strict=True)]
 
 
 @dataclass
@@ -115,6 +113,7 @@ class _Walk:
     levels: list[Usual] = field(default_factory=list)  # before each night
     _told: tuple[list[int], Usual] | None = None  # what was asked last, of which nights
     _known_spread: tuple[list[int], tuple[float, float]] | None = None
+    _known_anchor: tuple[list[int], float | None] | None = None
 
     def usual_now(self) -> Usual:
         """The level, and what stands clear of it for the worse."""
@@ -388,16 +387,25 @@ class _Walk:
         level = base - np.polyval(np.polyfit(nights, base, 1), nights)
         return math.sqrt(2.0) * standard_error(level, CREEP) if remembered(level) else 0.0
 
+    def _anchored(self) -> float | None:
+        """The middle of the nights at the last release, None of too few."""
+        if self._known_anchor is None or self._known_anchor[0] is not self.anchor:
+            self._known_anchor = self.anchor, self._middle(self.anchor)
+        return self._known_anchor[1]
+
+    def _middle(self, places: Sequence[int]) -> float | None:
+        finite = [self.values[i] for i in places if math.isfinite(self.values[i])]
+        return median(finite) if len(finite) >= CREEP else None
+
     def _creep(self) -> Verdict | None:
         """Drift against the last release, where both ends have nights enough."""
-        recent = [self.values[i] for i in self.usual[-CREEP:] if math.isfinite(self.values[i])]
-        old = [self.values[i] for i in self.anchor if math.isfinite(self.values[i])]
-        if len(recent) < CREEP or len(old) < CREEP:
+        old, recent = self._anchored(), self._middle(self.usual[-CREEP:])
+        if old is None or recent is None:
             return None
         _, threshold = self.usual_now()
-        change = worse_by(median(old), median(recent), self.larger_is_better)
+        change = worse_by(old, recent, self.larger_is_better)
         enough = min(threshold, 0.5 * self.crept) if self.crept else threshold
-        if change <= enough or (not self.crept and change * median(old) <= self._wanders()):
+        if change <= enough or (not self.crept and change * old <= self._wanders()):
             self.crept = 0.0
             return None
         self.crept = max(self.crept, change)
@@ -407,12 +415,24 @@ class _Walk:
 
 def _outermost(reached: Sequence[float]) -> list[float]:
     """The largest two, the largest first."""
-    return sorted(reached)[:-3:-1]
+    if len(reached) < 2:
+        return list(reached)
+    largest = max(reached)
+    rest = list(reached)
+    rest.remove(largest)
+    return [largest, max(rest)]
+
+
+def median(values: Iterable[float]) -> float:
+    """The middle value, of an even number the mean of the middle two; of at least one, none of them NaN."""
+    ordered = sorted(values)
+    half, odd = divmod(len(ordered), 2)
+    return ordered[half] if odd else (ordered[half - 1] + ordered[half]) / 2
 
 
 def _level_and_noise(values: Sequence[float]) -> tuple[float, float]:
     """The median, and the relative standard deviation that the median deviation from it tells."""
-    finite = [value for value in values if math.isfinite(value)]
+    finite = values if all(map(math.isfinite, values)) else list(filter(math.isfinite, values))
     level = median(finite) if finite else math.inf
     if level in (0.0, math.inf):
         return level, 0.0

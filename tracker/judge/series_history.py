@@ -132,12 +132,16 @@ def judge_history(
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
-    names = list(map(lane, history))
-    if len(set(names)) == 1:  # mostly
-        return [list(range(len(names)))]
+    known: dict[
+        tuple[str, int], list[int]
+    ] = {}  # few machines and definitions: a name each, not one each night
     lanes: dict[Hashable, list[int]] = {}
-    for place, name in enumerate(names):
-        lanes.setdefault(name, []).append(place)
+    for place, night in enumerate(history):
+        facts = night.test_version, id(night.run.machine)
+        places = known.get(facts)
+        if places is None:
+            places = known[facts] = lanes.setdefault(lane(night), [])
+        places.append(place)
     return list(lanes.values())
 
 
@@ -288,7 +292,7 @@ def _repeats(before: Point, after: Point) -> bool:
     old, new = before.sample, after.sample
     return (old is new and old.value == new.value) or (
         old.value == new.value
-        and same_bits(before.value, after.value)
+        and same_bits(old.value, new.value)
         and old.outcome == new.outcome
         and old.set_point_held == new.set_point_held
         and (old.state_hash == new.state_hash or "" in (old.state_hash, new.state_hash))
@@ -386,12 +390,12 @@ def _judge_times(
         )
         for i, noisy in enumerate(verdicts):
             if noisy.state in ("detected", "suspected") and is_read_off(definition):
-                noisy = replace(
-                    noisy, verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
+                noisy = noisy._replace(
+                    verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
                 )
             if more := taken_again(lane[i]):
-                noisy = replace(
-                    noisy, verdict=replace(noisy.verdict, sentence=f"{noisy.verdict.sentence}{more}")
+                noisy = noisy._replace(
+                    verdict=replace(noisy.verdict, sentence=f"{noisy.verdict.sentence}{more}")
                 )
             own = standing(definition, lane[i].sample)
             stands: Class = "accepted" if noisy.state == "accepted" else own

@@ -9,10 +9,13 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
+from array import array
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from spook_tracker.tracker.document.json_form import boxed, builtins
+from spook_tracker.tracker.document.json_form import boxed, encode
+from spook_tracker.tracker.document.outside import escaped
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 
@@ -153,22 +156,29 @@ def _night_line(night: Night) -> list[Any]:
 def test_json(book: Book, test: TestHistory) -> bytes:
     """Everything about one test: its card, and each series with its definition and all values."""
     whole = {
-        "test": builtins(test.card),
+        "test": test.card,
         "nights": [
             {"run": n.id, "started": n.started, "version": n.engine.version, "git_hash": n.engine.git_hash}
             for n in book.nights
         ],
         "series": [
             {
-                "definition": builtins(t.definition),
+                "definition": t.definition,
                 "nights": t.nights,
-                "values": [boxed(v) for v in t.values],
+                "values": _as_json(t.values),
                 "outcomes": t.outcomes,
-                "newest": builtins(t.latest) if t.latest else None,
+                "newest": t.latest,
             }
             for t in test.trends
         ],
-        "figures": builtins(test.figures),
-        "maps": builtins(test.maps),
+        "figures": test.figures,
+        "maps": test.maps,
     }
-    return json.dumps(whole, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
+    return escaped(encode(whole).decode()).encode()
+
+
+def _as_json(values: Sequence[float]) -> Sequence[float | str]:
+    """Many values as JSON carries them; nearly always all are finite, which one sum tells."""
+    if math.isfinite(sum(values)):
+        return array("d", values).tolist()
+    return [boxed(value) for value in values]

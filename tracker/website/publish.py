@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -225,7 +226,7 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
 def _facts(test: TestHistory) -> dict[str, Any]:
     """What the files of a test are made from."""
     trends = [
-        [t.definition, t.nights, list(map(repr, t.values)), t.outcomes, t.held[-1:], t.latest]
+        [t.definition, t.nights, array("d", t.values).tobytes(), t.outcomes, t.held[-1:], t.latest]
         for t in test.trends
     ]
     return {"card": test.card, "trends": trends, "figures": test.figures, "maps": test.maps}
