@@ -21,7 +21,7 @@ help:
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
-	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava if they are installed"
+	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava"
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
@@ -92,8 +92,11 @@ mutants-tonight: develop
 mutation: develop
 	$(BIN)/python bench/mutation.py
 
-detectors: develop
-	$(BIN)/python bench/detectors.py --page docs/detectors.md
+# asv and Otava stand in an environment of their own: Otava pins its NumPy.
+detectors:
+	$(PYTHON) -m venv build/detectors
+	build/detectors/bin/pip install -q msgspec asv==0.6.6 apache-otava==0.8.0
+	PYTHONPATH=. build/detectors/bin/python bench/detectors.py --page docs/detectors.md
 
 aa: develop
 	$(BIN)/python bench/aa.py

@@ -4,8 +4,8 @@ Synthetic noise and steps (tests/noise_battery.py), and histories that continuou
 published (tests/data/recorded: each file says whose, at which commit). Alarms are starts of red stretches after
 sixty nights of learning; the other tools see each history whole, which favours them, and a step of theirs counts
 where it is upward and above 5 %, asv's own threshold for a regression. Delays are of night after night for all.
-asv and apache-otava are asked where they are installed (asv with NumPy, Otava 0.8 pins its own: another
-environment will do). `--page FILE` writes the tables as Markdown.
+asv and apache-otava are asked where they are installed; `make detectors` puts them into an environment of their own,
+for Otava pins its NumPy. `--page FILE` writes the tables as Markdown, with the versions that answered.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -62,6 +63,12 @@ def detectors() -> dict[str, Detector]:
     if find_spec("otava"):
         found["Otava"] = otava
     return found
+
+
+def others() -> str:
+    """The other tools that are installed, with their versions."""
+    known = {"asv": "asv", "otava": "apache-otava"}
+    return ", ".join(f"{tool} {version(tool)}" for module, tool in known.items() if find_spec(module))
 
 
 def alarms(detect: Detector, histories: Sequence[Sequence[float]]) -> tuple[int, int]:
@@ -165,7 +172,8 @@ def main() -> None:
     lines = [
         "# Detectors of slower run times, scored", "",
         "Made by `make detectors`, not by hand; what is counted stands at the head of `bench/detectors.py`,",
-        f"the noise in `tests/noise_battery.py`. {given.series} series of {NIGHTS} nights of each kind.", "",
+        f"the noise in `tests/noise_battery.py`. {given.series} series of {NIGHTS} nights of each kind.",
+        *([f"Beside ours: {others()}."] if len(found) > 1 else []), "",
         *false_alarms(found, given.series), *steps(found, 2 * given.series), *recorded(found, given.recorded),
     ]  # fmt: skip
     print("\n".join(lines))

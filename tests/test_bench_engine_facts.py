@@ -43,10 +43,40 @@ def column(place: int) -> dict[str, float]:
 def test_joint_coordinates_with_semi_implicit_euler_explode_on_the_chain_to_a_240th_of_a_second() -> None:
     for place in (0, 1):
         gain = column(place)
-        for name in ("mujoco (defaults)", "drake (sap)", "dart (joints)", "pybullet (joints)"):
+        for name in JOINT_COORDINATES:
             assert gain[name] > 1e3, name
         assert gain["mujoco (rk4)"] < 1.0
         assert gain["spook (plain)"] < 1.0
+
+
+JOINT_COORDINATES = {"mujoco (defaults)", "drake (sap)", "dart (joints)", "pybullet (joints)"}
+
+
+def test_the_page_says_what_its_table_of_kinds_shows() -> None:
+    """Each sentence above the table, asked of every setting in it."""
+    for place in (0, 1):
+        gain = column(place)
+        bounded = gain.keys() - JOINT_COORDINATES - {"exudyn (generalised-alpha)", "drake (rk3)"}
+        assert len(bounded) >= 10
+        assert all(gain[name] < 0.5 for name in bounded)
+    assert column(0)["drake (rk3)"] == float("inf")
+    assert column(1)["exudyn (generalised-alpha)"] > 0.5
+    split = column(2)
+    assert all(uneven >= 1.0 for name, uneven in split.items() if name != "spook (plain)")
+    assert max(split.values()) > 3.0
+    sag = column(3)
+    held = {name for name, fallen in sag.items() if fallen < 1.0}
+    assert held == {
+        "spook (plain)", "dart (joints)", "dart (constraints)", "drake (sap)", "mujoco (rk4)",
+        "mujoco (defaults)", "pybullet (joints)",
+    }  # fmt: skip
+    assert all(sag[name] < 2e-3 for name in held - {"pybullet (joints)"})
+    assert 0.06 < sag["pybullet (joints)"] < 0.075
+    assert all(sag[name] >= 1.2 for name in sag.keys() - held)
+    creep = column(4)
+    stands = {name for name, way in creep.items() if way < 1e-4}
+    assert stands == {"spook (plain)", "cannon (accurate)", "jolt (many-iterations)", "jolt (defaults)"}
+    assert max(creep, key=creep.__getitem__) == "mujoco (defaults)"
 
 
 def test_two_engines_split_the_doors_load_unevenly() -> None:
