@@ -25,7 +25,7 @@ constexpr double behind = 10.0, slow = 0.1;      // of the blur, and of itself: 
 constexpr double far = 1e-3;                     // a residual, of the speeds, from which the path may crawl
 constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
 constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
-constexpr int max_jumps = 10;                    // without half the residual
+constexpr int max_jumps = 2;                     // without half the least they met
 constexpr int max_losses = 3;                    // of the path, sought again,
 constexpr double good_enough = 1e-5;  //   unless jumps left a residual so small: few find less then
 constexpr double back = 10.0;         //   so many blurs away
@@ -327,6 +327,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     keep();
     double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
     int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
+    double least = unbounded;                         // residual of this row of jumps, m/s
     near_ = nearest, hold_ = loosest_hold;
     Left before = best;
     const double goal = best.speed > known * speed_ ? tightest * speed_ : unbounded;
@@ -357,11 +358,17 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         blur = found.blur;
         const bool lost =
             stalled >= (best.speed > far * speed_ ? long_patience : patience) || found.length < narrow;
-        if (lost && best.speed <= near_enough * speed_) break;
-        if (jumps >= 0 ? ++jumps < max_jumps || stalled == 0 : !lost) continue;
+        if ((lost || stalled > 1) && best.speed <= near_enough * speed_) break;
+        if (jumps < 0 && !lost) continue;
         if (jumps < 0 && met > 0.0) {
             jumps = 0, blur = 0.0;
+            least = unbounded;
             continue;
+        }
+        if (jumps >= 0) {
+            jumps = left.speed < 0.5 * least ? 0 : jumps + 1;
+            least = std::min(least, left.speed);
+            if (jumps < max_jumps) continue;
         }
         if (best.speed <= good_enough * speed_) break;
         // Begin anew, further from the end and more carefully.
