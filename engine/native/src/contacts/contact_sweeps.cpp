@@ -220,9 +220,30 @@ double ContactSweeps::update(Contact& c) noexcept {
     return change;
 }
 
+/// Asks for what the items behind this one will read: in large heaps bodies come from far away.
+void ContactSweeps::fetch(int item) const noexcept {
+    const auto ask = [](const auto& what) {
+        constexpr std::size_t line = 64;
+        const char* const at = reinterpret_cast<const char*>(&what);
+        for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
+    };
+    const int next = next_[item];
+    if (next < 0) return;
+    if (next >= joint_count_) {
+        const Contact& c = contacts_[next - joint_count_];
+        for (const int body : {c.first, c.second}) {
+            ask(joints_.velocity()[body]);
+            ask(inertia_[body]);
+        }
+    }
+    const int after = next_[next];
+    if (after >= joint_count_) ask(contacts_[after - joint_count_]);
+}
+
 double ContactSweeps::sweep_island(int island) noexcept {
     double change = 0.0;
     for (int item = head_[island]; item >= 0; item = next_[item]) {
+        fetch(item);
         const double own = item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
                                                : update(contacts_[item - joint_count_]);
         if (!(own <= change)) change = own;  // what is not a number stays
@@ -239,6 +260,7 @@ double ContactSweeps::sweep_hot(int island, int stamp, double focus) noexcept {
             if (!(own <= change)) change = own;
             continue;
         }
+        fetch(item);
         Contact& c = contacts_[item - joint_count_];
         if (stamp > 1 && hot_[c.first] < stamp - 1 && hot_[c.second] < stamp - 1) continue;
         const double own = update(c);

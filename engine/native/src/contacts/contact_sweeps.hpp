@@ -75,6 +75,7 @@ private:
     int root(int body) noexcept;
     void link(int item, int first, int second);
     void chain(int item);
+    void fetch(int item) const noexcept;
     double sweep_island(int root) noexcept;
     double sweep_hot(int root, int stamp, double focus) noexcept;
 
