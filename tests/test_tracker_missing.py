@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from spook_tracker.tracker.document.run_document import Asked
 from spook_tracker.tracker.judge.accepted import Accepted, read_accepted
-from spook_tracker.tracker.judge.lane import elsewhere, line_of
+from spook_tracker.tracker.judge.lane import RECENT, SPARSE, elsewhere, histories, line_of
 from spook_tracker.tracker.judge.tonight import tonight
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import DocumentHistory, sample, series
@@ -50,6 +50,27 @@ def test_a_value_that_its_test_no_longer_gives_is_missing_that_night() -> None:
 
     assert found(runs[:2])[COMPANION.key] == ("missing", True, True)
     assert found(runs)[COMPANION.key][:2] == ("identical", False)
+
+
+LONG = RECENT + 3 * SPARSE  # nights: of the first, one in so many is looked at closely
+
+
+def nights_of(runs: list[Any], key: str) -> list[str]:
+    return [point.run.id for point in histories(DocumentHistory(runs), runs)[key].points]
+
+
+def test_a_history_with_a_missing_value_stays_in_its_order_however_long_it_is() -> None:
+    """Of runs that do not say what they were asked for."""
+    runs = [both(n) for n in range(LONG)]
+    runs[-5] = night(LONG - 5, [*one(0.5), (GATE, sample(GATE, 0.5))])
+
+    assert nights_of(runs, COMPANION.key) == [run.id for run in runs]
+
+
+def test_a_gate_is_not_missed_before_it_was_there() -> None:
+    runs = [night(n, one(0.5)) if n < SPARSE + 3 else both(n) for n in range(LONG)]
+
+    assert nights_of(runs, GATE.key) == [run.id for run in runs[SPARSE + 3 :]]
 
 
 def test_a_run_of_some_tests_misses_nothing_of_the_others() -> None:

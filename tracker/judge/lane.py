@@ -136,19 +136,27 @@ def histories(
     looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
     recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
+    known: dict[
+        int, tuple[Any, Samples]
+    ] = {}  # of a stored run: its run here (None: not of this line), its evidence
+    nothing: Samples = {}
     for key, stored in records.series(keys, evidence=False).items():
         points = []
         for point in stored.points:
-            run = place.get(point.run.id)
+            here = known.get(id(point.run))
+            if here is None:
+                run = place.get(point.run.id)
+                here = known[id(point.run)] = run, nothing if run is None else recent.get(run.id, nothing)
+            run, evidence = here
             if run is None:
                 continue
-            evidence = recent[run.id].get(key) if run.id in recent else None
-            if evidence is not None or run is not point.run:
-                point = Point(run, evidence[1] if evidence else point.sample, point.test_version)
-            points.append(point)
+            if key in evidence:
+                points.append(Point(run, evidence[key][1], point.test_version))
+            else:
+                points.append(point if run is point.run else Point(run, point.sample, point.test_version))
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
-    found = with_missing(found, [run for run in runs if run.id in recent or _says(run)], recent)
+    found = with_missing(found, runs, recent)
     return found | run_times(found) | work(looked_at, recent, tests)
 
 
@@ -205,10 +213,12 @@ def with_missing(
     What a run was asked for it stores. Of a run that does not say (recorded by an earlier tracker, or by another
     tool), it is taken to be every value of the tests and families (values, sweep, stability) it measured, and for
     a nightly the whole catalogue. If the whole catalogue was asked, a gate whose test is gone is removed, not
-    forgotten. What is read off the clock is not missed: a machine may be too busy for it.
+    forgotten. What is read off the clock is not missed: a machine may be too busy for it. A run that neither says
+    nor is among the measured is not asked.
     """
     place = {run.id: i for i, run in enumerate(runs)}
     ids = [run.id for run in runs]
+    telling = [i for i, run in enumerate(runs) if run.id in measured or _says(run)]
 
     @cache
     def asked(i: int) -> dict[str, set[str]]:
@@ -222,8 +232,8 @@ def with_missing(
             continue
         points = list(series.points)
         answered = {point.run.id for point in points}
-        first = place.get(points[0].run.id, -1)
-        silent = [i for i in range(first + 1, len(runs)) if ids[i] not in answered]
+        first = place[points[0].run.id]
+        silent = [i for i in telling if i > first and ids[i] not in answered]
         for i in silent:
             if runs[i].engine.name != points[0].run.engine.name:
                 continue
@@ -239,8 +249,7 @@ def with_missing(
             )
             points.append(Point(runs[i], lost, definition.test_version))
         if len(points) > len(series.points):
-            order = {point.run.id: i for i, point in enumerate(series.points)}
-            points.sort(key=lambda p: (place.get(p.run.id, -1), order.get(p.run.id, -1)))
+            points.sort(key=lambda point: place[point.run.id])
         told[key] = SeriesHistory(definition, tuple(points))
     return told
 
