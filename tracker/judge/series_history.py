@@ -193,7 +193,12 @@ def _judge_values(
         if lent is not None and lent[1].over(night_of(night.run)):
             level, lent, calm = lent[0], None, None  # what was lent is due: the old level counts again
             release = settled = level
-        if calm is not None and level is not None and _repeats(level, night):
+        sample = night.sample
+        if (
+            calm is not None
+            and level is not None
+            and ((sample is level.sample and sample.value == sample.value) or _repeats(level, night))
+        ):
             yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
             level = night
             if is_release(night.run):
@@ -290,7 +295,7 @@ def red_class(own: Class, sample: Sample) -> Class:
 def _repeats(before: Point, after: Point) -> bool:
     """The same bits of the same state under the same definition: nothing to judge. Both are of one lane."""
     old, new = before.sample, after.sample
-    return (old is new and old.value == new.value) or (
+    return (
         old.value == new.value
         and same_bits(old.value, new.value)
         and old.outcome == new.outcome

@@ -123,7 +123,9 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
     found: dict[str, Marks] = {}
     for key, series in told.items():
         timed = series.definition.kind == "time" and not is_read_off(series.definition)
-        for judged in series.nights:
+        for judged in (
+            series.nights if timed else [night for night in series.nights if night.state == "detected"]
+        ):
             usual = None
             if timed and judged.usual is not None:
                 level, threshold = judged.usual

@@ -90,16 +90,16 @@ def _nearest(test: TestHistory, book: Book) -> Row:
     return shown
 
 
-def counts_by_night(book: Book) -> list[Count]:
-    """Limits and set points, night by night."""
-    pairs: list[list[Any]] = [[] for _ in book.nights]
+def counts_by_night(book: Book, most: int) -> dict[int, Count]:
+    """Limits and set points of so many nights, the newest, by the index of the night."""
+    pairs: dict[int, list[Any]] = {night.index: [] for night in book.nights[-most:]}
     for test in book.tests:
         for trend in test.trends:
             if expected(trend.definition):
-                for night, judged in zip(trend.nights, trend.told.nights, strict=True):
-                    if judged.night.sample.outcome != "missing":
+                for night, judged in zip(trend.nights[-most:], trend.told.nights[-most:], strict=True):
+                    if night in pairs and judged.night.sample.outcome != "missing":
                         pairs[night].append((trend.definition, judged.night.sample))
-    return [count(of_night) for of_night in pairs]
+    return {night: count(found) for night, found in pairs.items()}
 
 
 def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:

@@ -131,7 +131,7 @@ def compare(told: Comparisons, book: Book) -> Page:
 def versions(book: Book) -> Page:
     """What ran where."""
     nights = list(reversed(book.nights))
-    counts = counts_by_night(book)
+    counts = counts_by_night(book, MOST_NIGHTS)
     machines = Counter(night.machine for night in book.nights)
     context = {
         "nights": [
