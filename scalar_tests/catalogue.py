@@ -59,6 +59,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "rolling_friction": "rolling_friction",
     "grain": "grain",
     "masonry_arch": "masonry_arch",
+    "stone_bridge": "stone_bridge",
     "vehicle": "vehicle",
     "suspension": "suspension",
     "cornering": "cornering",

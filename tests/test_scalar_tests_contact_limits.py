@@ -19,6 +19,7 @@ from spook_tracker.scalar_tests import (
     rocking_block,
     rolling_coin,
     sorting,
+    stone_bridge,
     turntable,
     vehicle,
 )
@@ -152,16 +153,17 @@ def test_the_loads_of_a_braking_vehicle_balance_its_moments() -> None:
     assert rear > 0.0 and pytest.approx(0.19e-6, rel=0.02) == v.SINK
 
 
-def arch_statics(count: int, thickness: float, *, round_stones: bool = False) -> tuple[float, float] | None:
-    """The least and largest thrust over the weight of an arch without sliding; None if no thrust line fits.
+def ring_balance(
+    joints: list[float], thickness: float, *, round_stones: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Three balances a stone of a ring of mean radius 1 m, and their right sides, in areas of stone.
 
-    Two forces a joint, at its inner and outer edge, none of them pulling; three balances a stone.
+    Two forces a joint, at its inner and outer edge, each along the ring and along the radius. `joints` are angles from x.
     """
-    joints = [math.pi * k / count for k in range(count + 1)]
+    count, half = len(joints) - 1, 0.5 * (joints[1] - joints[0])
     inner, outer = 1.0 - 0.5 * thickness, 1.0 + 0.5 * thickness
     balance, load = np.zeros((3 * count, 4 * (count + 1))), np.zeros(3 * count)
     for k in range(count):
-        half = 0.5 * math.pi / count
         # Centre of mass on the bisector: of a sector of a ring, or of the trapezium between its joints.
         if round_stones:
             area = (outer**2 - inner**2) * half
@@ -180,14 +182,29 @@ def arch_statics(count: int, thickness: float, *, round_stones: bool = False) ->
                     balance[3 * k : 3 * k + 2, column] = sign * force
                     balance[3 * k + 2, column] = sign * (arm[0] * force[1] - arm[1] * force[0])
         load[3 * k + 1] = area
-    push = np.zeros(balance.shape[1])
-    push[[1, 3]] = 1.0  # along the radius at the first foot: level
-    bounds = [(0.0, None), (None, None)] * (2 * (count + 1))
+    return balance, load
+
+
+def thrusts(balance: np.ndarray, load: np.ndarray, level: float) -> tuple[float, float] | None:
+    """The least and largest thrust without sliding, none of the edges pulling; None if no thrust line fits. `level` is the
+    angle of the first joint [rad]: its forces' level parts are the thrust."""
+    edges = balance.shape[1] // 2
+    push = np.zeros(2 * edges)
+    push[[0, 2]], push[[1, 3]] = -math.sin(level), math.cos(level)
+    bounds = [(0.0, None), (None, None)] * edges
     ends = [linprog(side * push, A_eq=balance, b_eq=load, bounds=bounds) for side in (1.0, -1.0)]
     if any(end.status != 0 for end in ends):
         return None
-    thrusts = sorted(abs(end.fun) / load.sum() for end in ends)
-    return thrusts[0], thrusts[1]
+    found = sorted(abs(end.fun) for end in ends)
+    return found[0], found[1]
+
+
+def arch_statics(count: int, thickness: float, *, round_stones: bool = False) -> tuple[float, float] | None:
+    """The least and largest thrust over the weight of a semicircle without sliding; None if no thrust line fits."""
+    joints = [math.pi * k / count for k in range(count + 1)]
+    balance, load = ring_balance(joints, thickness, round_stones=round_stones)
+    found = thrusts(balance, load, 0.0)
+    return found and (found[0] / load.sum(), found[1] / load.sum())
 
 
 def least_thickness(count: int, *, round_stones: bool = False) -> float:
@@ -207,6 +224,51 @@ def test_an_arch_is_as_thin_as_limit_analysis_allows() -> None:
         assert masonry_arch.LEAST[count] == pytest.approx(least_thickness(count), abs=5e-7)
         thrust = arch_statics(count, 1.02 * masonry_arch.LEAST[count])
         assert thrust == pytest.approx(masonry_arch.THRUST[count], abs=2e-5)
+
+
+def bridge_limit(shares: dict[int, float]) -> tuple[float, float]:
+    """The largest load over the weight, shared so by the stones, and the steepest force in a joint then: sliding over
+    pressing."""
+    b = stone_bridge
+    balance, load = ring_balance(b.joints()[::-1], b.THICKNESS)
+    column = np.zeros(len(load))
+    for stone, share in shares.items():
+        column[3 * (b.STONES - 1 - stone) + 1] = -share * load.sum()
+    edges = balance.shape[1] // 2
+    whole = np.column_stack([balance, column])
+    aim = np.append(np.zeros(2 * edges), -1.0)
+    found = linprog(aim, A_eq=whole, b_eq=load, bounds=[(0.0, None), (None, None)] * edges + [(0.0, None)])
+    assert found.status == 0
+    forces = found.x[:-1].reshape(-1, 2, 2).sum(axis=1)
+    return -float(found.fun), float(np.abs(forces[:, 1] / forces[:, 0]).max())
+
+
+def test_a_bridge_carries_what_limit_analysis_allows() -> None:
+    b = stone_bridge
+    for stone, known in b.LIMIT.items():
+        limit, steepest = bridge_limit({stone: 1.0})
+        assert known == pytest.approx(limit, abs=5e-7)
+        assert bridge_limit({b.STONES - 1 - stone: 1.0})[0] == pytest.approx(limit, rel=1e-9)
+        assert steepest < 0.4 * b.FRICTION  # nothing slides
+    for stone, known in b.THRUST.items():
+        balance, load = ring_balance(b.joints()[::-1], b.THICKNESS)
+        asked = load.copy()
+        asked[3 * (b.STONES - 1 - stone) + 1] += b.LESS * b.LIMIT[stone] * load.sum()
+        found = thrusts(balance, asked, b.joints()[-1])
+        assert found is not None
+        assert np.array(found) / load.sum() == pytest.approx(known, abs=2e-5)
+        edges = balance.shape[1] // 2
+        for joint in range(b.STONES + 1):  # no joint is pressed by more than weight and load
+            press = np.zeros(2 * edges)
+            press[[4 * joint, 4 * joint + 2]] = -1.0
+            most = linprog(press, A_eq=balance, b_eq=asked, bounds=[(0.0, None), (None, None)] * edges)
+            assert most.status == 0 and -most.fun < asked.sum()
+    crossing = [
+        bridge_limit({stone: 1.0 - part, stone + 1: part})[0]
+        for stone in range(4)  # nearer to the keystone it carries more and more
+        for part in np.linspace(0.0, 1.0, 21)[:-1]
+    ]
+    assert min(crossing) == pytest.approx(b.LEAST, abs=5e-5) and min(b.LIMIT.values()) == b.LEAST
 
 
 def test_the_rocking_block_by_angular_momentum_and_a_tight_integration() -> None:
