@@ -77,6 +77,22 @@ def test_every_path_in_the_architecture_exists() -> None:
     assert missing == []
 
 
+def test_a_new_shape_and_a_new_joint_touch_the_files_that_are_said() -> None:
+    """The cone and the point on a line are found in those, and nowhere else in the engine."""
+    section = (ROOT / "CONTRIBUTING.md").read_text().split("## Add a shape or a joint")[1].split("\n## ")[0]
+    table, rest = section.split("\nThen put")
+    joints = rest.split("A joint that")[1]
+    shape = r"\b(Cone|cone_plane|Primitive cone)\b|ShapeKind::cone|Primitive::cone"
+    joint = r"\bPointOnLine\b|\bpoint_on_line\b"
+    sources = [*(ROOT / "engine").rglob("*.py"), *(ROOT / "engine/native/src").rglob("*.[ch]pp")]
+    for text, pattern, count in ((table, shape, 11), (joints, joint, 5)):
+        said = set(re.findall(r"`(engine/[\w./]+)`", text))
+        found = {
+            path.relative_to(ROOT).as_posix() for path in sources if re.search(pattern, path.read_text())
+        }
+        assert found == said and len(said) == count
+
+
 def test_every_module_says_what_it_is() -> None:
     without = [path.name for path in PYTHON_FILES if not ast.get_docstring(ast.parse(path.read_text()))]
 
