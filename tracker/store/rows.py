@@ -27,9 +27,21 @@ def json_of(part: Any) -> str:
     return encode(part).decode()
 
 
+_compressed: dict[
+    bytes, bytes
+] = {}  # by hash: figures of an engine that did not change are the same every night
+MOST_COMPRESSED = 512  # kept at a time
+
+
 def packed(part: Any) -> bytes:
     """Compressed JSON, for the bulky parts nobody queries."""
-    return zlib.compress(encode(part), 6)
+    content = encode(part)
+    name = hashlib.sha256(content).digest()
+    if name not in _compressed:
+        if len(_compressed) >= MOST_COMPRESSED:
+            del _compressed[next(iter(_compressed))]
+        _compressed[name] = zlib.compress(content, 6)
+    return _compressed[name]
 
 
 def unpacked(body: bytes, kind: type[Part]) -> Part:

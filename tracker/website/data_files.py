@@ -103,17 +103,22 @@ def ends(limit: float | tuple[float, float] | None, better: str) -> tuple[float 
 def history_csv(book: Book, test: TestHistory) -> bytes:
     """Scalars of one test over all nights: a line for each night, a column for each series."""
     shown = [t for t in test.trends if t.definition.kind != "ladder"]
-    return table(
-        ("started", "version", "git_hash", *(t.definition.key for t in shown)), _by_night(book.nights, shown)
-    )
+    columns = ("started", "version", "git_hash", *(t.definition.key for t in shown))
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\r\n")
+    writer.writerow(map(inert, columns))
+    writer.writerows(_by_night(book.nights, shown))
+    return out.getvalue().encode("utf-8", "replace")
 
 
-def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list[Any]]:
-    values = [dict(zip(t.nights, t.values, strict=True)) for t in trends]
-    for night in nights:
-        line = [found.get(night.index) for found in values]
-        if any(value is not None for value in line):
-            yield [night.started, night.engine.version, night.engine.git_hash, *line]
+def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list[str]]:
+    """The cells of each night in which any of these has a value; column by column, for there are many."""
+    facts = {n.index: [inert(n.started), inert(n.engine.version), inert(n.engine.git_hash)] for n in nights}
+    values = [dict(zip(t.nights, map(repr, t.values), strict=True)) for t in trends]
+    shown = set().union(*values)
+    for place, night in facts.items():
+        if place in shown:
+            yield night + [found.get(place, "") for found in values]
 
 
 def regressions(events: Sequence[Event]) -> Table:
