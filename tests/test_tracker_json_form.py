@@ -33,6 +33,18 @@ def test_equal_documents_are_equal_though_they_hold_nan() -> None:
     assert pickle.loads(pickle.dumps(line)) == line
 
 
+def test_many_numbers_are_read_at_once_and_stay_what_they_are() -> None:
+    back = decode('{"name": "c", "x": [1.5, -0.0], "y": [2, "nan", "-inf"], "style": "line"}', Curve)
+
+    assert back == Curve(name="c", x=(1.5, -0.0), y=(2.0, NAN, -math.inf), style="line")
+    assert math.copysign(1.0, back.x[1]) == -1.0
+    assert [type(value) for value in (*back.x, *back.y)] == [float, float, Number, Number, Number]
+    assert encode(back) == b'{"name":"c","x":[1.5,-0.0],"y":[2.0,"nan","-inf"],"style":"line"}'
+    assert pickle.loads(pickle.dumps(back)) == back
+    with pytest.raises(msgspec.DecodeError):
+        decode('{"name": "c", "x": 1.5, "y": [], "style": "line"}', Curve)
+
+
 @pytest.mark.parametrize(
     "told", ["null", "true", '"1.5"', '"infinity"', '"NaN"', "[]", "{}", "1e999", "1" + "0" * 400]
 )

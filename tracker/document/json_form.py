@@ -31,6 +31,12 @@ class Number(float):
 NAN: Number = float.__new__(Number, "nan")
 
 
+class Numbers(tuple[float, ...]):
+    """Many such numbers, read at once: a document has thousands. What is not finite is a `Number`."""
+
+    __slots__ = ()
+
+
 def boxed(number: float) -> float | str:
     """As JSON carries it."""
     if math.isfinite(number):
@@ -78,6 +84,10 @@ def plain(thing: Any) -> Any:
 
 
 def _read(kind: type, told: Any) -> Any:
+    if kind is Numbers and isinstance(told, (list, tuple)):
+        if {*map(type, told)} <= {float} and math.isfinite(sum(told)):  # nearly all: as they are
+            return Numbers(told)
+        return Numbers(_read(Number, one) for one in told)
     if type(told) is float and kind is Number and told == told:  # nearly all: a document has thousands
         return float.__new__(Number, told)
     if kind is Number and (told in SPECIAL if isinstance(told, str) else type(told) in (int, float)):
@@ -92,4 +102,6 @@ def schema_hook(kind: type) -> dict[str, Any]:
     """What the published schema says of a `Number`."""
     if kind is Number:
         return {"anyOf": [{"type": "number"}, {"enum": sorted(SPECIAL)}]}
+    if kind is Numbers:
+        return {"type": "array", "items": schema_hook(Number)}
     raise NotImplementedError(kind)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
 import msgspec
 
-from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.json_form import Number, Numbers
 
 SCHEMA_VERSION = 1
 
@@ -124,8 +124,8 @@ class Curve(Struct, frozen=True, kw_only=True):
     """One line of a figure."""
 
     name: Text
-    x: tuple[Number, ...]
-    y: tuple[Number, ...]
+    x: Numbers
+    y: Numbers
     style: Literal["line", "points", "both", "reference", "limit"]
 
 

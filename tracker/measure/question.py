@@ -26,7 +26,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityMap,
     StabilityStudy,
 )
-from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.json_form import Number, Numbers
 from spook_tracker.tracker.document.run_document import (
     Curve,
     FigureData,
@@ -243,8 +243,8 @@ def draw(name: str, figure: Figure, simulate: Simulate) -> FigureData:
         curves=tuple(
             Curve(
                 name=curve.name,
-                x=tuple(Number(x) for x in curve.x),
-                y=tuple(Number(y) for y in curve.y),
+                x=Numbers(Number(x) for x in curve.x),
+                y=Numbers(Number(y) for y in curve.y),
                 style=curve.style,
             )
             for curve in (drawing.curves if drawing else ())
