@@ -354,6 +354,15 @@ MUTANTS = (
         "material.rolling / scale",
         "0.97 * material.rolling / scale",
     ),
+    wrong(
+        "friction",
+        "against-the-slip",
+        "friction that differs with the direction acts more against the slip than the ellipse has it",
+        "grain",
+        "contacts/contact_detect.cpp",
+        "point.stretch[0] = along / point.material.friction;",
+        "point.stretch[0] = std::sqrt(along / point.material.friction);",
+    ),
     judged(
         "signed-errors",
         "an error is judged with its sign",

@@ -11,9 +11,7 @@ from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.shapes import Plane, Shape
 from spook_tracker.engine.time_functions import TimeFunction
 
-WIDEST_FRICTION = (
-    1e6  # times, between friction along a direction and across it: a thousand for a pair of surfaces
-)
+WIDEST_FRICTION = 1000.0  # times, between friction along a direction and across it: thirty for a pair
 WORLD = "world"  # the name that stands for the fixed world at one end of a constraint
 
 
@@ -53,7 +51,7 @@ class Material:
     (f_d/µ_d)² + (f_a/µ_a)² <= N²; while nothing slips the force is any inside that ellipse. So it lies on the ellipse,
     normal to it along −v: not opposite to the slip, but it never does positive work. The same holds where the
     direction leaves the surface; where it is normal to it, friction is `friction_across` all round. The friction models
-    box and scaled_box take the ellipse's rectangle. A slip_compliance is that of the direction of lower friction; in the
+    box and scaled_box take the ellipse's rectangle. Sweeps settle the slower the farther both are apart. A slip_compliance is that of the direction of lower friction; in the
     other one it is less, by the square of the ratio of both.
     """
 

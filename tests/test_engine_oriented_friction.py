@@ -95,7 +95,7 @@ def run(scene: Scene, steps: int, method: Method, body: str = "box") -> Any:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize(("along", "across"), [(0.5, 0.2), (0.2, 0.5), (0.5, 0.05), (0.3, 0.00031)])
+@pytest.mark.parametrize(("along", "across"), [(0.5, 0.2), (0.2, 0.5), (0.5, 0.05), (0.3, 0.0095)])
 @pytest.mark.parametrize("way", [0.9, 2.5])
 def test_a_box_drifts_down_a_slope_askew(solver: str, along: float, across: float, way: float) -> None:
     """From rest the way is straight, v = a t with a = g − N M a/√(a·M a), in every step of the method, too."""
@@ -290,7 +290,7 @@ def test_equal_coefficients_leave_every_bit() -> None:
         ({"friction_direction": (1, 0, 0), "friction_across": 0.0}, "friction_across"),
         ({"friction_direction": (1, 0, 0), "friction_across": math.inf}, "friction_across"),
         ({"friction_direction": (1, 0, 0), "friction_across": -0.1}, "friction_across"),
-        ({"friction_direction": (1, 0, 0), "friction_across": 1e-9}, "too far apart"),
+        ({"friction_direction": (1, 0, 0), "friction_across": 4.9e-4}, "too far apart"),
         ({"friction": 0.0, "friction_direction": (1, 0, 0), "friction_across": 0.2}, "too far apart"),
     ],
 )
