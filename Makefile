@@ -5,7 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 BIN    := $(VENV)/bin
 
-.PHONY: help tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -43,18 +43,20 @@ test: develop native-tests
 	@$(BIN)/python -m compileall -q engine tracker scalar_tests migrations tests  # once, not in each of its processes
 	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
-check: develop
+check: lint tidy
+
+lint: develop
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	sh .ci/subjects
 	$(BIN)/clang-format --dry-run -Werror $$(git ls-files 'engine/native/*.[ch]pp' 'engine/native/*.inl')
-	$(MAKE) --no-print-directory tidy
 
 # Over the core; again only when something in it has changed since it passed.
-tidy tidy-deep: develop
-	$(BIN)/cmake -S engine/native -B build/tidy $(NINJA) -DSPOOK_PYTHON=OFF -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
+tidy tidy-deep: tools
+	$(BIN)/cmake -S engine/native -B build/tidy $(NINJA) -DSPOOK_PYTHON=OFF -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \
+	    -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null  # each source as it stands
 	sh .ci/tidy $(BIN)/clang-tidy build/tidy $(patsubst tidy-%,%,$@)
 
 # The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
@@ -116,7 +118,7 @@ bench-heaps: develop
 	$(BIN)/python bench/bench_heaps.py
 
 # Where clang-19 and its WebAssembly libraries are; .ci/install-system gets them on Debian.
-wasm: develop
+wasm: tools
 	$(BIN)/cmake -S engine/native -B build/wasm $(NINJA) \
 	    -DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/engine/native/wasm/toolchain.cmake -DCMAKE_BUILD_TYPE=Release \
 	    -DSPOOK_PYTHON=OFF -DSPOOK_WASM=ON
@@ -185,5 +187,11 @@ $(VENV)/developed: $(VENV)/source-state | $(BIN)/pip
 	    echo "installing into $(VENV), with the tools of development" && $(BIN)/pip install -q -e '.[dev]'
 	@touch $(VENV)/installed $@
 
+# What compiles and reads C++ without Python: what needs no more need not wait for the rest.
+$(VENV)/tools: pyproject.toml | $(BIN)/pip
+	grep -oE '"(clang-tidy|cmake|ninja)[<>=][^"]*"' pyproject.toml | xargs $(BIN)/pip install -q
+	@touch $@
+
+tools: $(VENV)/tools
 install: $(VENV)/installed
 develop: $(VENV)/developed

@@ -6,7 +6,7 @@ All logarithmic: between two neighbouring points of a ladder error and time are 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations, pairwise
 from statistics import median
 
@@ -39,22 +39,27 @@ def in_range(time_step: float, order_range: tuple[float, float] | None) -> bool:
 
 def time_at_error(seconds: Sequence[float], errors: Sequence[float], target: float) -> float:
     """Seconds the ladder needs for |error| <= target; infinity if no point reaches it."""
-    return _cheapest(seconds, [abs(error) for error in errors], target)
+    return least_cost(seconds, [abs(error) for error in errors])(target)
 
 
 def error_in_time(seconds: Sequence[float], errors: Sequence[float], target: float) -> float:
     """Smallest |error| the ladder gives within `target` seconds; infinity if every point takes longer."""
-    return _cheapest([abs(error) for error in errors], seconds, target)
+    return least_cost([abs(error) for error in errors], seconds)(target)
 
 
-def _cheapest(cost: Sequence[float], quality: Sequence[float], target: float) -> float:
-    """Least cost at which quality falls to the target, between neighbours by powers."""
+def least_cost(cost: Sequence[float], quality: Sequence[float]) -> Callable[[float], float]:
+    """Least cost at which quality falls to a target, between neighbours by powers: a ladder asked many times."""
     points = [
         (c, q) for c, q in zip(cost, quality, strict=True) if math.isfinite(c) and math.isfinite(q) and c >= 0
     ]
-    found = [c for c, q in points if q <= target]
-    for (c1, q1), (c2, q2) in pairwise(points):
-        if (q1 - target) * (q2 - target) < 0.0 and min(c1, c2, q1, q2, target) > 0.0:
-            share = math.log(target / q1) / math.log(q2 / q1)
-            found.append(c1 * (c2 / c1) ** share)
-    return min(found, default=math.inf)
+    between = [(a, b) for a, b in pairwise(points) if min(*a, *b) > 0.0]
+
+    def at(target: float) -> float:
+        found = [c for c, q in points if q <= target]
+        for (c1, q1), (c2, q2) in between if target > 0.0 else ():
+            if (q1 - target) * (q2 - target) < 0.0:
+                share = math.log(target / q1) / math.log(q2 / q1)
+                found.append(c1 * (c2 / c1) ** share)
+        return min(found, default=math.inf)
+
+    return at

@@ -10,7 +10,7 @@ from statistics import median
 import msgspec
 
 from spook_tracker.tracker.document.json_form import Number
-from spook_tracker.tracker.document.order import error_in_time, time_at_error
+from spook_tracker.tracker.document.order import least_cost
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.judge.calibration import geometric_mean, that_counts
 from spook_tracker.tracker.judge.comparison_document import Change, Frontier
@@ -107,9 +107,9 @@ def frontiers(before: Samples, after: Samples, same_machine: bool) -> Iterator[F
             test=test,
             ladder=ladder.removeprefix("ladder:"),
             configuration=configuration,
-            time_at_equal_error=_ratio(time_at_error, seconds, errors, errors) if timed else None,
-            error_at_equal_time=_ratio(error_in_time, seconds, errors, seconds) if timed else None,
-            work_at_equal_error=_ratio(time_at_error, steps, errors, errors),
+            time_at_equal_error=_ratio(seconds, errors) if timed else None,
+            error_at_equal_time=_ratio(errors, seconds) if timed else None,
+            work_at_equal_error=_ratio(steps, errors),
         )
 
 
@@ -121,22 +121,19 @@ def _steps(sample: Sample) -> float:
     return float(sample.counters.get("steps", 0)) or math.nan
 
 
-def _ratio(
-    question: object, cost: list[list[float]], errors: list[list[float]], axis: list[list[float]]
-) -> float | None:
-    """Median over common values of `axis` of what the later side needs relative to the earlier."""
-    ask = question
-    assert callable(ask)
-    finite = [[value for value in side if math.isfinite(value) and value > 0.0] for side in axis]
+def _ratio(cost: list[list[float]], quality: list[list[float]]) -> float | None:
+    """Median over common values of `quality` of what the later side costs relative to the earlier."""
+    finite = [[value for value in side if math.isfinite(value) and value > 0.0] for side in quality]
     if not all(finite):
         return None
     low, high = max(min(side) for side in finite), min(max(side) for side in finite)
     if not 0.0 < low <= high:
         return None
+    earlier, later = (least_cost(c, q) for c, q in zip(cost, quality, strict=True))
     ratios = []
     for i in range(PROBES):
         target = low * (high / low) ** (i / (PROBES - 1)) * (1.0 + 1e-12)
-        first, second = (ask(c, e, target) for c, e in zip(cost, errors, strict=True))
+        first, second = earlier(target), later(target)
         if 0.0 < first < math.inf and 0.0 < second < math.inf:
             ratios.append(second / first)
     return median(ratios) if ratios else None

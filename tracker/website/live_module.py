@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import zlib
+from functools import lru_cache
 from pathlib import Path
 
 from spook_tracker.tracker.website.page_rows import Page
@@ -19,8 +20,12 @@ def module_script(static: Path) -> bytes | None:
     built = static / MODULE
     if not built.is_file():
         return None
-    packed = base64.b64encode(zlib.compress(built.read_bytes(), 9))
-    return b'const LIVE_MODULE="' + packed + b'";\n'
+    return _script(built.read_bytes())
+
+
+@lru_cache(maxsize=1)  # one module, published again and again
+def _script(module: bytes) -> bytes:
+    return b'const LIVE_MODULE="' + base64.b64encode(zlib.compress(module, 9)) + b'";\n'
 
 
 def live_page(module: str) -> Page:
