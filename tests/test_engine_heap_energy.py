@@ -29,6 +29,15 @@ SHAPES = (Box((0.4, 0.3, 0.5)), Cylinder(0.2, 0.5), Cone(0.3, 0.5))
 SOLVERS = ("direct", "iterative", "hybrid")
 
 
+def stack(count: int) -> Scene:
+    """Boxes of a metre and a kilogram, one upon the other."""
+    boxes = tuple(
+        RigidBody(name=f"box {k}", mass=1.0, shape=Box((1, 1, 1)), position=(0, 0, 0.5 + k), material=ROUGH)
+        for k in range(count)
+    )
+    return Scene(bodies=(GROUND, *boxes), gravity=GRAVITY)
+
+
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_what_is_lifted_out_of_an_overlap_has_paid_for_it(solver: str) -> None:
     """Corners and rims that swing in within a step sink a little; lifting them again won 2e-3 of the energy a step."""
@@ -60,12 +69,8 @@ def test_what_is_lifted_out_of_an_overlap_has_paid_for_it(solver: str) -> None:
 
 def test_sweeps_that_stop_early_win_no_energy() -> None:
     """Twenty boxes and fifty sweeps: the load is not carried at once, and what is missing was won back with more."""
-    boxes = tuple(
-        RigidBody(name=f"box {k}", mass=1.0, shape=Box((1, 1, 1)), position=(0, 0, 0.5 + k), material=ROUGH)
-        for k in range(20)
-    )
     result = simulate(
-        Scene(bodies=(GROUND, *boxes), gravity=GRAVITY),
+        stack(20),
         time_step=1 / 60,
         duration=1.0,
         method=Method(solver="iterative", iterations=50),
@@ -103,15 +108,7 @@ def test_a_rigid_contact_that_opens_is_not_pushed_after_its_own_speed(solver: st
 
 def test_a_stack_that_sinks_under_a_small_residual_is_unsettled() -> None:
     """Two hundred sweeps through a hundred boxes: no row is off by more than .1 m/s, and the stack sank by 3.2 m."""
-    boxes = tuple(
-        RigidBody(name=f"box {k}", mass=1.0, shape=Box((1, 1, 1)), position=(0, 0, 0.5 + k), material=ROUGH)
-        for k in range(100)
-    )
-    result = simulate(
-        Scene(bodies=(GROUND, *boxes), gravity=GRAVITY),
-        time_step=1 / 60,
-        steps=45,
-        method=Method(solver="iterative", iterations=200),
-    )
+    method = Method(solver="iterative", iterations=200)
+    result = simulate(stack(100), time_step=1 / 60, steps=45, method=method)
 
     assert result.status == "unsettled"

@@ -39,13 +39,24 @@ def test_a_page_that_fails_says_so_and_the_rest_is_published(tmp_path, monkeypat
     assert "could not be made" not in (tmp_path / "public" / "tests" / "beam.html").read_text()
 
 
-@pytest.mark.parametrize("name", ["a/b", "../../etc", "x,y", "0", " ", "#&=%", "run\n2", "é" * 90])
-def test_any_id_of_a_run_can_be_published(tmp_path, name):
-    runs = [document(0), msgspec.structs.replace(document(1), id=name), document(2)]
-    report = publish(DocumentHistory(runs), tmp_path / "public")
+IDS = ["a/b", "../../etc", "x,y", "0", " ", "#&=%", "run\n2", "é" * 90]
+
+
+@pytest.fixture(scope="module")
+def runs_of_any_name(tmp_path_factory):
+    """The report and the folder of one website of runs with all these ids, between two with usual ones."""
+    out = tmp_path_factory.mktemp("named") / "public"
+    named = [msgspec.structs.replace(document(n), id=name) for n, name in enumerate(IDS, 1)]
+    return publish(DocumentHistory([document(0), *named, document(len(IDS) + 1)]), out), out
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_any_id_of_a_run_can_be_published(runs_of_any_name, name):
+    report, out = runs_of_any_name
 
     assert report.failed == ()
-    assert {p.parent.name for p in (tmp_path / "public").rglob("*.html")} == {"public", "tests"}
+    assert name in {night["run"] for night in json.loads((out / "data" / "nights.json").read_text())}
+    assert {p.parent.name for p in out.rglob("*.html")} == {"public", "tests"}
 
 
 @pytest.mark.parametrize("value", [1e308, -1.7e308, 5e-324, 0.0, "inf", "nan"])

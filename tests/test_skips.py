@@ -22,6 +22,8 @@ def test_of_another_engine():
 def test_known(): assert False
 """
 
+ALONE = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # loading those costs more than all else here
+
 
 @pytest.mark.parametrize(
     ("ci", "said"), [("", "2 skipped, 1 xfailed"), ("true", "1 skipped, 1 xfailed, 1 error")]
@@ -30,7 +32,7 @@ def test_what_ci_installs_is_never_skipped_there(tmp_path: Path, ci: str, said: 
     (tmp_path / "test_some.py").write_text(TESTS)
     command = [sys.executable, "-m", "pytest", "-p", "tests.skips", "-p", "no:cacheprovider", tmp_path]
     root = Path(__file__).parents[1]
-    done = subprocess.run(command, env=os.environ | {"CI": ci}, cwd=root, capture_output=True, text=True)
+    done = subprocess.run(command, env=ALONE | {"CI": ci}, cwd=root, capture_output=True, text=True)
 
     assert said in done.stdout
     assert ("skipped where nothing may be missing: " in done.stdout) == bool(ci)
@@ -40,6 +42,6 @@ def test_a_file_that_cannot_even_be_read_for_want_of_something_fails_too(tmp_pat
     (tmp_path / "test_some.py").write_text("import pytest\npytest.importorskip('no_such_module')\n")
     command = [sys.executable, "-m", "pytest", "-p", "tests.skips", "-p", "no:cacheprovider", tmp_path]
     root = Path(__file__).parents[1]
-    done = subprocess.run(command, env=os.environ | {"CI": "true"}, cwd=root, capture_output=True, text=True)
+    done = subprocess.run(command, env=ALONE | {"CI": "true"}, cwd=root, capture_output=True, text=True)
 
     assert "1 error" in done.stdout

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -47,11 +48,15 @@ class Night:
         patch.setattr("spook_tracker.tracker.measure.ladder.interleaved", interleaved)
 
 
+def scripted(patch: pytest.MonkeyPatch) -> Night:
+    patch.syspath_prepend(str(Path(__file__).parent))
+    patch.setattr(library, "publish", lambda *asked, **named: None)
+    return Night(patch)
+
+
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> Night:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.setattr(library, "publish", lambda *asked, **named: None)
-    return Night(monkeypatch)
+    return scripted(monkeypatch)
 
 
 def before(document: RunDocument, number: int, chance: random.Random) -> RunDocument:
@@ -78,18 +83,26 @@ def before(document: RunDocument, number: int, chance: random.Random) -> RunDocu
     )
 
 
-@pytest.fixture
-def history(measured: Night, tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Nights of one per cent noise, the last of them as slow as whatever comes next."""
-    url = f"sqlite:///{tmp_path / 'tracker.db'}"
-    document, chance = library.run(**ASKED), random.Random(5)
-    for number in range(NIGHTS, 1, -1):
-        library.record(before(document, number, chance), url)
-    measured.times, measured.factors = 0, [1.3]
-    slow = library.run(**ASKED)
-    library.record(before(slow, 1, chance), url)
-    measured.times = 0
-    return url
+    file = tmp_path_factory.mktemp("earlier") / "tracker.db"
+    url = f"sqlite:///{file}"
+    with pytest.MonkeyPatch.context() as patch:
+        measured = scripted(patch)
+        document, chance = library.run(**ASKED), random.Random(5)
+        for number in range(NIGHTS, 1, -1):
+            library.record(before(document, number, chance), url)
+        measured.times, measured.factors = 0, [1.3]
+        slow = library.run(**ASKED)
+        library.record(before(slow, 1, chance), url)
+    return file
+
+
+@pytest.fixture
+def history(earlier: Path, tmp_path: Path) -> str:
+    """A copy of those nights, to be gone on with."""
+    return f"sqlite:///{shutil.copy(earlier, tmp_path / 'tracker.db')}"
 
 
 def night(url: str, out: Path) -> library.NightlyReport:

@@ -96,16 +96,22 @@ def clusters(base: Values) -> tuple[float, float] | None:
     split = fewest + int(np.argmax(np.diff(ordered[fewest - 1 : len(ordered) - fewest + 1])))
     low, high = ordered[:split], ordered[split:]
     inside = math.sqrt((float(np.var(low)) * len(low) + float(np.var(high)) * len(high)) / len(ordered))
-    middles = float(np.median(low)), float(np.median(high))
+    middles = _middle(low), _middle(high)
     return middles if middles[1] - middles[0] > APART * inside else None
+
+
+def _middle(ordered: Values) -> float:
+    """The median of sorted values: `numpy.median` takes ten times as long for as few as these."""
+    half = len(ordered) // 2
+    return float(ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2.0)
 
 
 def _tried(base: Values, last: Values) -> Shift | None:
     import numpy as np
 
     pooled = np.concatenate([base, last])
-    middle = float(np.median(base))
-    noise = NORMAL * float(np.median(np.abs(base - middle)))
+    middle = _middle(np.sort(base))
+    noise = NORMAL * _middle(np.sort(np.abs(base - middle)))
     if noise > 0.0:
         far = max(CLIP * noise, 2.0 * LEAST * middle)
         pooled = np.clip(pooled, middle - far, middle + far)
