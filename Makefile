@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 DB     ?= sqlite:///tracker.db
 OUT    ?= public
+WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
 .PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
@@ -41,7 +42,7 @@ test: export OPENBLAS_NUM_THREADS = 1
 test: develop native-tests
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
 	@$(BIN)/python -m compileall -q engine tracker scalar_tests migrations tests  # once, not in each of its processes
-	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
+	$(BIN)/pytest -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 check: lint tidy
 
