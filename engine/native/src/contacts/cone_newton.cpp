@@ -25,7 +25,7 @@ constexpr double behind = 10.0, slow = 0.1;      // of the blur, and of itself: 
 constexpr double far = 1e-3;                     // a residual, of the speeds, from which the path may crawl
 constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
 constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
-constexpr int max_jumps = 2;                     // without half the least they met
+constexpr int max_jumps = 3;                     // without half the least they met
 constexpr int max_losses = 3;                    // of the path, sought again,
 constexpr double good_enough = 1e-5;  //   unless jumps left a residual so small: few find less then
 constexpr double back = 10.0;         //   so many blurs away
@@ -358,7 +358,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         blur = found.blur;
         const bool lost =
             stalled >= (best.speed > far * speed_ ? long_patience : patience) || found.length < narrow;
-        if ((lost || stalled > 1) && best.speed <= near_enough * speed_) break;
+        if (lost && best.speed <= near_enough * speed_) break;
         if (jumps < 0 && !lost) continue;
         if (jumps < 0 && met > 0.0) {
             jumps = 0, blur = 0.0;
