@@ -8,8 +8,11 @@
 
 namespace spook {
 
-double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
-    double own = block.softness[i];
+namespace {
+
+/// G M⁻¹ Gᵀ of one row.
+double inverse_inertia(const MixedSystem& system, const RowBlock& block, int i) {
+    double own = 0.0;
     for (const bool first : {true, false}) {
         const int body = first ? block.first : block.second;
         if (body < 0) continue;
@@ -19,6 +22,12 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
         own += dot(jacobian, x);
     }
     return own;
+}
+
+}  // namespace
+
+double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
+    return inverse_inertia(system, block, i) + block.softness[i];
 }
 
 namespace {
@@ -49,7 +58,9 @@ double friction_residual(const MixedSystem& system, const RowBlock& block, const
     const bool disc = model == FrictionModel::cone;
     const bool within = disc ? length(b1, b2) <= bound : std::abs(b1) <= bound && std::abs(b2) <= bound;
     if (within && length(s1, s2) <= enough) return 0.0;
-    const double own = own_inertia(system, block, one) + own_inertia(system, block, two);
+    // Without the rows' softness: that is the solver's own, which turns a slip's direction by it.
+    const double own =
+        inverse_inertia(system, block, one) + inverse_inertia(system, block, two) + 2.0 * point.slip_softness;
     double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
     bool sticks = true;
     if (disc) {
