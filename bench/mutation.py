@@ -52,7 +52,7 @@ MUTANTS = (
     mutant("one-night-confirms", "noise", "len(self.suspects) > 1 and", "len(self.suspects) > 0 and"),
     mutant("no-normal", "noise", "NORMAL = 1.4826", "NORMAL = 1.0"),
     mutant("larger-is-not-better", "slower", "return -change if larger_is_better else change", "return change"),
-    mutant("no-creep", "noise", "if len(recent) < CREEP or len(old) < CREEP:", "if True:"),
+    mutant("no-creep", "noise", "if old is None or recent is None:", "if True:"),
     mutant("clusters-are-not-learnt", "noise", "REACH = 1.25", "REACH = 0.0"),
     mutant("no-visits", "noise", "VISITS = 2 ", "VISITS = 200 "),
     mutant("one-visit-is-enough", "noise", "VISITS = 2 ", "VISITS = 1 "),

@@ -263,7 +263,7 @@ TEST = ScalarTest(
     theory=(
         "Friction f lies in (f_d/µ_d)² + (f_a/µ_a)² ≤ N²; while the box slides it is the one of these that dissipates most: "
         "f = −N (µ_d² v_d, µ_a² v_a)/√(µ_d² v_d² + µ_a² v_a²).",
-        "It stands up to tan θ = 1/√((cos φ/µ_d)² + (sin φ/µ_a)²), downhill at φ from the grain.",
+        "It stands up to tan θ = 1/√((cos(φ)/µ_d)² + (sin(φ)/µ_a)²), downhill at φ from the grain.",
         "From rest the way is straight: v = a t with a = g_t + f(a)/m, in every step of the method, too.",
         "On the level v_d ∝ v_a^((µ_d/µ_a)²): the box turns towards the direction of lower friction and stops in it.",
         "f · v ≤ 0 always: energy is only lost.",
