@@ -40,7 +40,7 @@ class Material:
 
     Two surfaces combine: friction by the geometric mean, restitution, rolling and torsional friction by the larger,
     compliance by the sum. Viscous friction, a force c times the slip, is a slip_compliance of 1/c under a friction that
-    never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
+    is never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
     a blow that returns.
 
     Friction may differ with the direction, as it does along a grain, on a blade or on a board with grooves: then
@@ -51,8 +51,9 @@ class Material:
     (f_d/µ_d)² + (f_a/µ_a)² <= N²; while nothing slips the force is any inside that ellipse. So it lies on the ellipse,
     normal to it along −v: not opposite to the slip, but it never does positive work. The same holds where the
     direction leaves the surface; where it is normal to it, friction is `friction_across` all round. The friction models
-    box and scaled_box take the ellipse's rectangle. Sweeps settle the slower the farther both are apart. A slip_compliance is that of the direction of lower friction; in the
-    other one it is less, by the square of the ratio of both.
+    box and scaled_box take the ellipse's rectangle. Sweeps settle the slower the farther both are apart. A
+    slip_compliance is that of the direction of lower friction; in the other one it is less, by the square of the ratio
+    of both.
     """
 
     friction: float = 0.0  # Coulomb's mu, 1

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
 constexpr double known = 1e-13;                     // of a start that is an answer already
-constexpr double refined = 1e-12;                   // of the square of what Newton's direction is to answer
+constexpr double refined = 1e-16;                   // of the square of what Newton's direction is to answer
 constexpr double roughly = 1e-6;    // the same along the path, which only leads to the next point
 constexpr double start_blur = 0.2;  // of the largest natural map
 constexpr double nearest = 1.0;     // of the blur: how far units may be from the path, in the mean
@@ -27,8 +27,7 @@ constexpr int patience = 3, long_patience = 12;  // iterations without half the 
 constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
 constexpr int max_jumps = 3;                     // without half the least they met
 constexpr int max_losses = 3;                    // of the path, sought again,
-constexpr double good_enough = 1e-5;  //   unless jumps left a residual so small: few find less then
-constexpr double back = 10.0;         //   so many blurs away
+constexpr double back = 10.0;                    //   so many blurs away
 
 }  // namespace
 
@@ -370,7 +369,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
             least = std::min(least, left.speed);
             if (jumps < max_jumps) continue;
         }
-        if (best.speed <= good_enough * speed_) break;
+        if (best.speed <= near_enough * speed_) break;
         // Begin anew, further from the end and more carefully.
         jumps = -1, stalled = 0, hold_ = loosest_hold, ++losses;
         if (met > 0.0) {

@@ -24,7 +24,7 @@ constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr int longest_wait = 16;        // solves
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 constexpr double fair = 1e-9;           // one that is an answer
-constexpr double near = 1e-5;           // one that is not worth another turn
+constexpr double near = 1e-6;           // one that is not worth another turn
 constexpr int sweep_turns = 1, turn_sweeps = 100;  // where Newton's path ends without an answer
 
 /// How much is spent on rounds of pivoting.

@@ -33,7 +33,7 @@ struct DirectSolver {
 /// Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// Systems of contacts alone under the cone, or of more than 24 blocks without friction, get a few of these rounds,
 /// which settle exactly what rests or slides on; where they failed they wait, up to 16 solves. What is left goes to
-/// Newton's method (`contacts/cone_newton.hpp`), where that ends beyond 1e-5 of the speeds (up to 24 blocks: 1e-9) to
+/// Newton's method (`contacts/cone_newton.hpp`), where that ends beyond 1e-6 of the speeds (up to 24 blocks: 1e-9) to
 /// 100 sweeps and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best
 /// within 1e-4 of the speeds is the answer, and converged within 1e-9; else sweeps finish.
 /// On return FrictionPoint::normal is the normal impulse.
