@@ -49,6 +49,28 @@ def test_a_question_whose_seconds_are_over_begins_no_further_simulation(slow: Sl
     assert Questions(**SOURCE, limit=0.5, patience=1.0).simulate()(0.4).seconds == 0.4, "the next has its own"
 
 
+@pytest.mark.parametrize(
+    "counted", ["process_time", "perf_counter"]
+)  # in this process, and in one of its own
+def test_a_simulation_that_raises_has_taken_its_time(
+    slow: Slow, monkeypatch: pytest.MonkeyPatch, counted: str
+) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(f"time.{counted}", lambda: clock[0])
+
+    def fails(scene: Any, **options: Any) -> Any:
+        clock[0] += 0.4
+        raise ValueError("came apart")
+
+    monkeypatch.setattr(slow, "simulate", fails)
+    simulate = Questions(**SOURCE, limit=0.5, patience=1.0).simulate()
+    for _ in range(3):
+        with pytest.raises(ValueError, match="came apart"):
+            simulate(0.4)
+    with pytest.raises(NoAnswer, match="not tried"):
+        simulate(0.4)
+
+
 def test_single_values_can_be_left_to_the_first_setting_and_ladders_cannot(slow: Slow) -> None:
     def asked(**more: Any) -> tuple[int, int]:
         tests = Questions(**SOURCE, **more).tests().values()
