@@ -42,9 +42,6 @@ GROWTH = 1.6  # × the cost per contact of the smallest heap: what sorting pairs
 REST = 0.5  # × one step of a stack that is hit: at rest no matrix is factored
 OFTEN = 0.25  # of the steps of knocked stacks may have an answer that is near only,
 NEAR = 0.01  # m/s, that leaves a tenth of what makes a run unsettled
-    0.25,
-    1e-4,
-)  # of the steps of knocked stacks: answers that are near only, and what they leave, m/s
 TALL = 1.6  # × the cost per box of a stack of 100, for one of 500 at rest
 WIDE = 1.8  # the same for a hundred stacks of ten, none straight; 6 where rounding kept them from being found at rest
 KNOCKS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5)  # m/s: one alone is luck, costs differ tenfold
