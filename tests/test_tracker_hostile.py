@@ -120,3 +120,22 @@ def test_a_hostile_document_is_refused_or_stored_as_what_it_says(url: str) -> No
     assert check(engine) == ()
     engine.dispose()
     assert 0 < stored < COUNT, "some harm nothing, most are refused"
+
+
+@pytest.mark.parametrize("place", ["counters", "parameters", "stage_seconds"])
+def test_keys_are_text_from_outside_like_any_other(place: str) -> None:
+    said = json.loads(encode(run()))
+    parts = {
+        "counters": said["samples"][0],
+        "parameters": said["series"][0],
+        "stage_seconds": next(sample["timing"] for sample in said["samples"] if sample.get("timing")),
+    }
+    parts[place][place] = {"x" * 70_000: 1}
+
+    with pytest.raises(DocumentError, match="a key: a text of 70000 characters; at most 65536 are stored"):
+        decoded(json.dumps(said).encode())
+
+    parts[place][place] = {"a\0": 1, "\ud800": 2}
+    cleaned = json.loads(encode(decoded(json.dumps(said).encode())))
+    assert "\\u0000" not in json.dumps(cleaned)
+    assert "\\ud800" not in json.dumps(cleaned)

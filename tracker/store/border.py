@@ -55,7 +55,10 @@ def _cleaned(part: Any, place: str) -> Any:
             raise DocumentError(f"{place}: a whole number of {digits} digits; 64 bits hold 19")
         return part
     if isinstance(part, dict):
-        return {clean_text(name): _cleaned(inner, f"{place}.{name}") for name, inner in part.items()}
+        return {
+            _cleaned(name, f"{place}, a key"): _cleaned(inner, f"{place}.{name}")
+            for name, inner in part.items()
+        }
     if isinstance(part, (list, tuple)):
         return tuple(_cleaned(inner, place) for inner in part)
     return part
@@ -79,8 +82,12 @@ def _check(kind: inspect.Type) -> Check | None:
     if isinstance(kind, inspect.IntType):
         return lambda number: -MAX_INTEGER <= number <= MAX_INTEGER
     if isinstance(kind, inspect.DictType):
-        value = _check(kind.value_type)
-        return None if value is None else lambda part: all(map(value, part.values()))
+        key, value = _check(kind.key_type), _check(kind.value_type)
+        if key is None:
+            return None if value is None else lambda part: all(map(value, part.values()))
+        if value is None:
+            return lambda part: all(map(key, part))
+        return lambda part: all(map(key, part)) and all(map(value, part.values()))
     if isinstance(kind, inspect.VarTupleType):
         item = _check(kind.item_type)
         return None if item is None else lambda part: all(map(item, part))
