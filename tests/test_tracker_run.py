@@ -95,8 +95,17 @@ def test_whatever_hangs_is_timed_out_and_everything_else_is_answered(monkeypatch
     document = run(SOURCE, Request(workers=4, time_limit=0.3, **asked))
 
     samples = by_key(document)
-    asked_for = [s for key, s in samples.items() if "/ladder:" not in key or "/h=" in key]
-    assert {s.outcome for s in asked_for} == {"timed_out"}  # the rest is read off the rungs
+    read_off = {key: s for key, s in samples.items() if "/ladder:" in key and "/h=" not in key}
+    assert {s.outcome for key, s in samples.items() if key not in read_off} == {"timed_out"}
+    said = {key.rpartition(":")[2]: (s.outcome, s.value, s.failure) for key, s in read_off.items()}
+    assert said["time-to-error"] == ("not_finite", math.inf, "no step reaches 0.1 m")
+    assert said["error-in-time"] == ("not_finite", math.inf, "every step takes longer than 1 s")
+    assert said["order"][::2] == ("missing", "fewer than three usable points in the asymptotic range")
+    assert math.isnan(said["order"][1])
+    assert len(said) == 3
+    assert not any(s.passed for s in samples.values())
+    expected = {s.key for s in healthy.series if "/ladder:" in s.key and "/h=" not in s.key}
+    assert read_off.keys() == expected, "no scalar of a ladder is lost"
     assert samples["fall/plain/position_error/h=0.01"].failure.startswith("no answer within 0.3 s")
     assert document.figures[0].note.startswith("could not be drawn: no answer within")
     versions = {s.key: s.test_version for s in healthy.series}
