@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import combinations, pairwise
-from statistics import median
+
+from spook_tracker.tracker.document.middle import median
 
 FEWEST_POINTS = 3
 

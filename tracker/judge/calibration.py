@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from statistics import median
 from typing import TypeAlias
 
+from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Again, Point, Timing
 
 Taken: TypeAlias = Timing | Again

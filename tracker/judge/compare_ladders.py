@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from statistics import median
 
 import msgspec
 
 from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.order import least_cost
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.judge.calibration import geometric_mean, that_counts

@@ -14,10 +14,11 @@ median of the last nights against those at the last release, and is red until ha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
@@ -421,13 +422,6 @@ def _outermost(reached: Sequence[float]) -> list[float]:
     rest = list(reached)
     rest.remove(largest)
     return [largest, max(rest)]
-
-
-def median(values: Iterable[float]) -> float:
-    """The middle value, of an even number the mean of the middle two; of at least one, none of them NaN."""
-    ordered = sorted(values)
-    half, odd = divmod(len(ordered), 2)
-    return ordered[half] if odd else (ordered[half - 1] + ordered[half]) / 2
 
 
 def _level_and_noise(values: Sequence[float]) -> tuple[float, float]:

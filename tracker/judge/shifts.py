@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
+from spook_tracker.tracker.document.middle import median_of_sorted
+
 if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
     import numpy as np
     import numpy.typing as npt
@@ -96,22 +98,16 @@ def clusters(base: Values) -> tuple[float, float] | None:
     split = fewest + int(np.argmax(np.diff(ordered[fewest - 1 : len(ordered) - fewest + 1])))
     low, high = ordered[:split], ordered[split:]
     inside = math.sqrt((float(np.var(low)) * len(low) + float(np.var(high)) * len(high)) / len(ordered))
-    middles = _middle(low), _middle(high)
+    middles = median_of_sorted(low), median_of_sorted(high)
     return middles if middles[1] - middles[0] > APART * inside else None
-
-
-def _middle(ordered: Values) -> float:
-    """The median of sorted values: `numpy.median` takes ten times as long for as few as these."""
-    half = len(ordered) // 2
-    return float(ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2.0)
 
 
 def _tried(base: Values, last: Values) -> Shift | None:
     import numpy as np
 
     pooled = np.concatenate([base, last])
-    middle = _middle(np.sort(base))
-    noise = NORMAL * _middle(np.sort(np.abs(base - middle)))
+    middle = median_of_sorted(np.sort(base))
+    noise = NORMAL * median_of_sorted(np.sort(np.abs(base - middle)))
     if noise > 0.0:
         far = max(CLIP * noise, 2.0 * LEAST * middle)
         pooled = np.clip(pooled, middle - far, middle + far)

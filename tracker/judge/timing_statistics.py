@@ -11,8 +11,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from statistics import median
 
+from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Timing
 
 FLOOR = 0.10  # least relative change of run time worth a word, between two sessions
