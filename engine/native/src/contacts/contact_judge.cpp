@@ -8,11 +8,8 @@
 
 namespace spook {
 
-namespace {
-
-/// G M⁻¹ Gᵀ of one row.
-double inverse_inertia(const MixedSystem& system, const RowBlock& block, int i) {
-    double own = 0.0;
+double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
+    double own = block.softness[i];
     for (const bool first : {true, false}) {
         const int body = first ? block.first : block.second;
         if (body < 0) continue;
@@ -24,23 +21,29 @@ double inverse_inertia(const MixedSystem& system, const RowBlock& block, int i) 
     return own;
 }
 
-}  // namespace
-
-double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
-    return inverse_inertia(system, block, i) + block.softness[i];
-}
-
 namespace {
 
 constexpr double sunk = 0.02;     // of the smaller body's radius: an overlap that a solve has left
 constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
+
+/// About G M⁻¹ Gᵀ of one row: off-diagonal inertia left out, since every step asks.
+double nearly_own(const MixedSystem& system, const RowBlock& block, int i) {
+    double own = 0.0;
+    for (const bool first : {true, false}) {
+        const int body = first ? block.first : block.second;
+        if (body < 0) continue;
+        const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
+        for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
+    }
+    return own;
+}
 
 /// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds. At most
 /// |w|, so no more is asked where that is `enough`.
 double bounded_residual(const MixedSystem& system, const RowBlock& block, int i, double enough) {
     const double w = row_residual(block, i, system.velocity), z = block.multiplier[i];
     if (std::abs(w) <= enough && z >= block.lower[i] && z <= block.upper[i]) return 0.0;
-    const double own = own_inertia(system, block, i);
+    const double own = nearly_own(system, block, i) + block.softness[i];
     if (!(own > 0.0)) return 0.0;
     // z − w/own would round w away
     return w > 0.0 ? std::min(w, own * (z - block.lower[i])) : std::min(-w, own * (block.upper[i] - z));
@@ -60,7 +63,7 @@ double friction_residual(const MixedSystem& system, const RowBlock& block, const
     if (within && length(s1, s2) <= enough) return 0.0;
     // Without the rows' softness: that is the solver's own, which turns a slip's direction by it.
     const double own =
-        inverse_inertia(system, block, one) + inverse_inertia(system, block, two) + 2.0 * point.slip_softness;
+        nearly_own(system, block, one) + nearly_own(system, block, two) + 2.0 * point.slip_softness;
     double d1 = b1 - s1 / own, d2 = b2 - s2 / own;
     bool sticks = true;
     if (disc) {

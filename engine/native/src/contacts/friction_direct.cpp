@@ -14,7 +14,7 @@ namespace spook {
 namespace {
 
 constexpr double settled = 1e-10;  // of the largest normal impulse
-constexpr double exact = 1e-14;    // the same: an answer that another round would not better
+constexpr double exact = 1e-12;    // the same: an answer that another round would not better
 constexpr double falling = 0.1;    // of the residual before: worth another round
 constexpr double loosest = 1e-6;
 constexpr double reluctance =
@@ -197,8 +197,9 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     Acceleration acceleration;
     double accepted = settled;
     int lost = 0;
-    struct Answer {
-        MixedSystem system;
+    struct Answer {  // what rounds change of a system
+        std::vector<RowBlock> rows;
+        std::vector<Vec6> velocity;
         std::vector<FrictionPoint> points;
         FrictionReport report;
     };
@@ -241,13 +242,14 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         if (answer && !(is_answer && report.residual <= falling * answer->report.residual)) {
             if (!is_answer || report.residual > answer->report.residual) {
                 const int rounds = report.rounds, pivots = report.pivots;
-                system = std::move(answer->system), points = std::move(answer->points);
+                system.rows = std::move(answer->rows), system.velocity = std::move(answer->velocity);
+                points = std::move(answer->points);
                 report = answer->report;
                 report.rounds = rounds, report.pivots = pivots;
             }
             return true;
         }
-        if (is_answer) answer.emplace(Answer{system, points, report});
+        if (is_answer) answer.emplace(Answer{system.rows, system.velocity, points, report});
         lost = report.converged ? 0 : lost + 1;
         if (lost >= effort.lost) break;
         if (points.empty() || model == FrictionModel::box) {

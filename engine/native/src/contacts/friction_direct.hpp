@@ -28,7 +28,7 @@ struct DirectSolver {
 /// s_2 + (|s|/(mu nu)) beta_2 = 0, a softness. The first slip is the one predicted without constraints,
 /// D(v + h M⁻¹ f); then the one of the last solve. A fixed point obeys the disc exactly: no direction is preferred.
 /// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
-/// 25 rounds tenfold more every five, at most 1e-6), and go on while each leaves a tenth of that, down to 1e-14: where
+/// 25 rounds tenfold more every five, at most 1e-6), and go on while each leaves a tenth of that, down to 1e-12: where
 /// points are redundant, little in a bound is much in how they share their load. After `max_rounds` without an answer
 /// Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// Systems of contacts alone under the cone, or of more than 24 blocks without friction, get a few of these rounds,
