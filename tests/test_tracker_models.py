@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import random
 import struct
+import zlib
 from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
@@ -15,7 +17,7 @@ from sqlalchemy.exc import IntegrityError
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked, clean_text
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.identity import identity
@@ -154,3 +156,17 @@ def test_the_document_is_frozen():
     with pytest.raises(AttributeError):
         run().id = "other"  # type: ignore[misc]
     assert RunDocument.__struct_config__.frozen
+
+
+def test_bodies_kept_compressed_are_bounded_by_bytes():
+    kept = rows.Compressed(1000)
+    contents = [random.Random(n).randbytes(300) for n in range(9)]
+    bodies = [kept.of(content) for content in contents]
+
+    assert list(map(zlib.decompress, bodies)) == contents
+    assert 600 < kept.size == sum(map(len, kept.bodies.values())) <= 1000
+    assert kept.of(contents[-1]) is bodies[-1]
+    assert kept.of(contents[0]) is not bodies[0], "the oldest went first"
+    before = dict(kept.bodies)
+    assert zlib.decompress(kept.of(bytes(random.Random(9).randbytes(2000))))
+    assert kept.bodies == before, "what is larger than all of it drives nothing out"

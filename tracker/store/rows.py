@@ -27,21 +27,33 @@ def json_of(part: Any) -> str:
     return encode(part).decode()
 
 
-_compressed: dict[
-    bytes, bytes
-] = {}  # by hash: figures of an engine that did not change are the same every night
-MOST_COMPRESSED = 512  # kept at a time
+class Compressed:
+    """Bodies compressed already, by hash: figures of an engine that did not change are the same every night."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.size = most, 0  # bytes that are kept, the oldest go first
+        self.bodies: dict[bytes, bytes] = {}
+
+    def of(self, content: bytes) -> bytes:
+        """The content compressed."""
+        name = hashlib.sha256(content).digest()
+        if (known := self.bodies.get(name)) is not None:
+            return known
+        body = zlib.compress(content, 6)
+        if len(body) <= self.most:
+            self.bodies[name] = body
+            self.size += len(body)
+            while self.size > self.most:
+                self.size -= len(self.bodies.pop(next(iter(self.bodies))))
+        return body
+
+
+_compressed = Compressed(32 * 1024 * 1024)
 
 
 def packed(part: Any) -> bytes:
     """Compressed JSON, for the bulky parts nobody queries."""
-    content = encode(part)
-    name = hashlib.sha256(content).digest()
-    if name not in _compressed:
-        if len(_compressed) >= MOST_COMPRESSED:
-            del _compressed[next(iter(_compressed))]
-        _compressed[name] = zlib.compress(content, 6)
-    return _compressed[name]
+    return _compressed.of(encode(part))
 
 
 def unpacked(body: bytes, kind: type[Part]) -> Part:
