@@ -18,10 +18,12 @@ from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.connection import connected
 from spook_tracker.tracker.store.database import database_url, head, open_database, upgrade
+from spook_tracker.tracker.store.database_check import check
 from spook_tracker.tracker.store.database_copy import digest
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.revisions import configuration, differences, revert
+from spook_tracker.tracker.website.publish import publish
 from tests.database_work import migrate_and_die
 from tests.forked import begun, said
 from tests.run_documents import definition, run, run_of, sample
@@ -322,10 +324,43 @@ def contents(url):
     return found
 
 
+def test_down_and_up_again_loses_the_hash_of_what_was_measured_and_nothing_else(url, tmp_path):
+    """Below 0010 there is none; a run without one is checked and published like those from before it. (No run time
+    of these rows was taken again: that would be lost below 0009.)"""
+
+    def of_columns(name):
+        with engine.connect() as connection:
+            found = connection.execute(text(f'SELECT * FROM "{name}"')).mappings().all()
+        return sorted((dict(row) for row in found), key=repr)
+
+    engine = at_head_with_rows(url)
+    names = [name for name in inspect(engine).get_table_names() if name != "alembic_version"]
+    before = {name: of_columns(name) for name in names}
+    assert all(row["content"] for row in before["run"])
+    with engine.begin() as connection:
+        revert(connection, "0008")
+    upgrade(engine, keep_copy=False)
+    after = {name: of_columns(name) for name in names}
+
+    assert {row["content"] for row in after["run"]} == {""}
+    for rows in (before["run"], after["run"]):
+        for row in rows:
+            del row["content"]
+        rows.sort(key=repr)
+    assert after == before
+    assert check(engine) == ()
+    with Session(engine) as session:
+        publish(History(session), tmp_path / "public")
+    engine.dispose()
+    assert list((tmp_path / "public" / "compare").glob("nights-*.js"))
+
+
 def test_a_migration_that_moves_every_row_is_whole_or_absent_wherever_it_is_killed(url):
     """Revision 0008 gives every id a new number: up, down, and killed after each of several statements."""
     engine = at_head_with_rows(url)
-    with engine.begin() as connection:  # what later revisions added is lost below them, and not made again
+    with (
+        engine.begin() as connection
+    ):  # what later revisions added is lost below them: the next test says what
         revert(connection, "0008")
     upgrade(engine, keep_copy=False)
     above = contents(url)
