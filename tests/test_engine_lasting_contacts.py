@@ -13,6 +13,7 @@ from spook_tracker.engine import (
     Box,
     Final,
     Hinge,
+    Load,
     Material,
     MaximumAbsolute,
     Method,
@@ -22,6 +23,7 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
+    Trace,
     Velocity,
     compile,
     simulate,
@@ -216,3 +218,31 @@ def test_what_no_higher_order_can_carry_is_refused_by_name(
     )  # fmt: skip
     with pytest.raises(MethodError, match=why):
         compile(Scene(bodies=(ground(), body)), time_step=0.01, method=method)
+
+
+def test_a_block_of_steps_taken_back_behind_a_look_ahead_goes_the_same_way_again() -> None:
+    """Two balls strike in the step after a sample whose velocities were looked ahead for; behind it a wheel turns too
+    fast, and the steps since the last check are taken one by one again to find where."""
+    h = 0.01
+
+    def ball(name: str, x: float, v: float) -> RigidBody:
+        return RigidBody(
+            name=name, mass=1.0, shape=Sphere(0.1), position=(x, 0.0, 0.0), velocity=(v, 0.0, 0.0)
+        )
+
+    wheel = RigidBody(name="wheel", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 9.0, 0.0))
+    observe = {"x": Trace(quantity=Position("left")), "v": Trace(quantity=Velocity("left"))}
+    struck = set()
+    for meets in np.arange(28.5, 36.0):  # steps; checks lie 1, 2, 4, 8 ... steps apart
+        scene = Scene(
+            bodies=(ball("left", -0.1 - meets * h, 1.0), ball("right", 0.1 + 0.5 * meets * h, -0.5), wheel),
+            forces=(Load(name="drive", body="wheel", torque=(0.0, 0.0, 250.0)),),
+        )
+        undisturbed = simulate(scene, time_step=h, steps=38, method=HALF, observe=observe)
+        failed = simulate(scene, time_step=h, steps=80, method=HALF, observe=observe)
+
+        assert (undisturbed.status, failed.status) == ("completed", "diverged")
+        for name in observe:
+            assert np.array_equal(failed.partial[name][:39], undisturbed[name]), (name, meets)
+        struck.add(int(np.argmax(undisturbed["v"][:, 0] < 0.9)))
+    assert len(struck) == 8  # steps, the first of the block among them

@@ -7,6 +7,10 @@
 namespace spook {
 
 void RigidSystem::keep(Memory& memory) const {
+    if (contacts_ && live_.velocity_ready) {
+        memory = before_ahead_;
+        return;
+    }
     memory.redundancy = redundant_.memory();
     memory.live = live_, memory.joints = joints_.states, memory.mixed = mixed_;
     if (contacts_) memory.contacts = contacts_->memory();

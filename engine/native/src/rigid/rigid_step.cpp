@@ -69,6 +69,14 @@ void RigidSystem::velocity_stage() {
     }
 }
 
+/// The velocities of the coming step, before it is begun.
+void RigidSystem::look_ahead() {
+    if (live_.velocity_ready) return;
+    if (contacts_) keep(before_ahead_);
+    velocity_stage();
+    live_.velocity_ready = true;
+}
+
 void RigidSystem::kick_free_body(int i) noexcept {
     BodyState& s = live_.bodies[i];
     s.velocity += kick(i);

@@ -196,8 +196,7 @@ void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
         // What is seen lives at the sample; what goes on does not.
         LargeArray<BodyState> going;
         if (half_step_) {
-            if (!live_.velocity_ready) velocity_stage();
-            live_.velocity_ready = true;
+            look_ahead();
             going = live_.bodies;
             read_half_step();
         } else {
@@ -279,8 +278,7 @@ std::vector<double> RigidSystem::final_state() {
     if (live_.lost < 0 && live_.not_solved < 0) {
         if (composed_) read_composition();
         if (half_step_) {
-            if (!live_.velocity_ready) velocity_stage();
-            live_.velocity_ready = true;
+            look_ahead();
             read_half_step();
         }
     }

@@ -61,7 +61,9 @@ public:
     std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
 
     class Memory;
-    /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it.
+    /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it. Where
+    /// velocities were looked ahead for with contacts, it is what was before, and they are found again: what their
+    /// contacts left for the end of the step is too much to keep.
     void keep(Memory& memory) const;
     void go_back(const Memory& memory);
 
@@ -175,6 +177,7 @@ private:
     void take_stages(const RigidScene& scene);
     void step();
     void velocity_stage();
+    void look_ahead();
 
     // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
     void start_half_step();
@@ -295,7 +298,7 @@ private:
 
     // The state.
     Live live_;
-    Memory saved_;
+    Memory saved_, before_ahead_;  // the latter: before look_ahead(), with contacts
     JointSet joints_;
     bool replaying_ = false;                    // a block that ended unfit
     LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
