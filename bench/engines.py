@@ -23,6 +23,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+import bench.engine_kinds as engine_kinds
 import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
 import spook_tracker.tracker.judge.rank as ranks
@@ -115,6 +116,7 @@ def page(database: str, of_facts: str = "") -> str:
         f"`npm install {' '.join(find.NODE.values())}` bring all.",
         "",
         *READING,
+        *_treatment(samples),
         "",
         *_choice(races),
         *_facts(facts),
@@ -172,8 +174,7 @@ def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Any]) -> lis
     for name, told in samples.items():
         found = [sample for definition, sample in told.values() if definition.kind == "ladder"]
         outcomes = Counter(sample.outcome for sample in found)
-        late = {m[1] or m[2] for sample in found if (m := LIMIT.search(sample.failure))}
-        bound = ", ".join(f"{seconds} s" for seconds in sorted(late, key=float))
+        bound = _limits(found)
         others = len(found) - outcomes["value"] - outcomes["timed_out"] - outcomes["not_supported"]
         took = _minutes(runs[name])
         rows.append(
@@ -199,12 +200,40 @@ def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Any]) -> lis
         "|---|---|---|---|---|---|---|",
         *(f"| {' | '.join(map(str, row))} |" for row in rows),
         "",
+        f"All nights together, the facts above not counted: {sum(float(row[-1].split()[0]) for row in rows if row[-1] != '-'):.1f} min.",
+        "",
     ]
 
 
 def _minutes(run: Any) -> str:
     begun, ended = instant(run.started), instant(run.finished)
     return "-" if begun is None or ended is None else f"{(ended - begun).total_seconds() / 60.0:.1f} min"
+
+
+def _limits(samples: Sequence[Any]) -> str:
+    """The limits that samples ran into."""
+    late = {m[1] or m[2] for sample in samples if (m := LIMIT.search(sample.failure))}
+    return ", ".join(f"{seconds} s" for seconds in sorted(late, key=float))
+
+
+def _treatment(samples: Mapping[str, ranks.Samples]) -> list[str]:
+    """How ours and the others are not treated alike, and how often that told."""
+    rungs = {
+        name: [sample for definition, sample in told.values() if definition.kind == "ladder"]
+        for name, told in samples.items()
+    }
+    theirs = [sample for name, found in rungs.items() if name != OURS for sample in found]
+    late, ours = (sum(s.outcome == "timed_out" for s in found) for found in (theirs, rungs[OURS]))
+    bound = _limits(theirs)
+    return [
+        "Ours and the others are not treated alike. Of another engine a simulation has a limit"
+        + (f" ({bound})," if bound else ","),
+        "and so have those of one ladder in one setting together; a run is timed up to "
+        f"{REPEATS.most} times, beyond {1e3 * REPEATS.seconds:g} ms once.",
+        f"Ours has no limit and is timed up to {Repeats().most} times, never less than {Repeats().fewest}. "
+        f"Rungs that ran out of time: {late} of the",
+        f"others, {ours} of ours.",
+    ]
 
 
 READING = (
@@ -268,11 +297,21 @@ def _facts(samples: Mapping[str, ranks.Samples]) -> list[str]:
         for (name, setting), row in cells.items()
         if set(row.values()) != {"-"}
     ]
+    shown, lacking = engine_kinds.carried(
+        {
+            f"{name} ({setting})": [row.get(place, "-") for place in columns]
+            for (name, setting), row in cells.items()
+        }
+    )
+    for words in lacking:
+        print(f"left out, the table does not show it: {words}", flush=True)
     return [
         "## What kinds of engines do",
         "",
-        *KINDS,
+        KINDS,
         "",
+        *shown,
+        *([""] if shown else []),
         "| engine (setting) | " + " | ".join(columns.values()) + " |",
         "|---|" + "---|" * len(columns),
         *rows,
@@ -287,21 +326,7 @@ HEADS = {
     "fact_creep": "box held by friction: creep in 10 s [m]",
     "fact_digits": "uniform motion: relative error",
 }
-KINDS = (
-    "Five questions whose answers follow from how an engine is made, in every setting (`bench/engine_facts.py` states them):",
-    "",
-    "- **A chain of 26 links** gains energy without bound, or comes apart, in joint coordinates with semi-implicit Euler at",
-    "  1/60 s and 1/240 s, and with Runge-Kutta of order 3 at 1/60 s. Rods held as constraints gain less than half a per cent,",
-    "  as Runge-Kutta of order 4 does; exudyn's generalised-alpha is the exception.",
-    "- **A door on ten hinges** is held by many splits of its load. That of least norm is even; sweeps, soft constraints and",
-    "  joint coordinates give others, whose forces across are off by as much as the largest of them, or by several times that.",
-    "- **A beam of 80 locked boxes** on two piles falls between them where sweeps or springs hold the locks (free fall is",
-    "  1.2 m in half a second); a direct solve or merged bodies hold it to two millimetres, pybullet's to seven centimetres.",
-    "- **A box** on a slope of 0.3 with a friction of 0.5 stands. Within a tenth of a millimetre it does so in spook, in",
-    "  cannon when it is asked for accuracy, and in jolt; in the others it creeps, furthest in mujoco's defaults, whose",
-    "  friction is regularised.",
-    "- **Uniform motion** needs no method: what is lost in 1000 steps is rounding, far more in single precision than in double.",
-)
+KINDS = "Five questions whose answers follow from how an engine is made, in every setting (`bench/engine_facts.py` states them):"
 
 
 def _first(races: Sequence[ranks.Race]) -> list[str]:

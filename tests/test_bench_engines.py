@@ -103,3 +103,41 @@ def test_rungs_that_were_out_of_time_are_counted_and_the_limit_told(engines: Any
     )
 
     assert line.split(" | ")[2:4] == ["2", "0.5 s"]
+
+
+def test_the_published_page_says_how_unequal_the_treatment_is_and_how_long_all_took(engines: Any) -> None:
+    """Sums of the page's own rows."""
+    text = engines.PAGE.read_text(encoding="utf-8")
+    table = text.partition("## Rungs")[2].partition("\n## ")[0]
+    rows = {
+        cells[0]: cells[1:]
+        for line in table.splitlines()
+        if (cells := [cell.strip() for cell in line.strip("|").split("|")]) and line.endswith(" min |")
+    }
+    first = " ".join(text.partition("## Which engine")[0].split())
+
+    late = sum(int(cells[1]) for name, cells in rows.items() if name != engines.OURS)
+    assert f"Rungs that ran out of time: {late} of the others, {rows[engines.OURS][1]} of ours." in first
+    assert f"a limit ({', '.join({c[2] for c in rows.values()} - {'-'})})," in first
+    assert f"timed up to {engines.REPEATS.most} times, beyond 50 ms once. Ours has no limit" in first
+    minutes = sum(float(cells[-1].removesuffix(" min")) for cells in rows.values())
+    assert f"All nights together, the facts above not counted: {minutes:.1f} min." in table
+
+
+def test_a_new_page_says_so_too(engines: Any, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/engines.db"
+    late = tuple(
+        msgspec.structs.replace(s, outcome="timed_out", failure="the time limit of 0.5 s was reached")
+        if "/ladder:" in s.series and "/h=" in s.series
+        else s
+        for s in THEIRS.samples
+    )
+    for run in (document(0), msgspec.structs.replace(THEIRS, samples=late)):
+        tracker.record(run, database)
+    told = " ".join(engines.page(database).split())
+
+    assert "Of another engine a simulation has a limit (0.5 s), and so have those" in told
+    count = sum(s.outcome == "timed_out" for s in late)
+    assert count > 0
+    assert f"Rungs that ran out of time: {count} of the others, 0 of ours." in told
+    assert "All nights together, the facts above not counted: " in told
