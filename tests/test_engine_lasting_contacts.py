@@ -246,3 +246,17 @@ def test_a_block_of_steps_taken_back_behind_a_look_ahead_goes_the_same_way_again
             assert np.array_equal(failed.partial[name][:39], undisturbed[name]), (name, meets)
         struck.add(int(np.argmax(undisturbed["v"][:, 0] < 0.9)))
     assert len(struck) == 8  # steps, the first of the block among them
+
+
+def test_a_restitution_that_nothing_can_meet_is_not_refused() -> None:
+    lively = Material(restitution=0.5)
+    rests = RigidBody(name="rests", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS))
+    bare = RigidBody(
+        name="bare", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(5.0, 0.0, 0.0), material=lively
+    )
+    ghost = RigidBody(name="ghost", mass=1.0, shape=Sphere(RADIUS), position=(9.0, 0.0, 9.0), material=lively)
+    scene = Scene(bodies=(ground(), rests, bare, ghost), no_contact=(("ground", "ghost"), ("rests", "ghost")))
+    assert compile(scene, time_step=0.01, method=HALF)
+
+    with pytest.raises(MethodError, match="'ghost' has a restitution"):
+        compile(Scene(bodies=scene.bodies, no_contact=(("ground", "ghost"),)), time_step=0.01, method=HALF)
