@@ -146,8 +146,9 @@ public:
     /// `again` when the bodies are displaced: what is linear in the displacement is not all.
     bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
 
-    /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse of
-    /// what does not move by itself: forces keep adding up to the momentum.
+    /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse at
+    /// the first pushing contact with what does not move by itself: there forces keep adding up to the momentum, not
+    /// moments to the angular one. An island that only joints tie to such a thing has nothing to book it at.
     void pay(int island, Vec3 momentum) noexcept;
 
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
