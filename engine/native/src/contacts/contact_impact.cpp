@@ -1,6 +1,8 @@
 // The contact stage's second part: blows.
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
@@ -35,17 +37,16 @@ double ContactStage::kinetic_energy(const MixedSystem& system, const std::vector
 /// softness, which hit_exactly() takes back.
 void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
                               const std::vector<std::size_t>& who) const {
-    for (std::size_t from = 0, end = 0; from < who.size(); from = end) {
-        const auto pair = [&](std::size_t j) {
-            const Contact& contact = points_[who[j]].contact;
-            return IndexPair{contact.first, contact.second};
-        };
-        while (end < who.size() && pair(end) == pair(from)) ++end;
-        if (end - from <= determined) continue;
-        for (std::size_t j = from; j < end; ++j) {
-            RowBlock& block = hit.rows[joints + j];
-            block.softness[0] = blow_give * own_inertia(hit, block, 0);
-        }
+    std::map<std::pair<int, int>, int> shared;  // points by bodies: those of compounds do not come together
+    const auto pair = [&](std::size_t k) {
+        const Contact& contact = points_[k].contact;
+        return std::pair{contact.first, contact.second};
+    };
+    for (const std::size_t k : who) ++shared[pair(k)];
+    for (std::size_t j = 0; j < who.size(); ++j) {
+        if (shared[pair(who[j])] <= determined) continue;
+        RowBlock& block = hit.rows[joints + j];
+        block.softness[0] = blow_give * own_inertia(hit, block, 0);
     }
 }
 
