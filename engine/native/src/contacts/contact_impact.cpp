@@ -18,6 +18,7 @@ constexpr double blow_give =
 constexpr int determined = 3;   // points of a pair whose normal impulses its motion fixes
 constexpr int most_again = 8;   // solves until the give is gone: each leaves about blow_give of it
 constexpr double left = 1e-16;  // of the fastest row: a give that is rounding
+constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 
 }  // namespace
 
@@ -51,10 +52,10 @@ void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
 }
 
 /// Solves a blow; where its rows are soft, again and again with their give added to what they ask, until none is left
-/// (the proximal point algorithm, Rockafellar 1976).
+/// (the proximal point algorithm, Rockafellar 1976). Rows that contradict each other keep some: the solve is unsettled.
 void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                                FrictionModel model) {
-    run(hit, friction, impact_solver_, model);
+    bool finite = run(hit, friction, impact_solver_, model).finite;
     std::vector<double> asked;
     std::vector<char> answered(hit.rows.size(), 1);
     double fastest = 0.0;
@@ -65,8 +66,9 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
         fastest = std::max(fastest, std::abs(row_velocity(block, 0, hit.velocity)));
         soft = soft || block.softness[0] > 0.0;
     }
-    for (int again = 0; soft && again < most_again; ++again) {
-        double change = 0.0;
+    double change = 0.0;
+    for (int again = 0; soft && finite && again <= most_again; ++again) {
+        change = 0.0;
         for (std::size_t k = 0; k < asked.size(); ++k) {
             RowBlock& block = hit.rows[joints + k];
             const double right = asked[k] + block.softness[0] * block.multiplier[0];
@@ -74,9 +76,11 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
             answered[joints + k] = std::abs(right - block.right[0]) <= left * fastest;
             block.right[0] = right;
         }
-        if (change <= left * fastest) break;
-        run(hit, friction, impact_solver_, model, &answered);
+        if (change <= left * fastest || again == most_again) break;
+        finite = run(hit, friction, impact_solver_, model, &answered).finite;
     }
+    const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
+    if (finite && change > std::max(enough, tolerated * fastest)) ++counters_.unsettled;
 }
 
 void ContactStage::impact(MixedSystem& system) {
