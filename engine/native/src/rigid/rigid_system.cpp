@@ -213,10 +213,11 @@ void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
 
 Health RigidSystem::health() const {
     if (live_.too_fast >= 0) {
-        const bool given = h_ * norm(start_[live_.too_fast].angular_velocity) >= 2.0;  // then no joint did it
+        // Then no joint did it: with h |I⁻¹ L| above 1 (of a sphere) no turn has that angular momentum.
+        const bool given = h_ * norm(start_[live_.too_fast].angular_velocity) >= 1.0;
         const char* tension = given ? "" : cause();
         return {Status::diverged, live_.too_fast,
-                *tension ? tension : "turns too fast for the time step (h |w| reaches 2); try a smaller one"};
+                *tension ? tension : "turns too fast for the time step (h |w| reaches 1); try a smaller one"};
     }
     if (live_.lost >= 0)
         return {
