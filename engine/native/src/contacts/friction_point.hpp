@@ -9,7 +9,8 @@
 
 namespace spook {
 
-/// cone: |beta| <= mu nu, isotropic but for what ContactStage::orient() stretches. box: each |beta_i| <= mu nu of the step before, tangents along world axes.
+/// cone: |beta| <= mu nu, isotropic but for what ContactStage::orient() stretches. box: each |beta_i| <= mu nu of the
+/// step before, tangents along world axes.
 /// scaled_box: the box with the normal force of this step.
 SPOOK_NAMED_ENUM(FrictionModel, cone, box, scaled_box)
 
