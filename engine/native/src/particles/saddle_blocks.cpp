@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 namespace spook {
 
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double DAMPED_ABOVE = 0.3;    // of T h²/(m l)
 constexpr double STRING_DAMPING = 1.0;  // D̃/K̃ there: a damping time of h/4
+constexpr double IN_A_ROW = 1e-14;  // of det J / (tr J)³: points that lie to 1e-7 of their extent on a line
 
 void put(double* out, Vec3 v) noexcept {
     out[0] = v.x;
@@ -20,6 +22,16 @@ void put(double* out, Vec3 v) noexcept {
 
 void add(double* block, const Mat3& m, double sign) noexcept {
     for (int i = 0; i < 9; ++i) block[i] += sign * m.m[i];
+}
+
+/// w of J w = l for the inertia J of some points; of points in a row, that without a turn about it.
+Vec3 turn_of(const Mat3& inertia, Vec3 l, Vec3 along) noexcept {
+    const double* m = inertia.m;
+    const Vec3 r0{m[0], m[1], m[2]}, r1{m[3], m[4], m[5]}, r2{m[6], m[7], m[8]};
+    const double det = dot(r0, cross(r1, r2)), size = m[0] + m[4] + m[8];
+    if (std::fabs(det) > IN_A_ROW * size * size * size)
+        return (1.0 / det) * Vec3{dot(l, cross(r1, r2)), dot(r0, cross(l, r2)), dot(r0, cross(r1, l))};
+    return (2.0 / size) * (l - (dot(l, along) / dot(along, along)) * along);
 }
 
 }  // namespace
@@ -63,6 +75,53 @@ void SaddleBlocks::analyse(const Nodes& nodes, const DistanceRows& rows, const O
     rhs_.assign(static_cast<std::size_t>(ldlt_.unknowns()), 0.0);
     solution_ = rhs_;
     redundant_.prepare(ldlt_);
+    if (options_.stiff_strings) find_islands(nodes, rows);
+}
+
+void SaddleBlocks::find_islands(const Nodes& nodes, const DistanceRows& rows) {
+    const int count = static_cast<int>(nodes.size());  // which stands for all that does not float
+    std::vector<int> root(nodes.size() + 1);
+    std::iota(root.begin(), root.end(), 0);
+    const auto find = [&root](int i) {
+        while (root[i] != i) i = root[i] = root[root[i]];
+        return i;
+    };
+    const auto place = [&](int node) { return block_of_node_[node] < 0 ? count : node; };
+    for (const Row& row : rows.row) root[find(place(row.a))] = find(place(row.b));
+    std::vector<std::vector<int>> members(root.size());
+    for (int node = 0; node < count; ++node)
+        if (block_of_node_[node] >= 0) members[find(node)].push_back(node);
+    const int held = find(count);
+    for (int k = 0; k <= count; ++k)
+        if (k != held && !members[k].empty()) islands_.push_back(std::move(members[k]));
+}
+
+/// Σ x × m dv of what floats is 0 but for the forces across the rows, which leave a couple.
+void SaddleBlocks::keep_angular_momentum(const Nodes& nodes) {
+    for (const std::vector<int>& island : islands_) {
+        Vec3 centre, missing, along;
+        double mass = 0.0, farthest = -1.0;
+        for (const int node : island) {
+            centre += (1.0 / nodes.w[node]) * nodes.x[node];
+            mass += 1.0 / nodes.w[node];
+        }
+        centre *= 1.0 / mass;
+        Mat3 inertia;
+        for (const int node : island) {
+            const double m = 1.0 / nodes.w[node];
+            const Vec3 r = nodes.x[node] - centre;
+            const double r2 = dot(r, r);
+            if (r2 > farthest) farthest = r2, along = r;
+            missing -= m * cross(r, vec_at(solution_.data() + ldlt_.offset(block_of_node_[node])));
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) inertia(i, j) += m * ((i == j ? r2 : 0.0) - r[i] * r[j]);
+        }
+        const Vec3 turn = turn_of(inertia, missing, along);
+        for (const int node : island) {
+            double* dv = solution_.data() + ldlt_.offset(block_of_node_[node]);
+            put(dv, vec_at(dv) + cross(turn, nodes.x[node] - centre));
+        }
+    }
 }
 
 void SaddleBlocks::factor(const Nodes& nodes, const DistanceRows& rows) {
@@ -122,6 +181,7 @@ void SaddleBlocks::substitute(const Nodes& nodes, DistanceRows& rows) {
         redundant_.solve(ldlt_, options_.floor, rhs_.data(), solution_.data(), options_.refinements,
                          [&](std::span<const double> left) { return rows_hold(nodes, rows, left); });
     if (doubtful && options_.may_contradict) find_contradiction(nodes, rows);
+    if (options_.stiff_strings && redundant_.finite()) keep_angular_momentum(nodes);
     for (std::size_t k = 0; k < rows.row.size(); ++k)
         rows.link[k].lambda = redundant_.finite() ? -solution_[ldlt_.offset(row_blocks_[k].row)]
                                                   : std::numeric_limits<double>::quiet_NaN();

@@ -5,7 +5,9 @@
 //     [ G  −Sig ] [ μ  ] = [ rhs of the Schur form     ]
 // Without string stiffness K̃ = D̃ = 0. With it K̃ = (h²/4) Σ (T/l)(I − u uᵀ), T the tension of the step before:
 // the transverse stiffness of a taut row averaged over ¼ (x₊ + 2x + x₋) like a compliance, and D̃ a damping only
-// where the explicit step would be near its limit T h²/(m l) = 1.
+// where the explicit step would be near its limit T h²/(m l) = 1. Its forces stand across the rows, so that those at
+// a row's two ends turn what nothing holds to the world: a turn of the whole, which no row feels, gives the angular
+// momentum back.
 #pragma once
 
 #include <cstdint>
@@ -62,6 +64,8 @@ private:
         int between;    // edge between its bodies, for string stiffness
     };
     void stiffen_strings(const Nodes& nodes, const DistanceRows& rows);
+    void find_islands(const Nodes& nodes, const DistanceRows& rows);
+    void keep_angular_momentum(const Nodes& nodes);
     bool rows_hold(const Nodes& nodes, const DistanceRows& rows, std::span<const double> residuals) const;
     void find_contradiction(const Nodes& nodes, const DistanceRows& rows);
 
@@ -70,6 +74,7 @@ private:
     RedundantRows redundant_;
     std::vector<int> block_of_node_;
     std::vector<RowBlocks> row_blocks_;
+    std::vector<std::vector<int>> islands_;  // of nodes that nothing holds to the world, for string stiffness
     std::vector<double> rhs_, solution_;
     std::uint64_t operations_before_ = 0;
     int contradicted_ = -1;
