@@ -1,5 +1,7 @@
 """Recorded motion: within the error it states, bounded in size, and a result whatever the engine does."""
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -91,6 +93,20 @@ def test_a_motion_that_diverges_is_shown_until_it_does():
     moved = trajectory("fall", Named(falling(1.0)), explodes)
 
     assert moved is None or "ball" in moved.failure
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_scene_of_the_catalogue_gives_a_motion(name):
+    """Its first steps: how long it goes on is no question of what can be recorded."""
+    example = CATALOGUE[name].example()
+    short = replace(example, duration=min(example.duration, 4 * example.time_step))
+    moved = trajectory(name, Named(lambda: short), simulate)
+
+    assert moved is not None
+    assert moved.failure == ""
+    assert moved.bodies == min(len(example.scene.bodies), motion.MOST_SOLIDS)
+    assert np.isfinite(of(moved, "position")).all()
+    assert moved.exact, "nothing to compare it with"
 
 
 @pytest.mark.parametrize("name", ["pendulum", "friction", "cantilever"])

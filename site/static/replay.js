@@ -63,25 +63,33 @@ async function startReplay(box) {
     box.classList.add("moving");
     box.player = player;
     if (sources.length < 2) { return; }
-    const other = player.select([["", tonight.ghost ? tonight.ghost.name : "nothing"], ...sources.slice(1).map((s) => [s.key, s.label])], "", async (key) => {
+    const other = player.select([["", tonight.ghost ? tonight.ghost.name : "nothing"], ...sources.slice(1).map((s) => [s.key, s.label])], "", (key) => {
       state.set("against", key);
-      await against(key);
+      return laid(key);
     });
     const first = make("button", { type: "button", class: "button", hidden: true }, "First difference");
     first.addEventListener("click", () => { player.pause(); player.seek(Number(first.dataset.sample)); player.remember(); });
-    let night = null, label = "";
+    let night = null, label = "", asked = "";
     const beside = player.check("side by side", state.get("beside") === "1", (on) => { state.set("beside", on ? "1" : ""); player.beside(on ? night : null, label); });
     beside.hidden = true;
     async function against(key) {
       const source = sources.find((s) => s.key === key);
       beside.hidden = !source;
       player.beside(null);
+      asked = key;
+      say("");
       if (!source) { first.hidden = true; player.use(tonight, true); player.view.load(tonight, true); return; }
-      night = await movieFrom(source);
+      const loaded = await movieFrom(source);
+      if (asked !== key) { return; }  // another was chosen while this one came
+      night = loaded;
       label = source.label;
       beside.querySelector("input").disabled = !sameScene(tonight, night);
-      if (!sameScene(tonight, night)) { say(`${source.label} was recorded with other steps or bodies, so it cannot be laid over tonight.`); return; }
-      say("");
+      if (!sameScene(tonight, night)) {
+        first.hidden = true;
+        player.use(tonight, true);
+        say(`${source.label} was recorded with other steps or bodies, so it cannot be laid over tonight.`);
+        return;
+      }
       const at = firstDifference(tonight, night, TOLD);
       first.hidden = false;
       first.disabled = at < 0;
@@ -91,8 +99,17 @@ async function startReplay(box) {
       player.use({ ...tonight, ghost: { name: source.label, position: night.position, orientation: night.orientation, energy: night.energy } }, true);
       if (beside.querySelector("input").checked) { player.beside(night, label); }
     }
+    // Whatever keeps a night from being shown, tonight stays.
+    async function laid(key) {
+      try { await against(key); } catch (error) {
+        if (asked !== key) { return; }
+        first.hidden = beside.hidden = true;
+        player.use(tonight, true);
+        say(`The motion of that night cannot be shown: ${error.message}.`);
+      }
+    }
     player.tools.prepend(make("label", {}, "against ", other), first, beside);
-    if (state.get("against")) { other.value = state.get("against"); await against(other.value); }
+    if (state.get("against")) { other.value = state.get("against"); await laid(other.value); }
     if (state.get("at") === "first") {  // whoever comes from the list of causes wants to see it go wrong
       state.set("at", "");
       if (!first.hidden && first.dataset.seen >= 0) { player.seek(Number(first.dataset.seen)); player.remember(); } else if (!first.hidden) { player.toWorst(); }

@@ -26,7 +26,6 @@ from spook_tracker.tracker.judge.tonight import judge_maps, map_key
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory
 from spook_tracker.tracker.website.page_rows import address
-from spook_tracker.tracker.website.replays import MOST_NIGHTS, key_of
 
 SAID = {"detected": "RED", "accepted": "ACCEPTED", "fixed": "FIXED", "recovered": "RECOVERED"}
 SIGN: dict[str, Class] = {"accepted": "accepted", "fixed": "pass", "recovered": "pass"}
@@ -135,7 +134,7 @@ def told(cause: Cause, book: Book) -> Told:
         damage=_damage(shown),
         tests=tests,
         worst=hit_row(shown[0], book),
-        replay=_replay(by_test, known, night, good, book),
+        replay=_replay(by_test, known, good, book),
         compare=f"compare.html#after={night.id}&before={good.id}" if good is not None else "",
         ended=[ends[0][1], ends[-1][1]] if ends else [],
         hits=cause.hits,
@@ -161,14 +160,14 @@ def _damage(hits: Sequence[Hit]) -> list[tuple[str, int]]:
 
 
 def _replay(
-    by_test: dict[str, list[Hit]], known: dict[str, TestHistory], night: Night, good: Night | None, book: Book
+    by_test: dict[str, list[Hit]], known: dict[str, TestHistory], good: Night | None, book: Book
 ) -> str:
     """The first test hit whose recorded motion differs from that of the last good night, at that moment."""
     for name in by_test:
-        motions = {found.id: motion for found, motion in known[name].motions[:MOST_NIGHTS]}
-        if good is None or good.id not in motions or book.tonight.id not in motions:
+        keys = {motion.night.id: motion.key for motion in book.motions[name]}
+        if good is None or good.id not in keys or book.tonight.id not in keys:
             continue
-        now, then = key_of(motions[book.tonight.id]), key_of(motions[good.id])
+        now, then = keys[book.tonight.id], keys[good.id]
         if now != then:
             return f"{address(known[name])}#against={then}&at=first"
     return ""

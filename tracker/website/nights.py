@@ -30,6 +30,7 @@ from spook_tracker.tracker.judge.standing import worst
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.earlier_nights import Earlier, earlier_nights
+from spook_tracker.tracker.website.motions import Motion, kept_motions
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
 MapKey = tuple[str, str, str]  # test, configuration, name
@@ -101,7 +102,7 @@ class TestHistory:
     card: TestCard
     trends: list[Trend]
     figures: tuple[FigureData, ...] = ()
-    motions: tuple[tuple[Night, Trajectory], ...] = ()  # newest first
+    motions: tuple[tuple[Night, Trajectory], ...] = ()  # as recorded, newest first; see Book.motions
     maps: tuple[MapData, ...] = ()
     earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
     map_nights: dict[str, tuple[Night | None, Night]] = field(default_factory=dict)  # both, by key of a map
@@ -157,6 +158,11 @@ class Book(Chapter):
     def engines(self) -> list[Chapter]:
         """Every engine, ours first."""
         return [self, *self.others]
+
+    @cached_property
+    def motions(self) -> dict[str, tuple[Motion, ...]]:
+        """By test, newest first: what can be replayed within the budget of a site."""
+        return kept_motions(self.tests)
 
     def peers(self, test: str) -> list[tuple[str, TestHistory]]:
         """The same test put to other engines, where it ran on the machine of tonight."""

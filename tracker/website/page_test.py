@@ -45,7 +45,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "card": test.card,
         "slug": slug(test.name),
         "stage_times": stage_times(test),
-        "replay": replay(test),
+        "replay": replay(book.motions[test.name]),
         "scenery": scenery(test.card.scene) if test.card.scene else None,
         "state": test.state,
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),

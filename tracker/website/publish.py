@@ -202,7 +202,7 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
             partial(data_files.history_csv, told, test),
         )
         yield f"data/{slug(test.name)}.json", facts, partial(data_files.test_json, told, test)
-    for path, content in replay_files(told.tests):
+    for path, content in replay_files(told.motions).items():
         yield path, content, partial(bytes, content)
     tables = {
         "tonight": data_files.newest(told, told.tests),

@@ -1,0 +1,100 @@
+"""Which recorded motions the website keeps: decided once, so that nothing is offered whose file is not there.
+
+A motion that is the same on several nights is one file.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from spook_tracker.tracker.document.json_form import encode
+from spook_tracker.tracker.document.run_document import Trajectory
+from spook_tracker.tracker.document.wording import slug
+from spook_tracker.tracker.website.folder import digest
+
+if TYPE_CHECKING:  # they ask for what is kept
+    from spook_tracker.tracker.website.nights import Night, TestHistory
+
+MOST_NIGHTS = 8  # of one test
+SITE_BYTES = 12_000_000  # of all motions: older nights are left out beyond, newest first, tonight never
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a test's scene moved in a night, and the file it is loaded from."""
+
+    night: Night
+    recorded: Trajectory
+    key: str  # the same for the same motion, whatever night it is of
+    script: bytes  # a page opened from a file may not fetch, so data come as a script
+
+    @property
+    def address(self) -> str:
+        """Below the root of the website."""
+        return f"replay/{self.key}.js"
+
+
+def kept_motions(tests: Iterable[TestHistory]) -> dict[str, tuple[Motion, ...]]:
+    """The motions within the budget of a site, by test, newest first: the newest of each test is always there."""
+    found: dict[str, list[Motion]] = {test.name: [] for test in tests}
+    written: dict[str, bytes] = {}
+    spent = 0
+    for age in range(MOST_NIGHTS):
+        for test in tests:
+            if age >= len(test.motions):
+                continue
+            night, recorded = test.motions[age]
+            key = f"{slug(recorded.test)}-{digest(encode(recorded))[:10]}"
+            if key not in written:
+                script = _script(key, recorded)
+                if age > 0 and spent + len(script) > SITE_BYTES:
+                    continue
+                written[key] = script
+                spent += len(script)
+            found[test.name].append(Motion(night, recorded, key, written[key]))
+    return {name: tuple(motions) for name, motions in found.items()}
+
+
+def _script(key: str, motion: Trajectory) -> bytes:
+    solids = [
+        {
+            "kind": solid.kind,
+            "size": solid.size,
+            "fixed": solid.fixed,
+            "position": solid.position,
+            "orientation": solid.orientation,
+            "body": body,
+        }
+        for solid, body in zip(motion.solids, motion.body_of_solid, strict=True)
+    ]
+    links = [
+        {"kind": link.kind, "bodies": link.bodies, "anchors": link.anchors, "row": link.row}
+        for link in motion.links
+    ]
+    channels = [
+        {
+            "name": channel.name,
+            "unit": channel.unit,
+            "low": channel.low,
+            "step": channel.step,
+            "data": base64.b64encode(channel.data).decode("ascii"),
+        }
+        for channel in motion.channels
+    ]
+    data: dict[str, Any] = {
+        "step": motion.step,
+        "count": motion.count,
+        "bodies": motion.bodies,
+        "rows": motion.rows,
+        "gravity": motion.gravity,
+        "attractors": motion.attractors,
+        "exact": motion.exact,
+        "solids": solids,
+        "links": links,
+        "channels": channels,
+    }
+    return f"recorded({json.dumps(key)},{json.dumps(data, separators=(',', ':'))});\n".encode()
