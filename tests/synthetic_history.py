@@ -300,7 +300,8 @@ class DocumentHistory:
                 points.setdefault(found.series, []).append(
                     Point(run, found, newest[found.series].test_version)
                 )
-        return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(points)}
+        chosen = points.keys() if keys is None else points.keys() & set(keys)
+        return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(chosen)}
 
     def samples(self, run_id: str) -> dict[str, tuple[SeriesDefinition, Sample]]:
         run = self.documents[run_id]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import xml.etree.ElementTree as ElementTree
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from click import unstyle
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -42,14 +43,30 @@ def night(number: int, pairs: list[Any], version: str = "", **changes: Any) -> R
     )
 
 
-def rungs(seconds: float) -> list[Any]:
-    """A ladder of two time steps that take so long."""
+def rungs(seconds: float, worst: float = STEPS[0] ** 2) -> list[Any]:
+    """A ladder of two time steps that take so long; the error of the longer step."""
     found = []
     for h in STEPS:
         definition = series("t", "ladder:e", kind="ladder", time_step=h, unit="m")
         timing = Timing(seconds=(seconds / h, 1.01 * seconds / h), runs_per_repeat=1)
-        found.append((definition, sample(definition, h * h, timing=timing)))
+        found.append((definition, sample(definition, worst if h == STEPS[0] else h * h, timing=timing)))
     return found
+
+
+def order(value: float) -> list[Any]:
+    """The order a ladder shows; NaN where fewer than three of its points can be used."""
+    definition = series(
+        "t", "ladder:e:order", kind="order", role="companion", better="inside", time_step=None, limit=(0.9, 1.1),
+        reference=1.0,
+    )  # fmt: skip
+    return [(definition, judged(definition, value, "fewer than three usable points"))]
+
+
+def judged(definition: Any, value: float, why_not: str) -> Any:
+    """A sample; NaN is a value that was looked for and is missing, as measuring writes it down."""
+    if math.isnan(value):
+        return sample(definition, value, outcome="missing", failure=why_not)
+    return sample(definition, value)
 
 
 def one(value: float, **facts: Any) -> list[Any]:
@@ -137,12 +154,18 @@ def histories(draw: Any) -> tuple[list[RunDocument], list[Accepted]]:
         bound = series("u", "c", role="companion", set_point=(0.0, 0.6), unit="m")
         if draw(st.integers(0, 5)):
             pairs.append((bound, sample(bound, draw(LEVELS))))
+        if draw(st.integers(0, 4)):
+            kept = series("u", "kept", role="gate", limit=0.6, unit="m")
+            value = draw(LEVELS)
+            pairs.append((kept, judged(kept, value, "the measurement gave no 'kept'")))
+        if draw(st.booleans()):
+            pairs += order(draw(st.sampled_from([1.0, 1.0, 1.05, 1.3, math.nan])))
         point = series("u", "stable", role="companion", kind="break_point", better="larger", time_step=None)
         pairs.append((point, sample(point, draw(LEVELS))))
         if draw(st.booleans()):
             pairs += seconds(1e-3 * draw(TIMES))
         if draw(st.integers(0, 4)):
-            pairs += rungs(1e-3 * draw(TIMES))
+            pairs += rungs(1e-3 * draw(TIMES), draw(st.sampled_from([0.01, 0.01, 0.02, math.nan])))
         machine = replace(MACHINE, fingerprint=draw(st.sampled_from("mmmn")))
         version = draw(st.sampled_from(["", "", "1.0.0", "1.1.0"]))
         runs.append(night(number, pairs, version, machine=machine))
@@ -167,7 +190,7 @@ class Recorded(DocumentHistory):
 def test_every_output_says_the_same_of_a_series(
     given_history: tuple[list[RunDocument], list[Accepted]],
 ) -> None:
-    from spook_tracker.tracker.judge.standing import count
+    from spook_tracker.tracker.judge.standing import worst
     from spook_tracker.tracker.library import trend
     from spook_tracker.tracker.website.causes import causes_of
     from spook_tracker.tracker.website.events import all_events
@@ -176,6 +199,11 @@ def test_every_output_says_the_same_of_a_series(
     from spook_tracker.tracker.website.page_index import health
 
     runs, accepted = given_history
+    note(
+        "\n".join(
+            f"{r.id} {r.engine.version} {[(s.series, s.value, s.outcome) for s in r.samples]}" for r in runs
+        )
+    )
     records: Any = Recorded(runs)
     findings = tonight(records, runs[-1], accepted)
     word = {f.series: f.verdict.word for f in findings}
@@ -195,10 +223,13 @@ def test_every_output_says_the_same_of_a_series(
     events = [e for e in all_events(told) if e.lasting and e.last is told.tonight]
     assert {e.definition.key: e.name for e in events} == name
     state, found = health(told)
+    stands = {f.series: f.judged.stands for f in findings if f.judged}
+    assert {key: t.state for key, t in trends.items() if t.nights[-1] == last} == stands
+    expects = found.expected > 0
+    assert state == worst(stands.values()) or (state == "none" and not expects)
     assert (state in ("fail", "watch")) == bool(name)
-    assert found == count(
-        (next(d for d in runs[-1].series if d.key == s.series), s) for s in runs[-1].samples
-    )
+    assert state == "fail" or not any(stands[key] == "fail" for key in name)
+    _counts_alike(runs, told, stands, name)
 
     causes = causes_of(told)
     lasting = [(hit.series, cause) for cause in causes for hit in cause.hits if hit.end is None]
@@ -218,6 +249,125 @@ def test_every_output_says_the_same_of_a_series(
 
     if len(runs) > 1:
         _compares_alike(records, runs, accepted, told, {f.series: f for f in findings})
+
+
+def without_lost(found: Any) -> Any:
+    """The table of versions says only what is expected; a value that is only followed is not in it."""
+    return dataclasses.replace(found, lost=0)
+
+
+def _counts_alike(runs: list[RunDocument], told: Any, stands: dict[str, Any], red: dict[str, str]) -> None:
+    """The command that shows a run, the badge, the heat map and the page count one number of limits."""
+    from spook_tracker.tracker.cli.report_table import pairs, verdict, word
+    from spook_tracker.tracker.judge.standing import count, worst
+    from spook_tracker.tracker.judge.vocabulary import CLASSES
+    from spook_tracker.tracker.website.feed import badge_words
+    from spook_tracker.tracker.website.page_index import counts_by_night, health, heat, said
+
+    _, found = health(told)
+    assert found == count(pairs(runs[-1]))
+    assert without_lost(found) == without_lost(counts_by_night(told, 1)[told.tonight.index])
+    printed = unstyle(verdict(runs[-1]))
+    if found.red:
+        assert printed.startswith(f"✗ red: {found.broken} of {found.limits} limits broken")
+        assert ("set points left" in printed) == (found.left > 0)
+    elif found.expected:
+        assert f"all {found.expected} limits and set points hold" in printed
+    assert badge_words(found) == f"{found.limits - found.broken} of {found.limits} limits kept"
+
+    signs = {name: f"{mark} {called}" for name, (mark, called, _) in CLASSES.items()}
+    for definition, measured in pairs(runs[-1]):
+        shown, page = word(definition, measured), stands[definition.key]
+        if page == "accepted":
+            continue  # what somebody accepted, the bare number does not know
+        if definition.key not in red:
+            assert shown == signs[page], definition.key
+        else:  # what only became worse than before, the bare number does not know either
+            assert (shown == signs["fail"]) <= (page == "fail"), definition.key
+            assert page == "fail" or shown in (signs["watch"], signs["pass"], signs["followed"])
+
+    last = told.tonight.index
+    for test, row in zip(told.tests, heat(told)["rows"], strict=True):
+        tonight = [t.state for t in test.trends if t.nights[-1] == last]
+        run = row["runs"][-1]
+        assert (run["state"], run["told"].split(": ")[1].split(" ")[0]) == (
+            worst(tonight),
+            said(worst(tonight)).split(" ")[0],
+        )
+
+
+def test_an_order_nobody_could_read_is_a_broken_limit_for_the_command_and_for_the_page(
+    tmp_path: Path,
+) -> None:
+    """The order of a ladder with fewer than three usable points is recorded as missing."""
+    runs = [night(0, one(0.5) + order(1.0)), night(1, one(0.5) + order(math.nan))]
+
+    publish(DocumentHistory(runs), tmp_path / "public")
+
+    from spook_tracker.tracker.cli.report_table import verdict
+
+    assert unstyle(verdict(runs[-1])).startswith("✗ red: 1 of 2 limits broken")
+    assert json.loads((tmp_path / "public" / "badge.json").read_text())["message"] == "1 of 2 limits kept"
+    assert "One limit is broken tonight" in (tmp_path / "public" / "index.html").read_text()
+
+
+def test_a_series_nobody_measured_is_no_limit_of_that_run(tmp_path: Path) -> None:
+    """What the history adds, because it was asked for and not answered, the command that shows a run cannot count."""
+    runs = [night(0, one(0.5) + order(1.0)), night(1, one(0.5))]
+
+    publish(DocumentHistory(runs), tmp_path / "public")
+
+    assert json.loads((tmp_path / "public" / "badge.json").read_text())["message"] == "1 of 1 limits kept"
+
+
+def test_an_order_that_moved_in_its_ninth_digit_is_not_called_wrong(tmp_path: Path) -> None:
+    """Nearer to 2 is nearer; farther from it by one in the ninth digit is said to be that, and with its digits."""
+    near, far = 1.98444647, 1.98444646
+    facts: dict[str, Any] = {"reference": 2.0, "limit": (1.9, 2.1)}
+    runs = [
+        night(n, [(replace(order(1.0)[0][0], **facts), order(value)[0][1])])
+        for n, value in enumerate((near, near, far))
+    ]
+
+    publish(DocumentHistory(runs), tmp_path / "public")
+    (line,) = [line for line in finding_lines(tonight(DocumentHistory(runs), runs[-1])) if "✗ t/" in line]
+    pages = " ".join(page.read_text() for page in (tmp_path / "public").rglob("*.html"))
+
+    assert "further from its order; 1.98444647 → 1.98444646" in line
+    for text in (line, pages):
+        assert "wrong order" not in text
+        assert "1.98445 → 1.98445" not in text
+
+
+def test_a_run_time_that_fell_is_not_slower(tmp_path: Path) -> None:
+    runs = [night(n, rungs(1e-3 * noise(n) * (0.45 if n >= 12 else 1.0))) for n in range(14)]
+
+    assert red_tonight(runs) == red_on_the_site(runs, tmp_path / "public") == set()
+    found = {f.series: f for f in tonight(DocumentHistory(runs), runs[-1])}
+    assert found["t/plain/ladder:e:run-time"].verdict.word in ("improved", "same")
+    assert not any("slower" in line for line in finding_lines(list(found.values())))
+    assert "slower" not in (tmp_path / "public" / "regressions.html").read_text()
+
+
+def test_the_first_night_of_a_database_does_not_hold_its_level() -> None:
+    runs = [night(0, one(0.5) + order(1.0) + rungs(1e-3))]
+
+    lines = " ".join(finding_lines(tonight(DocumentHistory(runs), runs[-1])))
+
+    assert "hold" not in lines
+    assert "measured for the first time" in lines
+
+
+def test_a_rung_that_became_nan_turns_the_cell_of_its_test_red() -> None:
+    from spook_tracker.tracker.website.nights import book
+    from spook_tracker.tracker.website.page_index import heat
+
+    runs = [night(0, rungs(1e-3)), night(1, rungs(1e-3, math.nan))]
+    records: Any = Recorded(runs)
+
+    (row,) = heat(book(records))["rows"]
+
+    assert [run["state"] for run in row["runs"]] == ["followed", "fail"]
 
 
 def _compares_alike(

@@ -131,7 +131,7 @@ def test_a_series_over_versions(session, nowhere):
 
     assert list(history) == ["other", KEY]
     assert [point.sample.value for point in history[KEY].points] == [1.0, 2.0]
-    assert [version for _, _, version in history[KEY].points] == ["v1", "v1"]
+    assert [point.test_version for point in history[KEY].points] == ["v1", "v1"]
 
 
 def test_the_definition_of_a_history_is_the_newest(session, nowhere):

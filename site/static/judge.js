@@ -224,9 +224,13 @@ function judgeSeries(key, old, now, before, after, accepted) {
   let told, word = null;
   if (!old) { told = verdict("new", "measured for the first time"); } else if (!now) {
     const family = FAMILY[definition.kind], tests = after.asked[family];
-    if ((tests || []).includes(definition.test) && definition.kind !== "time") {
+    const missed = (tests || []).includes(definition.test) && definition.kind !== "time";
+    const removed = after.whole && definition.role === "gate" && tests;
+    if (old.outcome === "missing" && (missed || removed)) {
+      told = verdict("identical", "still missing", { ulps: 0n });
+    } else if (missed) {
       told = verdict("missing", "no longer measured by this test", { name: "missing" });
-    } else if (after.whole && definition.role === "gate" && tests) {
+    } else if (removed) {
       told = verdict("removed", "the whole catalogue was asked, and this gate is not in it any more", { name: "removed" });
     } else { told = verdict("same", "not measured in this run"); word = "not_measured"; }
   } else {

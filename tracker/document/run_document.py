@@ -314,6 +314,7 @@ class Point(NamedTuple):
     run: Any  # a Run
     sample: Sample
     test_version: str
+    recorded: bool = True  # False: asked for and not answered; no document has this sample
 
     @property
     def value(self) -> float:

@@ -192,7 +192,11 @@ def same_commit(before: Side, after: Side) -> bool:
 def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool, removed: bool) -> Change:
     """A value that is not there: a gap where the test was run, silence where it was not asked."""
     definition, sample = old
-    if asked and definition.kind != "time":
+    missed = asked and definition.kind != "time"
+    if sample.outcome == "missing" and (missed or removed):
+        still = Verdict(word="identical", sentence="still missing", ulps=0)
+        return _change(key, definition, sample, None, still)
+    if missed:
         verdict = Verdict(word="missing", sentence="no longer measured by this test", name="missing")
         return _change(key, definition, sample, None, verdict)
     if removed:

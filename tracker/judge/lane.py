@@ -134,7 +134,10 @@ def histories(
     place = {run.id: run for run in runs}
     tests = None if keys is None else {key.partition("/")[0] for key in keys}
     looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
-    recent = records.samples_of([run.id for run in looked_at], tests)
+    told_by_answers = any(
+        not _says(run) for run in looked_at
+    )  # what these were asked, only all they answered tells
+    recent = records.samples_of([run.id for run in looked_at], None if told_by_answers else tests)
     found: dict[str, SeriesHistory] = {}
     known: dict[
         int, tuple[Any, Samples]
@@ -247,7 +250,7 @@ def with_missing(
             lost = Sample(
                 series=key, value=NAN, outcome="missing", passed=False, set_point_held=False, failure=why
             )
-            points.append(Point(runs[i], lost, definition.test_version))
+            points.append(Point(runs[i], lost, definition.test_version, recorded=False))
         if len(points) > len(series.points):
             points.sort(key=lambda point: place[point.run.id])
         told[key] = SeriesHistory(definition, tuple(points))

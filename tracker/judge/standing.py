@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.document.run_document import Point, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 NOT_SUPPORTED = "not_supported"  # outside the order: an engine cannot be asked this
@@ -86,6 +86,11 @@ class Count:
     @property
     def red(self) -> bool:
         return self.broken + self.left + self.lost > 0
+
+
+def count_points(points: Iterable[tuple[SeriesDefinition, Point]]) -> Count:
+    """The count of a run from its place in the histories: only what the run recorded, whatever became of it."""
+    return count((definition, point.sample) for definition, point in points if point.recorded)
 
 
 def count(pairs: Iterable[tuple[SeriesDefinition, Sample]]) -> Count:

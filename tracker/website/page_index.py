@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
+from spook_tracker.tracker.document.run_document import Point, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
 from spook_tracker.tracker.judge.causes import Cause
-from spook_tracker.tracker.judge.standing import Count, count, expected, worst
+from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
 from spook_tracker.tracker.website.causes import Told, lasting, told
 from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
@@ -29,8 +30,7 @@ def tonight(book: Book) -> list[Trend]:
 
 def counted(book: Book) -> Count:
     """Limits and set points of the newest night."""
-    samples = ((t.definition, t.told.nights[-1].night.sample) for t in tonight(book))
-    return count((definition, sample) for definition, sample in samples if sample.outcome != "missing")
+    return count_points((t.definition, t.told.nights[-1].night) for t in tonight(book))
 
 
 def health(book: Book) -> tuple[Class, Count]:
@@ -92,14 +92,16 @@ def _nearest(test: TestHistory, book: Book) -> Row:
 
 def counts_by_night(book: Book, most: int) -> dict[int, Count]:
     """Limits and set points of so many nights, the newest, by the index of the night."""
-    pairs: dict[int, list[Any]] = {night.index: [] for night in book.nights[-most:]}
+    pairs: dict[int, list[tuple[SeriesDefinition, Point]]] = {
+        night.index: [] for night in book.nights[-most:]
+    }
     for test in book.tests:
         for trend in test.trends:
             if expected(trend.definition):
                 for night, judged in zip(trend.nights[-most:], trend.told.nights[-most:], strict=True):
-                    if night in pairs and judged.night.sample.outcome != "missing":
-                        pairs[night].append((trend.definition, judged.night.sample))
-    return {night: count(found) for night, found in pairs.items()}
+                    if night in pairs:
+                        pairs[night].append((trend.definition, judged.night))
+    return {night: count_points(found) for night, found in pairs.items()}
 
 
 def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:
