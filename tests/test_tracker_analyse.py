@@ -267,3 +267,40 @@ def test_maps_are_judged_cell_by_cell():
 
     assert found.red
     assert found.series == "t/c/map:n"
+
+
+def test_a_stability_map_that_is_not_there_any_more_is_missing_until_it_is_back_or_given_up():
+    from spook_tracker.tracker.judge.accepted import Accepted
+    from spook_tracker.tracker.judge.tonight import tonight
+    from spook_tracker.tracker.website.causes import causes_of
+    from spook_tracker.tracker.website.nights import book
+    from tests.synthetic_history import DocumentHistory, document
+
+    runs = [document(n) for n in range(5)]
+    runs[3:] = [msgspec.structs.replace(run, maps=()) for run in runs[3:]]
+    key = "pendulum/plain/map:damping-compliance"
+    for last in (4, 5):  # the first night without it, and the second
+        told = DocumentHistory(runs[:last])
+        (found,) = [f for f in tonight(told, runs[last - 1]) if f.series == key]
+        assert (found.red, found.verdict.word) == (True, "missing")
+        assert (found.good.id, found.bad.id) == (runs[2].id, runs[last - 1].id)
+        assert [h.sentence for c in causes_of(book(told)) for h in c.hits if h.series == key]
+
+    given_up = [Accepted(series=key, low=math.inf, high=math.inf, who="A", why="w", removed=True)]
+    assert not [f for f in tonight(DocumentHistory(runs), runs[-1], given_up) if f.red]
+    assert not causes_of(book(DocumentHistory(runs), given_up))
+
+    runs.append(document(5))
+    assert not [f for f in tonight(DocumentHistory(runs), runs[-1]) if f.red]
+
+
+def test_a_stability_map_that_was_not_asked_for_is_not_missed():
+    from spook_tracker.tracker.document.run_document import Asked
+    from spook_tracker.tracker.judge.tonight import tonight
+    from tests.synthetic_history import DocumentHistory, document
+
+    runs = [document(n) for n in range(3)]
+    asked = Asked(tests=tuple(card.name for card in runs[0].tests), families=("values", "sweep"), whole=True)
+    runs[2] = msgspec.structs.replace(runs[2], maps=(), asked=asked)
+
+    assert not [f for f in tonight(DocumentHistory(runs), runs[2]) if ":damping" in f.series]

@@ -168,6 +168,22 @@ def test_a_map_cell_that_got_worse_is_a_regression():
     assert (document.changes[0].series, document.changes[0].red) == ("t/c/map:n", True)
 
 
+def test_a_map_that_was_asked_for_and_is_not_there_is_missing_and_red():
+    facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
+    cells = MapData(
+        **facts, x_label="x", y_label="y", x=(1.0,), y=(1.0,), cells=(("settled",),), prediction=None
+    )
+    values = [pair("t/c/m", 1.0), pair("t/c/stability:s", 1.0, kind="break_point", better="larger")]
+    document = compare(run("a", *values, maps=[cells]), run("b", *values))
+    silent = compare(run("a", *values, maps=[cells]), run("b", values[0]))
+    level = Accepted(series="t/c/map:*", low=math.inf, high=math.inf, who="Ada", why="w", removed=True)
+    accepted = compare(run("a", *values, maps=[cells]), run("b", *values), [level])
+
+    assert (by_series(document)["t/c/map:n"], document.exit_code) == ("missing", 1)
+    assert (silent.exit_code, "t/c/map:n" in by_series(silent)) == (0, False)
+    assert (by_series(accepted)["t/c/map:n"], accepted.exit_code) == ("accepted", 0)
+
+
 def test_a_smaller_break_point_is_less_stable():
     def point(value: float):
         return pair("t/c/stability:s", value, kind="break_point", better="larger", relative_tolerance=0.01)

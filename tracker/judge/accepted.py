@@ -9,8 +9,8 @@ accepted.toml holds tables like
     why = "one sentence"
     until = 2027-01-31                                 # optional: after this day it is red again
 
-and, for a gate that left the catalogue on purpose, `removed = true` in place of the range. A value inside the
-range is not red until that day and is the new level. What is not finite is never accepted.
+and, for a gate or a stability map that is not asked for any more, `removed = true` in place of the range. A value
+inside the range is not red until that day and is the new level. What is not finite is never accepted.
 
 A table [[expected]] without a range (series, who, why, until) names what is known to fail: whatever it gives is not
 red until that day, the level from before stays the one to come back to, and once it holds the entry is reported.

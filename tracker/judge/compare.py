@@ -5,6 +5,7 @@ Takes plain values (definitions, samples, maps) so that it can be asked without 
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +36,7 @@ from spook_tracker.tracker.judge.series_history import (
 )
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
-from spook_tracker.tracker.judge.tonight import map_key, not_compared
+from spook_tracker.tracker.judge.tonight import NO_MAP, map_key, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
 from spook_tracker.tracker.judge.work import FAMILIES
@@ -287,26 +288,27 @@ def _stands(definition: SeriesDefinition, after: Sample | None, verdict: Verdict
 
 
 def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
-    old_maps = {(m.test, m.configuration, m.name): m for m in before.maps}
+    asked = (asked_in(after.samples) if after.asked is None else after.asked).get("stability", set())
+    new = {map_key(found): found for found in after.maps}
     changes = []
-    for new in after.maps:
-        key = (new.test, new.configuration, new.name)
-        old = old_maps.get(key)
-        if old is None:
+    for old in before.maps:
+        key = map_key(old)
+        if key not in new and old.test not in asked:
             continue
-        verdict = judge_map(old, new)
+        verdict = judge_map(old, new[key]) if key in new else NO_MAP
+        stands: Class = "fail" if verdict.word == "missing" else "watch" if verdict.red else "pass"
         changes.append(
             Change(
-                series=map_key(new),
-                test=new.test,
-                metric=f"map:{new.name}",
-                configuration=new.configuration,
+                series=key,
+                test=old.test,
+                metric=f"map:{old.name}",
+                configuration=old.configuration,
                 role="companion",
                 kind="map",
                 unit="",
                 word=verdict.word,
                 red=verdict.red,
-                stands="watch" if verdict.red else "pass",
+                stands=stands,
                 name=verdict.name,
                 sentence=verdict.sentence,
                 before=None,
@@ -321,9 +323,11 @@ def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
 
 def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change:
     """A red change at an accepted level is not red; it says who took it and why."""
-    if not change.red or change.after is None:
+    gone = (change.kind == "map" and change.word == "missing") or change.word == "removed"
+    if not change.red or (change.after is None and not gone):
         return change
-    level = acceptance(accepted, change.series, float(change.after), night)
+    value = math.nan if change.after is None else float(change.after)
+    level = acceptance(accepted, change.series, value, night, removed=gone)
     if level is None:
         return change
     word: Word = "expected" if level.expected else "accepted"

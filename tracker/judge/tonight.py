@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from spook_tracker.tracker.document.run_document import MapData, SeriesDefinition
-from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.lane import Records, histories, line_of
-from spook_tracker.tracker.judge.series_history import Judged, Told, blame, commit_of, judge_all
+from spook_tracker.tracker.judge.lane import RECENT, Records, asked_for, histories, line_of
+from spook_tracker.tracker.judge.series_history import (
+    Judged,
+    Told,
+    blame,
+    commit_of,
+    judge_all,
+    night_of,
+)
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge_map
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
 
 MOST_NAMED = 8  # tests in one sentence
+NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,12 +72,29 @@ def tonight(records: Records, run: Any, accepted: Sequence[Accepted] = ()) -> li
     """Findings of one recorded run against its history (tracker.store.history.History); red first."""
     line = line_of(records.runs(), run)
     findings = of_run(judge_all(histories(records, line), accepted), run.id)
-    for other in reversed(line[:-1]):
-        if other.machine.float_environment == run.machine.float_environment and records.maps(other.id):
-            found = judge_maps(records.maps(other.id), records.maps(run.id))
-            findings += [replace(finding, good=other, bad=run) for finding in found]
-            break
+    findings += _of_maps(records, line, run, accepted)
     return worst_first(findings)
+
+
+def _of_maps(records: Records, line: Sequence[Any], run: Any, accepted: Sequence[Accepted]) -> list[Finding]:
+    """Each stability map against the last run that has it: one that is not there any more stays missing."""
+    asked = asked_for(run, {} if run.asked is not None else records.samples(run.id)).get("stability", set())
+    maps, seen, findings = records.maps(run.id), set[str](), list[Finding]()
+    for other in reversed(line[-RECENT:-1]):
+        if other.machine.float_environment != run.machine.float_environment:
+            continue
+        earlier = [found for found in records.maps(other.id) if map_key(found) not in seen]
+        seen.update(map(map_key, earlier))
+        for finding in judge_maps(earlier, maps, asked):
+            gone = finding.verdict.word == "missing"
+            taken = (
+                acceptance(accepted, finding.series, math.nan, night_of(run), removed=True) if gone else None
+            )
+            if taken is not None:
+                known = replace(finding.verdict, word="accepted", name="")
+                finding = replace(finding, verdict=known, red=False)
+            findings.append(replace(finding, good=other, bad=run))
+    return findings
 
 
 def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
@@ -130,24 +156,22 @@ def not_compared(verdicts: Iterable[tuple[str, Verdict]]) -> list[str]:
     return said
 
 
-def judge_maps(before: Sequence[MapData], after: Sequence[MapData]) -> list[Finding]:
-    """Tonight's stability maps against those of an earlier night."""
-    old = {(m.test, m.configuration, m.name): m for m in before}
+def judge_maps(
+    before: Sequence[MapData], after: Sequence[MapData], asked: Collection[str] = ()
+) -> list[Finding]:
+    """Tonight's stability maps against those of an earlier night; `asked` are the tests asked for stability tonight."""
+    new = {map_key(found): found for found in after}
     findings = []
-    for new in after:
-        earlier = old.get((new.test, new.configuration, new.name))
-        if earlier is None:
+    for old in before:
+        key = map_key(old)
+        if key in new:
+            verdict = judge_map(old, new[key])
+        elif old.test in asked:
+            verdict = NO_MAP
+        else:
             continue
-        verdict = judge_map(earlier, new)
         findings.append(
-            Finding(
-                series=map_key(new),
-                definition=None,
-                test=new.test,
-                judged=None,
-                verdict=verdict,
-                red=verdict.red,
-            )
+            Finding(series=key, definition=None, test=old.test, judged=None, verdict=verdict, red=verdict.red)
         )
     return findings
 

@@ -22,8 +22,9 @@ from spook_tracker.tracker.document.wording import (
 )
 from spook_tracker.tracker.judge.causes import Cause, Hit, causes
 from spook_tracker.tracker.judge.series_history import blame
-from spook_tracker.tracker.judge.tonight import judge_maps, map_key
+from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.events import map_verdicts
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory
 from spook_tracker.tracker.website.page_rows import address
 
@@ -67,23 +68,25 @@ class Told:
 def causes_of(book: Book) -> list[Cause]:
     """Every cause of the history: what lasts first, then the newest, then the widest."""
     told = {trend.definition.key: trend.told for test in book.tests for trend in test.trends}
-    return causes(told, [hit for test in book.tests for hit in _map_hits(test)])
+    return causes(told, [hit for test in book.tests for hit in _map_hits(test, book.tonight)])
 
 
-def _map_hits(test: TestHistory) -> list[Hit]:
-    """The stability maps of a test with worse cells than the night before that has them."""
+def _map_hits(test: TestHistory, tonight: Night) -> list[Hit]:
+    """The stability maps of a test with worse cells than the night before that has them, and those that are gone."""
     found = []
-    for finding in judge_maps(test.earlier_maps, test.maps):
-        good, bad = test.map_nights.get(finding.series, (None, None))
-        if finding.red and bad is not None:
+    for key, verdict in map_verdicts(test).items():
+        good, newest = test.map_nights.get(key, (None, None))
+        lost = key in test.lost_maps
+        good, bad = (newest, tonight) if lost else (good, newest)
+        if verdict.red and bad is not None:
             found.append(
                 Hit(
-                    series=finding.series,
+                    series=key,
                     test=test.name,
                     definition=None,
-                    name=finding.name,
-                    sentence=finding.verdict.sentence,
-                    stands="watch",
+                    name=verdict.name,
+                    sentence=verdict.sentence,
+                    stands="fail" if lost else "watch",
                     before=math.nan,
                     value=math.nan,
                     good=good,
@@ -147,13 +150,15 @@ def anchor(cause: Cause) -> str:
 
 
 def _damage(hits: Sequence[Hit]) -> list[tuple[str, int]]:
-    maps = sum(hit.definition is None for hit in hits)
-    lost = sum(hit.stands == "fail" and not math.isfinite(hit.value) for hit in hits)
-    broken = sum(hit.stands == "fail" for hit in hits) - lost
+    gone = sum(hit.definition is None and hit.stands == "fail" for hit in hits)
+    maps = sum(hit.definition is None for hit in hits) - gone
+    lost = sum(hit.stands == "fail" and not math.isfinite(hit.value) for hit in hits) - gone
+    broken = sum(hit.stands == "fail" for hit in hits) - lost - gone
     counts = [
         ("limit broken" if broken == 1 else "limits broken", broken),
         ("value lost" if lost == 1 else "values lost", lost),
-        ("worse, limits kept", len(hits) - broken - lost - maps),
+        ("worse, limits kept", len(hits) - broken - lost - maps - gone),
+        ("stability map lost" if gone == 1 else "stability maps lost", gone),
         ("stability map worse" if maps == 1 else "stability maps worse", maps),
     ]
     return [(words, count) for words, count in counts if count]

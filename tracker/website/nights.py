@@ -7,7 +7,7 @@ in parallel lists, because ten years of nights are a million of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -23,9 +23,9 @@ from spook_tracker.tracker.document.run_document import (
     Trajectory,
 )
 from spook_tracker.tracker.document.wording import day, short_hash, version
-from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.lane import histories, lines
-from spook_tracker.tracker.judge.series_history import Told, judge_all
+from spook_tracker.tracker.judge.accepted import Accepted, acceptance
+from spook_tracker.tracker.judge.lane import asked_for, histories, lines
+from spook_tracker.tracker.judge.series_history import Told, judge_all, night_of
 from spook_tracker.tracker.judge.standing import worst
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
@@ -106,6 +106,7 @@ class TestHistory:
     maps: tuple[MapData, ...] = ()
     earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
     map_nights: dict[str, tuple[Night | None, Night]] = field(default_factory=dict)  # both, by key of a map
+    lost_maps: tuple[str, ...] = ()  # keys of those that the newest night was asked for and did not answer
 
     def gates(self) -> list[Trend]:
         """The series that decide green or red."""
@@ -250,6 +251,9 @@ def _chapter(
             elif place_of_map not in earlier_maps:
                 earlier_maps[place_of_map] = stability_map
                 map_nights[place_of_map] = night, map_nights[place_of_map][1]
+    evidence = {} if nights[-1].asked is not None else history.samples(nights[-1].id)
+    asked = asked_for(nights[-1], evidence).get("stability", set())
+    lost = {key for key in _lost(maps, map_nights, nights[-1], asked) if not _gone(accepted, key, nights[-1])}
     by_test: dict[str, list[Trend]] = {}
     for trend in trends.values():
         by_test.setdefault(trend.definition.test, []).append(trend)
@@ -267,10 +271,28 @@ def _chapter(
             maps=tuple(m for m in maps.values() if m.test == test),
             earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
             map_nights={map_key(m): map_nights[place] for place, m in maps.items() if m.test == test},
+            lost_maps=tuple(
+                sorted(map_key(m) for m in maps.values() if m.test == test and map_key(m) in lost)
+            ),
         )
         for test, card in cards.items()
     ]
     return nights, sorted(tests, key=lambda t: not t.card.seven), earlier
+
+
+def _lost(
+    maps: Mapping[MapKey, MapData],
+    nights: Mapping[MapKey, tuple[Night | None, Night]],
+    newest: Night,
+    asked: Collection[str],
+) -> list[str]:
+    """Keys of the maps that the newest night was asked for and has not."""
+    return [map_key(m) for place, m in maps.items() if nights[place][1] is not newest and m.test in asked]
+
+
+def _gone(accepted: Sequence[Accepted], key: str, night: Night) -> bool:
+    """Whether somebody accepted that a map is not asked for any more."""
+    return acceptance(accepted, key, math.nan, night_of(night), removed=True) is not None
 
 
 def _bare_card(name: str, title: str) -> TestCard:
