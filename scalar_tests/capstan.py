@@ -191,7 +191,8 @@ def draw(simulate: Simulate) -> Drawing:
         x_label="angle round the bar [rad]",
         y_label="ratio of the pulls",
         y_scale="log",
-        note=f"One and a half turns with µ = {told(FRICTION)} hold {told(HOLDS, 4)} times the pull in front.",
+        note=f"One and a half turns with µ = {told(FRICTION)} hold {told(found[-1], 4)} times the pull in front, {told(HOLDS, 4)} "
+        "by Euler and Eytelwein.",
     )
 
 

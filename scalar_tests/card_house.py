@@ -134,8 +134,8 @@ def draw(simulate: Simulate) -> Drawing:
         ),
         x_label="storeys",
         y_label="least friction",
-        note=f"It grows towards {told(ARM / (cards.THICK + RISE), 3)}: "
-        "beyond that friction a house has no highest storey.",
+        note=f"{told(found[-1], 3)} with {storeys[-1]} storeys, {told(need(storeys[-1]), 3)} by statics, which grows towards "
+        f"{told(ARM / (cards.THICK + RISE), 3)}: beyond that friction a house has no highest storey.",
     )
 
 

@@ -103,7 +103,7 @@ def draw_position(simulate: Simulate) -> Drawing:
         ),
         x_label="time [s]",
         y_label="position z [m]",
-        note=f"The two lines are {told(float(abs(height[-1] + fallen(time)[-1])))} m apart at the end of a fall of "
+        note=f"The two lines are {told(float(abs(height[-1] + fallen(time)[-1])), 3)} m apart at the end of a fall of "
         f"{float(fallen(time)[-1]):.0f} m.",
     )
 

@@ -171,7 +171,7 @@ def draw(simulate: Simulate) -> Drawing:
         ),
         x_label="time [s]",
         y_label="angle [rad]",
-        note=f"Willis: the carrier turns a fifth as fast. The sun is never more than {told(off, 2)} rad from five times it.",
+        note=f"The sun is never more than {told(off, 2)} rad from five times the carrier, as Willis has it.",
     )
 
 

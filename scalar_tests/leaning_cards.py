@@ -140,7 +140,7 @@ def draw(simulate: Simulate) -> Drawing:
         ),
         x_label="lean from upright [°]",
         y_label="thrust over weight",
-        note=f"At 25° they need a friction of {told(need(), 3)}.",
+        note=f"At 25° the thrust is {told(thrusts[2], 3)} of the weight, {told(need(), 3)} by statics.",
     )
 
 

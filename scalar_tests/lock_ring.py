@@ -36,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
+from spook_tracker.scalar_tests.sweep import told
 
 COUNT = 24
 PIECE = 0.5  # m, length of a box along the ring
@@ -116,7 +117,7 @@ def _draw(simulate: Simulate) -> Drawing:
         ),
         x_label="box",
         y_label="largest displacement [pm]",
-        note="Rounding only, in every direction.",
+        note=f"At most {told(1e12 * float(moved.max()))} pm.",
     )
 
 

@@ -179,8 +179,8 @@ def draw(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="time [s]",
         y_label="angle of the axis from the vertical [°]",
-        note=f"After a turn the lean is off by {told(ends[0], 3)}°, {told(ends[1], 3)}° and {told(ends[2], 3)}°: about half as "
-        "much with half the step.",
+        note=f"After a turn the lean is off by {told(ends[0], 3)}°, {told(ends[1], 3)}° and {told(ends[2], 3)}°, each with half "
+        "the step of the one before.",
     )
 
 

@@ -232,7 +232,7 @@ def draw(simulate: Simulate) -> Drawing:
         x_label="links",
         y_label="block operations a step and link",
         x_scale="log",
-        note=f"A link costs what it costs, however many there are: {told(works[-1], 3)} with {counts[-1]}.",
+        note=f"{told(works[0], 3)} a link with {counts[0]} links, {told(works[-1], 3)} with {counts[-1]}.",
     )
 
 

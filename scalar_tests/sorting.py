@@ -202,8 +202,7 @@ def draw_belt(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="along the belt, seen from it [m]",
         y_label="across the belt [m]",
-        note=f"Seen from the belt all slide along one straight line; the smoothest ends {told(float(widest), 3)} m across "
-        f"it, the roughest {told(float(narrowest), 3)} m.",
+        note=f"Across the belt the smoothest ends {told(float(widest), 3)} m away, the roughest {told(float(narrowest), 3)} m.",
     )
 
 
@@ -223,8 +222,8 @@ def draw_table(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="time [s]",
         y_label="distance from the axis [m]",
-        note=f"The roughest three ride; in a second their circle has grown to {told(curves[-1].y[-1], 4)} m, since the "
-        f"table is felt where a step begins. The smoothest is {told(curves[0].y[-1], 3)} m away.",
+        note=f"In a second the circle of the roughest has grown to {told(curves[-1].y[-1], 4)} m, since the table is felt where "
+        f"a step begins. The smoothest is {told(curves[0].y[-1], 3)} m away.",
     )
 
 

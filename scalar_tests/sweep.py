@@ -31,6 +31,11 @@ def told(value: float, digits: int = 2) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "no finite value"
 
 
+def apart(found: Iterable[Any], expected: Iterable[Any]) -> str:
+    """The largest distance of two curves, as a sentence tells it."""
+    return told(max(abs(float(a) - float(b)) for a, b in zip(found, expected, strict=True)))
+
+
 def at(x: Iterable[float], y: Iterable[float], place: float) -> float:
     """The y of the point whose x is nearest to `place`."""
     return min(zip(x, y, strict=True), key=lambda point: abs(point[0] - place))[1]

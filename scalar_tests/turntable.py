@@ -157,7 +157,10 @@ def draw(simulate: Simulate) -> Drawing:
     observe = {"x": Trace(quantity=Position("ball"))}
     result = simulate(rolling(), time_step=TIME_STEP, steps=STEPS, observe=observe)
     exact = circle(result.sample_times["x"])
-    apart = float(np.abs(result["x"][:, 0] + 1j * result["x"][:, 1] - exact).max())
+    places = result["x"][:, 0] + 1j * result["x"][:, 1]
+    apart = float(np.abs(places - exact).max())
+    ways = np.unwrap(np.angle(np.diff(places)))
+    circled = float(ways[-1] - ways[0]) / math.tau * STEPS / (STEPS - 1)
     return Drawing(
         curves=(
             line("ball", result["x"][:, 0], result["x"][:, 1]),
@@ -165,8 +168,8 @@ def draw(simulate: Simulate) -> Drawing:
         ),
         x_label="x [m]",
         y_label="y [m]",
-        note=f"The table turns {told(3.5, 2)} times while the ball circles once; the run leaves the circle by "
-        f"{told(apart)} m, half a step of its turn.",
+        note=f"The ball circles {told(circled, 3)} times while the table turns {told(RATE * STEPS * TIME_STEP / math.tau, 3)} times; "
+        f"the run leaves the circle by {told(apart)} m.",
     )
 
 

@@ -202,8 +202,7 @@ def draw(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="time [s]",
         y_label="speed [m/s]",
-        note=f"It gains {told(ROLLING, 4)} m/s² down the slope and loses {told(BRAKING, 4)} with locked wheels; the runs "
-        f"are at most {told(apart)} m/s off.",
+        note=f"The runs are at most {told(apart)} m/s off the closed forms.",
     )
 
 

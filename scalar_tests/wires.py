@@ -197,11 +197,12 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
 
 def draw(simulate: Simulate) -> Drawing:
     """Speeds of stone and puller."""
-    curves = []
+    curves, ends = [], []
     for restitution in (0.0, 0.5):
         observe = {"v": Trace(quantity=Velocity())}
         result = simulate(tow(restitution), time_step=TIME_STEP, duration=0.5, observe=observe)
         for k, name in enumerate(("stone", "puller")):
+            ends.append(float(result["v"][-1, k, 0]))
             curves.append(
                 line(f"{name}, e = {restitution:g}", result.sample_times["v"], result["v"][:, k, 0])
             )
@@ -211,7 +212,8 @@ def draw(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="time [s]",
         y_label="speed [m/s]",
-        note=f"The rope is taut after {told(SLACK / FAST, 3)} s; then both go at {told(together, 3)} m/s if the blow is plastic.",
+        note=f"After a plastic blow they go at {told(ends[0], 3)} m/s and {told(ends[1], 3)} m/s, at {told(together, 3)} in closed "
+        "form.",
     )
 
 

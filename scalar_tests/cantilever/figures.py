@@ -7,6 +7,7 @@ import numpy as np
 from spook_tracker.scalar_tests.cantilever.measure import settled_nodes
 from spook_tracker.scalar_tests.cantilever.scene import COUNT, COUNTS, LENGTH, LOAD, SMALL, deflection
 from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
+from spook_tracker.scalar_tests.sweep import apart, told
 
 
 def draw_shape(simulate: Simulate) -> Drawing:
@@ -25,7 +26,7 @@ def draw_shape(simulate: Simulate) -> Drawing:
         ),
         x_label="position on the beam [m]",
         y_label="height [m]",
-        note="The thesis' beam bends too far, because its compliance was tuned by hand.",
+        note=f"At most {apart(nodes, deflection(x))} m from the formula. The thesis' beam bends too far, because its compliance was tuned by hand.",
     )
 
 
@@ -42,7 +43,7 @@ def draw_difference(simulate: Simulate) -> Drawing:
         ),
         x_label="position on the beam [m]",
         y_label="difference in height [m]",
-        note="What is left is the shortening of a strongly bent beam, which the linear formula does not know.",
+        note=f"At most {apart(deflection(x), nodes)} m. The linear formula does not know how a strongly bent beam shortens.",
     )
 
 
@@ -58,5 +59,5 @@ def draw_against_count(simulate: Simulate) -> Drawing:
         y_label="largest relative error of a node",
         x_scale="log",
         y_scale="log",
-        note="No discretisation error: the nodes are exact for any number of elements.",
+        note=f"At most {told(max(errors))}. In theory the nodes are exact for any number of elements.",
     )

@@ -21,7 +21,7 @@ from spook_tracker.scalar_tests.hanging_chain.scene import (
     lift,
     scene,
 )
-from spook_tracker.scalar_tests.sweep import line
+from spook_tracker.scalar_tests.sweep import line, told
 
 LADDER_RATIO, LADDER_TILT = 1000.0, 1e-4  # rad: small motion to 1e-9
 
@@ -61,6 +61,8 @@ def draw(simulate: Simulate) -> Drawing:
     """The load's path at a million to one."""
     result = simulate(scene(HEAVY), time_step=TIME_STEP, steps=STEPS, method=STRING, observe=OBSERVE)
     time = TIME_STEP * np.arange(STEPS + 1)
+    swings = np.abs(result["places"][:, -1, 0])
+    early, late = float(swings[: STEPS // 4].max()), float(swings[-STEPS // 4 :].max())
     return Drawing(
         curves=(
             line("string stiffness, 1e6 : 1", time[::4], result["places"][::4, -1, 0]),
@@ -68,7 +70,7 @@ def draw(simulate: Simulate) -> Drawing:
         ),
         x_label="time [s]",
         y_label="load, sideways [m]",
-        note="Plain SPOOK cannot run this scene. The amplitude falls by the damping that taut links need.",
+        note=f"In the last quarter it swings {told(100.0 * late / early, 3)} % as far as in the first.",
     )
 
 

@@ -33,6 +33,7 @@ from spook_tracker.scalar_tests.inclined_plane.scene import (
     scene,
     slide,
 )
+from spook_tracker.scalar_tests.sweep import told
 
 DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
 LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
@@ -71,9 +72,10 @@ def _measure_anisotropy(method: Method) -> object:
 def _draw_polar(slope: float) -> object:
     def draw(simulate: Simulate) -> Drawing:
         angles = (*tuple(math.degrees(alpha) for alpha in DIRECTIONS), 360.0)
-        curves = []
+        curves, said = [], []
         for name, method in MODELS.items():
             values = ratios(simulate, slope, method)
+            said.append(f"{name}: {told(min(values), 3)} to {told(max(values), 3)}")
             curves.append(Curve(name=name, x=angles, y=(*values, values[0])))
         curves.append(Curve(name="Coulomb", x=angles, y=(FRICTION,) * len(angles), style="reference"))
         return Drawing(
@@ -81,11 +83,8 @@ def _draw_polar(slope: float) -> object:
             x_label="direction of the slope [degrees]",
             y_label="F_t/F_n",
             x_scale="angle",
-            note=(
-                "At tan θ = µ every model only holds the box and reads 0.5: nothing is learnt about anisotropy."
-                if slope == FRICTION
-                else "Sliding at tan θ = 0.6: only the cone keeps 0.5 in every direction."
-            ),
+            note=", ".join(said)
+            + (". A box that is only held tells nothing about anisotropy." if slope == FRICTION else "."),
         )
 
     return draw

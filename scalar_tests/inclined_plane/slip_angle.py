@@ -25,6 +25,7 @@ from spook_tracker.scalar_tests.inclined_plane.scene import (
     slip_slope,
     slips,
 )
+from spook_tracker.scalar_tests.sweep import apart
 
 LADDER_SLOPE = 0.51
 COEFFICIENTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
@@ -54,7 +55,7 @@ def _draw_angle(simulate: Simulate) -> Drawing:
         ),
         x_label="friction coefficient µ",
         y_label="angle at which the box slides [rad]",
-        note="Above µ = 1 a cube tips over before it slides, so the sweep ends at 0.9.",
+        note=f"At most {apart(found, map(math.atan, COEFFICIENTS))} rad from atan µ. Above µ = 1 a cube tips over before it slides, so the sweep ends at 0.9.",
     )
 
 

@@ -128,8 +128,8 @@ def draw_energy_by_count(simulate: Simulate) -> Drawing:
         x_label="number of spheres",
         y_label="energy [% of the fall to hanging]",
         y_scale="log",
-        note="The gain falls with N, as the thesis found surprising: it is taken relative to an energy that grows "
-        "as N², while most of it is the half step by which the velocity lags at the start.",
+        note=f"The gain is {told(gains[0])} % with one sphere and {told(gains[-1])} % with {COUNTS[-1]}. It is taken relative to an "
+        "energy that grows as N², while most of it is the half step by which the velocity lags at the start.",
     )
 
 

@@ -23,7 +23,7 @@ from spook_tracker.scalar_tests.oscillator.scene import (
     stiffness_of_period,
     traced,
 )
-from spook_tracker.scalar_tests.sweep import line
+from spook_tracker.scalar_tests.sweep import apart, line, told
 
 DAMPING = 2.0 * TIME_STEP  # s
 STEPS = 10
@@ -60,7 +60,8 @@ def draw(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="number of time steps",
         y_label="position z [m]",
-        note="A low-pass filter, but a gentle one: at 50 steps a period 86 % is left after ten steps, not nothing.",
+        note=f"A low-pass filter: at 50 steps a period {told(100.0 * left(simulate, 50.0))} % is left after ten steps, at 10 "
+        f"{told(100.0 * left(simulate, 10.0))} %.",
     )
 
 
@@ -68,16 +69,17 @@ def draw_response(simulate: Simulate) -> Drawing:
     """What is left after ten steps against the period."""
     periods = [float(p) for p in np.geomspace(1.0, 300.0, 40)]
     exact = [decay(stiffness_of_period(p), DAMPING) ** STEPS for p in periods]
+    found = [left(simulate, p) for p in periods]
     return Drawing(
         curves=(
-            line("read off the run", periods, [left(simulate, p) for p in periods], "points"),
+            line("read off the run", periods, found, "points"),
             line("√α¹⁰", periods, exact, "reference"),
         ),
         x_label="steps a period",
         y_label="fraction left after ten steps",
         x_scale="log",
         y_scale="log",
-        note="θ = 2, the default of joints.",
+        note=f"At most {apart(found, exact)} from the closed form, at θ = 2, the default of joints.",
     )
 
 
