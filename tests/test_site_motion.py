@@ -136,6 +136,108 @@ def test_the_time_slider_moves_by_keyboard_and_stands_in_the_address(driver, sit
     )
 
 
+def test_the_slider_hears_real_keys(driver, site):
+    from selenium.webdriver.common.keys import Keys
+
+    replay(driver, site)
+    slider = driver.find_element("css selector", "#replay input[type=range]")
+    driver.find_element("css selector", "#replay .play").send_keys(Keys.TAB)
+    assert driver.switch_to.active_element == slider
+    sample = "return document.getElementById('replay').player.sample"
+    reached = []
+    for key in (Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT, Keys.END, Keys.HOME):
+        slider.send_keys(key)
+        reached.append(driver.execute_script(sample))
+    first, second, back, last, start = reached
+
+    assert 0 < first < second
+    assert back == pytest.approx(first)
+    assert (start, last) == (
+        0,
+        driver.execute_script("return document.getElementById('replay').player.movie.count - 1"),
+    )
+    slider.send_keys(Keys.ARROW_RIGHT)
+    assert "t=" in driver.current_url
+    assert slider.get_attribute("aria-valuetext").endswith("seconds")
+
+
+def test_the_camera_hears_real_keys(driver, site):
+    """Arrows turn about the middle of the scene, + and - change the distance, Home goes back."""
+    from selenium.webdriver.common.keys import Keys
+
+    replay(driver, site)
+    canvas = driver.find_element("css selector", "#replay canvas")
+    seen = """const v = document.getElementById('replay').player.view, d = v.camera.position.clone().sub(v.controls.target);
+        return [Math.atan2(d.y, d.x), Math.asin(d.z / d.length()), d.length()]"""
+    start = driver.execute_script(seen)
+    told = {}
+    for key in (Keys.ARROW_RIGHT, Keys.ARROW_UP, "+", "-", Keys.ARROW_DOWN, Keys.ARROW_LEFT):
+        canvas.send_keys(key)
+        told[key] = driver.execute_script(seen)
+    ten = np.radians(10.0)
+
+    assert told[Keys.ARROW_RIGHT] == pytest.approx([start[0] + ten, start[1], start[2]])
+    assert told[Keys.ARROW_UP] == pytest.approx([start[0] + ten, start[1] + ten, start[2]])
+    assert told["+"][2] == pytest.approx(start[2] / 1.15)
+    assert told[Keys.ARROW_LEFT] == pytest.approx(start)
+    canvas.send_keys(Keys.ARROW_RIGHT, Keys.ARROW_UP, "-", Keys.HOME)
+    assert driver.execute_script(seen) == pytest.approx(start)
+    assert canvas.accessible_name.startswith("The scene in three dimensions")
+    assert complaints(driver) == []
+
+
+def test_bar_and_axes_of_a_replay_measure_what_the_camera_sees(driver, site):
+    """Against the library's own projection, from two directions, in both themes."""
+    told = []
+    for dark in (False, True):
+        visit(driver, site, "tests/pendulum.html", dark=dark)
+        driver.execute_script("document.getElementById('replay').scrollIntoView()")
+        wait_for(driver, "!!document.getElementById('replay').player")
+        told += driver.execute_script("""
+          const v = document.getElementById('replay').player.view, wide = v.host.clientWidth, high = v.host.clientHeight, found = [];
+          for (const key of ['', 'ArrowRight', 'ArrowUp', '-']) {
+            v.turnBy(key);
+            const m = v.camera.matrixWorld.elements, at = (p) => { const q = p.project(v.camera); return [q.x * wide / 2, q.y * high / 2]; };
+            const middle = v.controls.target, start = at(middle.clone());
+            const across = at(middle.clone().add({ x: m[0] * v.marks.metres, y: m[1] * v.marks.metres, z: m[2] * v.marks.metres }));
+            const axes = v.marks.axes.map((axis) => axis.line.getAttribute('d').split('l')[1].split(' ').map(Number));
+            found.push({ bar: across[0] - start[0], drawn: Number(v.marks.bar.getAttribute('d').split('h')[1].split('v')[0]),
+              axes, near: v.size * 1e-4, words: v.marks.length.textContent, seen: getComputedStyle(v.marks.length).fill,
+              ground: getComputedStyle(v.host).backgroundColor, inside: [...v.marks.svg.children].every((part) => {
+                const a = part.getBoundingClientRect(), b = v.host.getBoundingClientRect();
+                return a.left >= b.left && a.right <= b.right && a.top >= b.top && a.bottom <= b.bottom; }),
+              projected: ['x', 'y', 'z'].map((k) => { const p = middle.clone(); p[k] += v.size * 1e-4; const q = at(p); return [q[0] - start[0], q[1] - start[1]]; }) });
+          }
+          return found;
+        """)
+
+    for seen in told:
+        assert seen["drawn"] == pytest.approx(seen["bar"], abs=0.1)
+        assert seen["words"] in ("0.1 m", "0.2 m", "0.5 m", "1 m")
+        assert seen["inside"]
+        for drawn, projected in zip(seen["axes"], seen["projected"], strict=True):
+            assert drawn[0] * -projected[1] == pytest.approx(drawn[1] * projected[0], abs=0.02)
+            assert drawn[0] * projected[0] >= -1e-9
+    assert told[0]["seen"] != told[-1]["seen"]
+
+
+def test_who_wants_little_motion_gets_none_that_was_not_asked_for(driver, site):
+    """Nothing plays by itself, nothing glides, nothing fades: what moves is what the reader moves."""
+    moved = """return [getComputedStyle(document.documentElement).scrollBehavior, document.getAnimations().length,
+        [...document.querySelectorAll('*')].filter((e) => parseFloat(getComputedStyle(e).transitionDuration) > 0).length]"""
+    still = [{"name": "prefers-reduced-motion", "value": "reduce"}]
+    replay(driver, site)
+    assert driver.execute_script(moved)[0] == "smooth"
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": still})
+    replayed = driver.execute_script("return document.getElementById('replay').player.playing")
+    driver.execute_script("document.getElementById('f-deviation-against-time').scrollIntoView()")
+    wait_for(driver, "'drawn' in document.getElementById('f-deviation-against-time').dataset")
+
+    assert driver.execute_script(moved) == ["auto", 0, 0]
+    assert not replayed
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
 def test_two_nights_laid_over_each_other_show_the_first_moment_they_part(driver, site, recorded):
     replay(driver, site)
     driver.execute_script(

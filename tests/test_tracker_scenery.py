@@ -16,7 +16,14 @@ from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Sph
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.run_document import SceneDrawing
 from spook_tracker.tracker.measure.scene_drawing import drawing
-from spook_tracker.tracker.website.scenery import scenery, turned
+from spook_tracker.tracker.website.scenery import (
+    AXIS,
+    WIDTH,
+    length_words,
+    round_length,
+    scenery,
+    turned,
+)
 
 HALF_TURN_ABOUT_X = (0.0, 1.0, 0.0, 0.0)
 QUARTER_TURN_ABOUT_Z = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
@@ -105,6 +112,52 @@ def test_a_box_shows_three_faces_and_a_plane_lies_behind_everything() -> None:
     assert "1 plane, 1 box, 1 capsule" in made.description
 
 
+APART = (0.7, -1.3, 0.4)  # m
+
+
+@pytest.mark.parametrize("size", [1e-4, 1.0, 30.0, 4e5])
+def test_bar_and_axes_measure_the_picture(size: float) -> None:
+    """Two places are as far apart in the picture as their way along the axes, in bars, says."""
+    places = [(0.0, 0.0, 0.0), tuple(size * way for way in APART)]
+    bodies = [Particle(name=f"{i}", position=at, mass=1.0) for i, at in enumerate(places)]  # type: ignore[arg-type]
+
+    made = scenery(drawing(Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -9.81))))
+
+    assert made is not None and made.bar is not None
+    large = {s.centre: float(s.radius) for s in made.shapes if s.centre is not None}
+    biggest = max(large.values())
+    one, other = ([float(n) for n in at] for at, radius in large.items() if radius == biggest)
+    ways = [[float(n) for n in mark.path.split("l")[1].split()] for mark in made.axes]
+    long = float(made.bar.path.split("h")[1].split("v")[0])
+    value, unit = (
+        made.bar.words.replace("×10", "e").translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")).split()
+    )
+    metres = float(value) * {"m": 1.0, "mm": 1e-3, "km": 1e3}[unit]
+    for k in (0, 1):
+        expected = sum(size * APART[i] * ways[i][k] / AXIS for i in range(3)) * long / metres
+        assert abs(other[k] - one[k]) == pytest.approx(abs(expected), abs=0.02 * WIDTH)
+    assert [mark.words for mark in made.axes] == ["x", "y", "z"]
+    assert 0.07 * WIDTH <= long <= 0.2 * WIDTH
+
+
+@pytest.mark.parametrize(
+    ("most", "length", "words"),
+    [
+        (1.0, 1.0, "1 m"),
+        (0.999, 0.5, "0.5 m"),
+        (0.21, 0.2, "0.2 m"),
+        (0.0999, 0.05, "50 mm"),
+        (4999.0, 2000.0, "2 km"),
+        (2e-5, 2e-5, "2×10⁻⁵ m"),
+        (7e8, 5e8, "5×10⁸ m"),
+        (1e3, 1e3, "1 km"),
+    ],
+)
+def test_a_bar_has_a_round_length(most: float, length: float, words: str) -> None:
+    assert round_length(most) == length
+    assert length_words(length) == words
+
+
 def test_nothing_to_see_makes_no_picture() -> None:
     assert scenery(SceneDrawing(solids=())) is None
 
@@ -120,6 +173,10 @@ def test_every_scene_of_the_catalogue_fits_its_frame(name: str) -> None:
             numbers = [float(shape.centre[0]), float(shape.centre[1])]
         assert all(-1.0 <= x <= made.width + 1.0 for x in numbers[0::2])
         assert all(-1.0 <= y <= made.height + 1.0 for y in numbers[1::2])
+    for mark in [made.bar, *made.axes]:
+        assert mark is not None
+        assert 4.0 <= float(mark.x) <= made.width - 4.0
+        assert 10.0 <= float(mark.y) <= made.height - 1.0
 
 
 def test_a_wire_is_drawn_along_its_whole_way() -> None:

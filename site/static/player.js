@@ -131,8 +131,7 @@ class Player {
     this.element = make("div", { class: "player", tabIndex: -1 }, this.stage, this.controls, this.tools, this.curvesBox);
     box.prepend(this.element);
     this.view = new SceneView(this.stage, movie);
-    this.view.canvas.setAttribute("role", "img");
-    this.view.canvas.setAttribute("aria-label", "The scene in three dimensions; drag to turn it.");
+    this.view.say("The scene in three dimensions");
     this.play.addEventListener("click", () => this.toggle());
     this.slider.addEventListener("input", () => { this.pause(); this.seek(Number(this.slider.value)); this.remember(); });
     this.element.addEventListener("keydown", (event) => {
@@ -202,8 +201,7 @@ class Player {
       this.stage.replaceWith(this.stages);
       this.stages.append(named("tonight", this.stage), named(name, stage));
       this.second = new SceneView(stage, { ...movie, ghost: null });
-      this.second.canvas.setAttribute("role", "img");
-      this.second.canvas.setAttribute("aria-label", `The scene as it moved: ${name}.`);
+      this.second.say(`The scene as it moved: ${name}`);
       const follow = (from, to) => from.controls.addEventListener("change", () => {
         if (to.camera.position.distanceToSquared(from.camera.position) < 1e-18) { return; }
         to.camera.position.copy(from.camera.position);

@@ -63,6 +63,114 @@ class Poses {
   }
 }
 
+// Solids of one shape as flat arrays, so that ten thousand are placed in a few milliseconds.
+function packed(items) {
+  const n = items.length, solids = { body: new Int32Array(n), offset: new Float64Array(3 * n), turn: new Float64Array(4 * n), scale: new Float64Array(3 * n) };
+  items.forEach((item, i) => {
+    solids.body[i] = item.body;
+    solids.offset.set(item.offset, 3 * i);
+    solids.turn.set(item.turn, 4 * i);
+    solids.scale.set(item.scale, 3 * i);
+  });
+  return solids;
+}
+
+// The matrix of each solid at a sample: that of its body, and the solid's place and turn in it. What Poses.at and
+// placeInto do for one, in one loop that makes nothing.
+function placeAll(out, poses, solids, sample) {
+  const { movie, position: v, orientation: o } = poses, { body, offset, turn, scale } = solids, n = movie.bodies;
+  const low = Math.floor(sample), share = sample - low, high = share ? Math.min(low + 1, movie.count - 1) : low;
+  for (let i = 0, at = 0; i < body.length; i += 1, at += 16) {
+    const b = body[i], sx = scale[3 * i], sy = scale[3 * i + 1], sz = scale[3 * i + 2];
+    let px = 0, py = 0, pz = 0, w = 1, x = 0, y = 0, z = 0;
+    if (b !== WORLD_BODY) {
+      const j = 3 * (low * n + b), k = 3 * (high * n + b);
+      px = v[j]; py = v[j + 1]; pz = v[j + 2];
+      if (share) { px += share * (v[k] - px); py += share * (v[k + 1] - py); pz += share * (v[k + 2] - pz); }
+      if (o) {
+        const a = 4 * (low * n + b), c = 4 * (high * n + b);
+        w = o[a]; x = o[a + 1]; y = o[a + 2]; z = o[a + 3];
+        if (share) {
+          const near = w * o[c] + x * o[c + 1] + y * o[c + 2] + z * o[c + 3] < 0 ? -share : share, rest = 1 - share;
+          w = rest * w + near * o[c]; x = rest * x + near * o[c + 1]; y = rest * y + near * o[c + 2]; z = rest * z + near * o[c + 3];
+        }
+        const size = Math.sqrt(w * w + x * x + y * y + z * z) || 1;
+        w /= size; x /= size; y /= size; z /= size;
+      }
+    }
+    const ox = offset[3 * i], oy = offset[3 * i + 1], oz = offset[3 * i + 2];
+    if (ox || oy || oz) {
+      const tx = 2 * (y * oz - z * oy), ty = 2 * (z * ox - x * oz), tz = 2 * (x * oy - y * ox);
+      px += ox + w * tx + y * tz - z * ty; py += oy + w * ty + z * tx - x * tz; pz += oz + w * tz + x * ty - y * tx;
+    }
+    const tw = turn[4 * i];
+    if (tw !== 1) {
+      const tx = turn[4 * i + 1], ty = turn[4 * i + 2], tz = turn[4 * i + 3], bw = w, bx = x, by = y, bz = z;
+      w = bw * tw - bx * tx - by * ty - bz * tz; x = bw * tx + bx * tw + by * tz - bz * ty;
+      y = bw * ty - bx * tz + by * tw + bz * tx; z = bw * tz + bx * ty - by * tx + bz * tw;
+    }
+    const xx = 2 * x * x, yy = 2 * y * y, zz = 2 * z * z, xy = 2 * x * y, xz = 2 * x * z, yz = 2 * y * z, wx = 2 * w * x, wy = 2 * w * y, wz = 2 * w * z;
+    out[at] = sx * (1 - yy - zz); out[at + 1] = sx * (xy + wz); out[at + 2] = sx * (xz - wy); out[at + 3] = 0;
+    out[at + 4] = sy * (xy - wz); out[at + 5] = sy * (1 - xx - zz); out[at + 6] = sy * (yz + wx); out[at + 7] = 0;
+    out[at + 8] = sz * (xz + wy); out[at + 9] = sz * (yz - wx); out[at + 10] = sz * (1 - xx - yy); out[at + 11] = 0;
+    out[at + 12] = px; out[at + 13] = py; out[at + 14] = pz; out[at + 15] = 1;
+  }
+}
+
+// The largest of 1, 2 and 5 times a power of ten that is not above `most`.
+function roundLength(most) {
+  const power = 10 ** Math.floor(Math.log10(most));
+  return power * ([5, 2, 1].find((n) => n * power <= most * (1 + 1e-12)) || 1);
+}
+
+function lengthWords(metres) {
+  const [unit, size] = metres >= 1e6 || metres < 1e-3 ? ["m", 1] : metres >= 1e3 ? ["km", 1e3] : metres >= 0.1 ? ["m", 1] : ["mm", 1e-3];
+  return `${Number((metres / size).toPrecision(3))} ${unit}`.replace("e+", "e").replace("-", "−");
+}
+
+// The length of a bar and the axes of the world, in the lower corners of the picture.
+const AXIS = 26, BAR = 0.2;  // px; share of the picture's width
+class Marks {
+  constructor(host) {
+    const drawn = (tag, attributes) => {
+      const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+      for (const [name, value] of Object.entries(attributes)) { element.setAttribute(name, value); }
+      return element;
+    };
+    this.svg = drawn("svg", { class: "scene-marks", "aria-hidden": "true" });
+    this.bar = drawn("path", {});
+    this.length = drawn("text", { class: "length" });
+    this.axes = [..."xyz"].map((letter) => {
+      const axis = { line: drawn("path", {}), letter: drawn("text", { class: "axis" }) };
+      axis.letter.textContent = letter;
+      return axis;
+    });
+    this.svg.append(this.bar, this.length, ...this.axes.flatMap((axis) => [axis.line, axis.letter]));
+    host.append(this.svg);
+  }
+
+  // `right` and `up` are the camera's axes, `scale` the pixels of a metre in the middle of the scene.
+  show(wide, high, right, up, scale) {
+    const metres = roundLength((BAR * wide) / scale), end = 14 + metres * scale;
+    this.metres = metres;
+    this.bar.setAttribute("d", `M14 ${high - 18}v8h${(metres * scale).toFixed(1)}v-8`);
+    this.length.textContent = lengthWords(metres);
+    this.length.setAttribute("x", ((14 + end) / 2).toFixed(1));
+    this.length.setAttribute("y", String(high - 16));
+    const x = wide - AXIS - 20, y = high - AXIS - 20;
+    this.axes.forEach((axis, k) => {
+      const dx = AXIS * right[k], dy = -AXIS * up[k], long = Math.hypot(dx, dy), away = long > 3 ? (long + 9) / long : 0;
+      axis.line.setAttribute("d", `M${x} ${y}l${dx.toFixed(1)} ${dy.toFixed(1)}`);
+      axis.letter.setAttribute("x", (x + away * dx + (long < AXIS / 2 ? Math.sign(dx) * 9 : 0)).toFixed(1));  // a short one's stands aside
+      axis.letter.setAttribute("y", (y + away * dy + 4).toFixed(1));
+    });
+  }
+
+  close() { this.svg.remove(); }
+}
+
+const TURN = Math.PI / 18, NEARER = 1.15;  // of one press of a key: rad; ratio of distances
+
 // Of facets: the corners of each face, three numbers each.
 function facesOf(size) {
   const faces = [];
@@ -118,6 +226,9 @@ class SceneView {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
     this.canvas = this.renderer.domElement;
     host.append(this.canvas);
+    this.marks = new Marks(host);
+    this.canvas.tabIndex = 0;
+    this.canvas.addEventListener("keydown", (event) => { if (this.turnBy(event.key)) { event.preventDefault(); } });
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 1000);
     this.camera.up.set(0, 0, 1);
@@ -211,10 +322,11 @@ class SceneView {
       const shape = key.split(" ")[0], fixed = key.endsWith("fixed");
       const geometry = () => shape === "facets" ? this.facets(key.split(" ")[1].split(",").map(Number)) : shape === "sphere" ? new THREE.SphereGeometry(1, ...detail) : shape === "box" ? new THREE.BoxGeometry(1, 1, 1) :
         new THREE.CapsuleGeometry(...key.split(" ")[1].split(",").map(Number), 6, 16).rotateX(Math.PI / 2);
-      this.solids.push({ mesh: this.mesh(geometry(), items.length), items, poses: this.poses, colour: fixed ? "--ink-3" : "--c0" });
+      const solids = packed(items);
+      this.solids.push({ mesh: this.mesh(geometry(), items.length), solids, poses: this.poses, colour: fixed ? "--ink-3" : "--c0" });
       if (this.ghost && !fixed) {
         const mesh = this.mesh(geometry(), items.length, { transparent: true, opacity: 0.36, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 });
-        this.solids.push({ mesh, items, poses: this.ghost, colour: "--c1", ghost: true });
+        this.solids.push({ mesh, solids, poses: this.ghost, colour: "--c1", ghost: true });
       }
     }
     const rods = this.movie.links.filter((link) => link.kind !== "joint"), joints = this.movie.links.filter((link) => link.kind === "joint");
@@ -315,18 +427,10 @@ class SceneView {
 
   show(sample) {
     this.sample = Math.max(0, Math.min(this.movie.count - 1, sample));
-    const place = [0, 0, 0];
     for (const part of this.solids) {
       part.mesh.visible = !part.ghost || this.shown.ghost;
       if (!part.mesh.visible) { continue; }
-      const out = part.mesh.instanceMatrix.array, poses = part.poses;
-      part.items.forEach((item, i) => {
-        poses.at(item.body, this.sample);
-        turnInto(place, poses.q, ...item.offset);
-        for (let k = 0; k < 3; k += 1) { place[k] += poses.p[k]; }
-        const turn = item.turn[0] === 1 ? poses.q : product(poses.q, item.turn);
-        placeInto(out, 16 * i, place, turn, item.scale[0], item.scale[1], item.scale[2]);
-      });
+      placeAll(part.mesh.instanceMatrix.array, part.poses, part.solids, this.sample);
       part.mesh.instanceMatrix.needsUpdate = true;
     }
     if (this.rods) { this.showLinks(this.rods, 0.34 * this.dot); }
@@ -416,7 +520,43 @@ class SceneView {
     this.controls.dispose();
     this.renderer.dispose();
     this.canvas.remove();
+    this.marks.close();
   }
 
-  draw() { this.renderer.render(this.scene, this.camera); }
+  say(name) {
+    this.canvas.setAttribute("role", "application");
+    this.canvas.setAttribute("aria-label", `${name}; drag or press the arrow keys to turn it, plus and minus to come nearer or go away, Home to go back.`);
+  }
+
+  // By keyboard: arrows turn the picture, + and - bring it nearer or take it away, Home shows it as it was. False for others.
+  turnBy(key) {
+    if (key === "Home") {
+      this.controls.target.set(...this.middle);
+      this.frame();
+      return true;
+    }
+    const turns = { ArrowLeft: [-TURN, 0, 1], ArrowRight: [TURN, 0, 1], ArrowUp: [0, TURN, 1], ArrowDown: [0, -TURN, 1], "+": [0, 0, 1 / NEARER], "-": [0, 0, NEARER] };
+    if (!turns[key]) { return false; }
+    const [about, above, far] = turns[key], from = this.controls.target, eye = this.camera.position;
+    const x = eye.x - from.x, y = eye.y - from.y, z = eye.z - from.z, reach = Math.hypot(x, y, z);
+    const round = Math.atan2(y, x) + about, high = Math.max(-1.5, Math.min(1.5, Math.asin(z / reach) + above)), r = reach * far;
+    eye.set(from.x + r * Math.cos(high) * Math.cos(round), from.y + r * Math.cos(high) * Math.sin(round), from.z + r * Math.sin(high));
+    this.controls.update();  // tells whoever follows, and draws
+    return true;
+  }
+
+  // Only where the camera has moved since: a scene that plays costs nothing here.
+  mark() {
+    const { position, matrixWorld, fov } = this.camera, wide = this.host.clientWidth, high = this.host.clientHeight, from = this.controls.target;
+    const now = [position.x, position.y, position.z, from.x, from.y, from.z, wide, high];
+    if (!wide || (this.marked && now.every((v, k) => v === this.marked[k]))) { return; }
+    this.marked = now;
+    const reach = position.distanceTo(from), m = matrixWorld.elements;
+    this.marks.show(wide, high, [m[0], m[1], m[2]], [m[4], m[5], m[6]], high / (2 * reach * Math.tan((fov * Math.PI) / 360)));
+  }
+
+  draw() {
+    this.renderer.render(this.scene, this.camera);
+    this.mark();
+  }
 }

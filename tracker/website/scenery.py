@@ -1,7 +1,7 @@
 """The picture of a scene: a parallel projection of its solids, far ones first.
 
 The camera looks along the axis on which the scene extends least, a little from above and from the side; a scene
-without gravity that lies flat is seen from above.
+without gravity that lies flat is seen from above. In the lower corners: a bar of a round length, and the axes.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from spook_tracker.tracker.document.quaternions import Vector, turned
 from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
+from spook_tracker.tracker.document.wording import number
 
 WIDTH, LEAST_HEIGHT, MOST_HEIGHT, EDGE = 640.0, 150.0, 400.0, 44.0
 SIDE, ABOVE = math.radians(24.0), math.radians(16.0)
@@ -21,6 +22,9 @@ FACES = [((0, 1, 3, 2), 0, -1), ((4, 6, 7, 5), 0, 1), ((0, 4, 5, 1), 1, -1), ((2
 Place = Callable[[Vector], tuple[float, float]]  # a place in the world to one in the picture
 MOST_JOINTS = 12  # marks would hide a longer row of bodies
 LIGHT = (0.35, -0.55, 0.76)
+BAR, AXIS, LETTER = 0.2, 22.0, 9.0  # share of the width; pixels of an axis, and of its letter beyond its end
+SHORT = 0.5  # of an axis: its letter stands aside, clear of the others
+BASE = 12.0  # pixels from the edge
 
 
 @dataclass
@@ -35,6 +39,16 @@ class Shape:
 
 
 @dataclass
+class Mark:
+    """A line with a word beside it."""
+
+    path: str
+    x: str
+    y: str
+    words: str
+
+
+@dataclass
 class Scenery:
     """The whole picture."""
 
@@ -43,6 +57,8 @@ class Scenery:
     description: str
     shapes: list[Shape] = field(default_factory=list)
     gravity: tuple[str, str, str, str] | None = None  # of the arrow in the corner
+    bar: Mark | None = None
+    axes: list[Mark] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -109,6 +125,8 @@ def scenery(drawn: SceneDrawing) -> Scenery | None:
     ]
     out.shapes += sorted(pieces, key=lambda piece: -piece.depth)
     out.gravity = _gravity(drawn.gravity, camera)
+    out.bar = _bar(scale, height)
+    out.axes = _axes(camera, height)
     return out
 
 
@@ -293,6 +311,48 @@ def _gravity(gravity: Vector, camera: Camera) -> tuple[str, str, str, str] | Non
         _n((start[1] + end[1]) / 2.0 + 4.0),
         "g",
     )
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above `most`, m."""
+    power = math.floor(math.log10(most))
+    digit = next(n for n in (5, 2, 1) if n <= most / 10.0**power * (1.0 + 1e-12))
+    return float(f"{digit}e{power}")
+
+
+def length_words(metres: float) -> str:
+    """A round length with the unit in which it is short."""
+    if 1e-3 <= metres < 0.1:
+        return f"{number(metres * 1e3)} mm"
+    if 1e3 <= metres < 1e6:
+        return f"{number(metres / 1e3)} km"
+    return f"{number(metres)} m"
+
+
+def _bar(scale: float, height: float) -> Mark:
+    """A length to measure by: the projection is parallel, so it holds everywhere across the picture."""
+    metres = round_length(BAR * WIDTH / scale)
+    long, y = metres * scale, height - BASE
+    path = f"M{_n(BASE)} {_n(y - 7)}v7h{_n(long)}v-7"
+    return Mark(path, _n(BASE + long / 2.0), _n(y - 5), length_words(metres))
+
+
+def _axes(camera: Camera, height: float) -> list[Mark]:
+    """The axes of the world, from one point in the lower right corner."""
+    ends, letters = [], []
+    for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
+        x, y, _ = camera.see(axis)
+        long = math.hypot(x, y)
+        far = AXIS + LETTER / long if long > 0.1 else 0.0
+        aside = math.copysign(LETTER, x) if long < SHORT else 0.0
+        ends.append((AXIS * x, -AXIS * y))
+        letters.append((far * x + aside, -far * y))
+    left = WIDTH - BASE - LETTER / 2.0 - max(x for x, _ in [*letters, (0.0, 0.0)])
+    top = height - BASE - max(y for _, y in [*letters, (0.0, 0.0)])
+    return [
+        Mark(f"M{_n(left)} {_n(top)}l{_n(dx)} {_n(dy)}", _n(left + x), _n(top + y + 4.5), name)
+        for name, (dx, dy), (x, y) in zip("xyz", ends, letters, strict=True)
+    ]
 
 
 def _describe(drawn: SceneDrawing) -> str:
