@@ -66,11 +66,13 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "rolling_coin": "rolling_coin",
     "bowl": "bowl",
     "slider_crank": "slider_crank",
+    "loose_bearing": "loose_bearing",
     "seams": "seams",
     "grasp": "grasp",
     "hanging_cable": "hanging_cable",
     "rope": "rope",
     "rocking_block": "rocking_block",
+    "shaken_block": "shaken_block",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

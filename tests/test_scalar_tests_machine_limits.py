@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from spook_tracker.scalar_tests import (
     bowl,
@@ -13,6 +14,7 @@ from spook_tracker.scalar_tests import (
     cornering,
     floating_box,
     gears,
+    loose_bearing,
     motor,
     robot_arm,
     rope,
@@ -222,3 +224,49 @@ def test_many_facets_make_a_round_bowl_and_few_of_them_slow_a_ball_down_at_corne
     slows = (math.cos(width) + 0.4) / 1.4
     after = -math.sqrt(2.0 * pull * half) * slows * math.cos(angle - width)
     assert (x[1] - x[0]) / 1e-3 == pytest.approx(after, rel=5e-3)
+
+
+def test_a_slider_with_play_flies_and_strikes_where_an_integration_with_events_says() -> None:
+    """Pin and slider as masses on a line: pressed at a wall until the force would pull, free until the gap has closed."""
+    b, s = loose_bearing, slider_crank
+    crank, rod = s.CRANK, s.ROD
+
+    def moved(t: float) -> tuple[float, float, float]:
+        """Place, speed and acceleration of the pin: x = r cos θ + q, q² = l² − r² sin²θ."""
+        c, n, w = math.cos(s.START + s.SPEED * t), math.sin(s.START + s.SPEED * t), s.SPEED
+        q = math.sqrt(rod**2 - (crank * n) ** 2)
+        first = -(crank**2) * n * c * w / q
+        second = (-(crank**2) * (c * c - n * n) * w * w - first**2) / q
+        return crank * c + q, -crank * n * w + first, -crank * c * w * w + second
+
+    def event(function: object, rising: float) -> object:
+        function.terminal, function.direction = True, rising  # type: ignore[attr-defined]
+        return function
+
+    time, side, found = 0.0, 1.0, []
+    tight = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
+    while True:
+        pressed = event(lambda t, y, side=side: -side * moved(t)[2], -1.0)
+        left = solve_ivp(lambda t, y: (0.0,), (time, 9.0), (0.0,), events=pressed, **tight).t[-1]
+        apart = event(lambda t, y, side=side: side * (y[0] - moved(t)[0]) + b.PLAY, -1.0)
+        start = (moved(left)[0] + side * b.PLAY, moved(left)[1])
+        flight = solve_ivp(lambda t, y: (y[1], 0.0), (left, 9.0), start, events=apart, **tight)
+        time, side = float(flight.t[-1]), -side
+        if time > b.DURATION:
+            break
+        found.append((left, time, flight.y[1, -1]))
+        assert b.path(np.array((0.5 * (left + time),)))[0] == pytest.approx(
+            float(start[0] + start[1] * 0.5 * (time - left)), abs=1e-8
+        )
+    np.testing.assert_allclose(b.flights(), found, atol=1e-7)
+    # The fastest mean speed of a step, wherever the fastest moment lies in it, is short by j h²/6 at most.
+    h, left = b.TIME_STEP, found[0][0]
+    slowest = max if moved(left)[1] > 0.0 else min
+    short = max(
+        abs(
+            slowest((moved(t + h)[0] - moved(t)[0]) / h for t in left + shift + h * np.arange(-2, 2))
+            - moved(left)[1]
+        )
+        for shift in np.linspace(0.0, h, 9)
+    )
+    assert 0.0 < short < b.flight_error(h)

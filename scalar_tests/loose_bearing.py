@@ -1,0 +1,331 @@
+"""Does a slider with play in its bearing fly, strike and stick when and where mechanics says?"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    Box,
+    Compound,
+    Hinge,
+    Material,
+    Method,
+    Motor,
+    Part,
+    PointOnLine,
+    Position,
+    Prismatic,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.slider_crank import (
+    CRANK,
+    RELAXATION,
+    ROD,
+    ROD_MASS,
+    SLIDER,
+    SPEED,
+    START,
+    TURNING,
+    ahead,
+    lag,
+    pin,
+    slope,
+)
+from spook_tracker.scalar_tests.sweep import line, told
+
+PIN, PLAY = 0.02, 0.005  # m, radius of the pin, and how far it may go to either side in its slot
+WALL = (0.02, 0.1, 0.1)  # m
+TIME_STEP = 1.0 / 240.0  # s
+DURATION = 2.25  # s: four flights
+
+
+@functools.cache
+def scene(time_step: float) -> Scene:
+    """A crank that a motor turns, a rod whose far end is a pin guided along x, and round it the slider's slot. The pin
+    touches the slot's left wall: it brakes the slider."""
+    x, lean, _ = (float(value) for value in pin(START))
+    rates = [SPEED * float(slope(lambda t, i=i: pin(t)[i], START)) for i in (0, 1)]
+    c, s = CRANK * math.cos(START), CRANK * math.sin(START)
+    joint: dict[str, Any] = {"compliance": 0.0, "damping": RELAXATION * time_step}
+    plastic = Material()
+    half = 0.5 * ROD
+    aside = PIN + PLAY + 0.5 * WALL[0]
+    bodies = (
+        RigidBody(
+            name="crank", mass=1.0, inertia=(TURNING,) * 3, position=(0, 0, 0), angular_velocity=(0, 0, SPEED)
+        ),
+        RigidBody(
+            name="rod",
+            mass=ROD_MASS,
+            shape=Compound((Part(shape=Sphere(PIN), position=(half, 0.0, 0.0)),)),
+            inertia=(1e-4, ROD_MASS * ROD**2 / 12.0, ROD_MASS * ROD**2 / 12.0),
+            position=(0.5 * (c + x), 0.5 * s, 0.0),
+            orientation=(math.cos(0.5 * lean), 0.0, 0.0, -math.sin(0.5 * lean)),
+            velocity=(0.5 * (rates[0] - SPEED * s), 0.5 * SPEED * c, 0.0),
+            angular_velocity=(0.0, 0.0, -rates[1]),
+            material=plastic,
+        ),
+        RigidBody(
+            name="slider",
+            mass=SLIDER,
+            shape=Compound(tuple(Part(shape=Box(WALL), position=(d, 0.0, 0.0)) for d in (-aside, aside))),
+            inertia=(0.01,) * 3,
+            position=(x + PLAY, 0, 0),
+            velocity=(rates[0], 0, 0),
+            material=plastic,
+        ),
+    )
+    joints = (
+        Hinge(
+            name="drive",
+            between=(WORLD, "crank"),
+            at=(0, 0, 0),
+            axis=(0, 0, 1),
+            motor=Motor(speed=SPEED),
+            **joint,
+        ),
+        Hinge(name="pin", between=("crank", "rod"), at=(c, s, 0.0), axis=(0, 0, 1), **joint),
+        PointOnLine(name="wrist", between=(WORLD, "rod"), at=(x, 0.0, 0.0), axis=(1, 0, 0), **joint),
+        Prismatic(name="guide", between=(WORLD, "slider"), axis=(1, 0, 0), **joint),
+    )
+    return Scene(bodies=bodies, constraints=joints)
+
+
+def place(time: Any) -> Any:
+    """Of the pin [m]."""
+    return pin(START + SPEED * np.asarray(time))[0]
+
+
+def speed(time: float) -> float:
+    """Of the pin [m/s]."""
+    return SPEED * float(slope(lambda t: pin(t)[0], START + SPEED * time))
+
+
+def acceleration(time: float) -> float:
+    """Of the pin [m/s²]."""
+    return SPEED**2 * float(slope(lambda t: slope(lambda u: pin(u)[0], t, 1e-3), START + SPEED * time, 1e-3))
+
+
+def crossing(function: Any, early: float, late: float) -> float:
+    """Where a function changes its sign, by halving."""
+    sign = function(early) > 0.0
+    for _ in range(60):
+        middle = 0.5 * (early + late)
+        early, late = (middle, late) if (function(middle) > 0.0) == sign else (early, middle)
+    return 0.5 * (early + late)
+
+
+@functools.cache
+def flights() -> tuple[tuple[float, float, float], ...]:
+    """When the slider leaves a wall of its slot, when it strikes the other, and how fast it flies [s, s, m/s]: it leaves
+    when the pin's acceleration changes its sign, goes on as it is, and sticks to the wall it strikes."""
+    found: list[tuple[float, float, float]] = []
+    time, side = 0.0, 1.0  # of the pin: +1 where the slider is as far ahead as it may be
+    while True:
+        later = time + 0.01
+        while acceleration(time) * acceleration(later) > 0.0:
+            later += 0.01
+        left = crossing(acceleration, time, later)
+        start, flies = float(place(left)) + side * PLAY, speed(left)
+
+        def beyond(
+            t: float, side: float = side, start: float = start, flies: float = flies, left: float = left
+        ) -> float:
+            return side * (start + flies * (t - left) - float(place(t))) + PLAY
+
+        late = left + 0.01
+        while beyond(late) > 0.0:
+            late += 0.01
+        struck = crossing(beyond, left, late)
+        if struck > DURATION:
+            return tuple(found)
+        found.append((left, struck, flies))
+        time, side = struck, -side
+
+
+def path(times: Any) -> Any:
+    """Of the slider [m]."""
+    found = place(times) + PLAY
+    side = 1.0
+    for left, struck, flies in flights():
+        found = np.where(times > left, place(left) + side * PLAY + flies * (times - left), found)
+        side = -side
+        found = np.where(times > struck, place(times) + side * PLAY, found)
+    return found
+
+
+def runs(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[Any, Any, Any]:
+    """Times, and the slider's place and speed along its guide."""
+    observe: dict[str, Observable] = {
+        "x": Trace(quantity=Position("slider")),
+        "v": Trace(quantity=Velocity("slider")),
+    }
+    result = simulate(
+        scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
+    )
+    return result.sample_times["x"], result["x"][:, 0], result["v"][:, 0]
+
+
+def measure(simulate: Simulate) -> dict[str, float]:
+    """Two turns and a quarter."""
+    times, x, v = runs(simulate, TIME_STEP)
+    flying = [v[round(0.5 * (left + struck) / TIME_STEP)] / flies - 1.0 for left, struck, flies in flights()]
+    held = [
+        round(0.5 * (struck + left) / TIME_STEP)
+        for (_, struck, _), (left, _, _) in itertools.pairwise(flights())
+    ]
+    return {
+        "place_error": float(np.abs(x - path(times)).max()),
+        "flight_error": float(np.abs(flying).max()),
+        "stuck_error": float(np.abs(np.abs(x[held] - place(times[held])) - PLAY).max()),
+    }
+
+
+def pin_error(time_step: float) -> float:
+    """Of the pin's place [m]: what its joints lag and its crank runs ahead."""
+    return lag(time_step) + ahead(time_step, DURATION)
+
+
+def flight_error(time_step: float) -> float:
+    """Of the speed in flight [m/s]: the slider leaves with the fastest mean speed of a step, j h²/6 short at most (j the jerk
+    there: within half a step of the fastest moment, and a mean over the step), of a pin whose lag swings twice a turn."""
+    left = flights()[0][0]
+    jerk = abs(acceleration(left + 1e-3) - acceleration(left - 1e-3)) / 2e-3
+    swings = SPEED * (2.0 * lag(time_step) + ahead(time_step, DURATION))
+    return jerk * time_step**2 / 6.0 + swings
+
+
+def place_limit(time_step: float) -> float:
+    """The pin's error, and that of the speed for as long as the slider flies."""
+    longest = max(struck - left for left, struck, _ in flights())
+    return pin_error(time_step) + longest * flight_error(time_step)
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest error of the slider's place [m]."""
+    times, x, _ = runs(simulate, time_step, method)
+    return float(np.abs(x - path(times)).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same turns with nothing observed."""
+    return simulate(scene(time_step), time_step=time_step, duration=DURATION, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """How far the slider is ahead of the pin."""
+    times, x, _ = runs(simulate, TIME_STEP)
+    apart = float(np.abs(x - path(times)).max())
+    return Drawing(
+        curves=(
+            line("simulation", times, 1e3 * (x - place(times)), "points"),
+            line("flights and blows", times, 1e3 * (path(times) - place(times)), "reference"),
+        ),
+        x_label="time [s]",
+        y_label="slider ahead of the pin [mm]",
+        note=f"The slider is at most {told(1e3 * apart)} mm from where it must be, of a play of {told(2e3 * PLAY)} mm.",
+    )
+
+
+LAG = "rods and cranks lag by (1 + 2 τ/h)/4 h² of the acceleration across a joint and run ahead by (h ω)²/24"
+
+TEST = ScalarTest(
+    title="Slider-crank with clearance",
+    question="Does a slider with play in its bearing fly, strike and stick when and where mechanics says?",
+    why="Worn bearings rattle. Twice a turn the pin leaves one side of its hole and strikes the other: a contact within a "
+    "loop of joints that opens, flies free and closes with a blow that runs through rod and crank to the motor.",
+    model="The slider-crank, its motor and masses, with a pin on the rod, guided along x, in a slot of the slider that is 10 mm "
+    "wider; pin and slot touch without friction and without rebound. No gravity.",
+    parameters=(
+        ("crank and rod", "0.15 m and 0.45 m"),
+        ("rod and slider", "1 kg and 2 kg"),
+        ("play", "5 mm to either side"),
+        ("speed", "a turn a second"),
+        ("joints", "rigid, τ = 2 h"),
+        (
+            "time step",
+            f"1/240 s, at which the pin is {told(1e3 * pin_error(TIME_STEP))} mm off; it would be "
+            f"{told(1e3 * pin_error(1.0 / 60.0))} mm at 1/60 s, of a play of 5",
+        ),
+    ),
+    theory=(
+        "The slider leaves its wall when the pin's acceleration changes its sign, flies at that speed, strikes the other wall "
+        "and moves with the pin again.",
+        "The gap may close within a step, no more: the slider lands on its wall, and the blow is plastic. What the release "
+        "is off is of second order, for the speed is largest there.",
+        "Nothing can run away: rows are rigid, and a plastic blow takes energy.",
+    ),
+    reference="Geometry, with release and strike located by halving.",
+    conclusion="Green: contacts open and close within loops of joints as they must. Red: a contact pulls, or a blow is lost.",
+    source="ours; any textbook of machine dynamics for the mechanism",
+    measurements=(
+        ask(
+            measure,
+            (
+                error(
+                    "place_error",
+                    "largest error of the slider's place in two turns and a quarter",
+                    "m",
+                    place_limit(TIME_STEP),
+                    f"{LAG}; the release is off by j h²/6 of the speed",
+                ),
+                error(
+                    "flight_error",
+                    "largest relative error of a flight's speed",
+                    "1",
+                    flight_error(TIME_STEP) / abs(flights()[0][2]),
+                    "the fastest mean speed of a step, and the lag of the joints, which swings twice a turn",
+                    "companion",
+                ),
+                error(
+                    "stuck_error",
+                    "largest distance from the wall halfway between a strike and the next release",
+                    "m",
+                    pin_error(TIME_STEP),
+                    LAG,
+                    "companion",
+                ),
+            ),
+            "four flights",
+            TIME_STEP,
+        ),
+    ),
+    example=lambda: Example(scene=scene(TIME_STEP), time_step=TIME_STEP, duration=4.0),
+    figures=(Figure(name="play", title="The slider's play", draw=draw),),
+    ladders=(
+        Ladder(
+            name="place",
+            description="largest error of the slider's place",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
+            configurations=(Configuration(name="direct", method=PLAIN, expected_order=2.0),),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=5e-4,
+            target_seconds=0.02,
+        ),
+    ),
+)
