@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay looks heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -16,6 +16,8 @@ help:
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
+	@echo "make bench-replay  what a frame of ten thousand bodies costs in a browser"
+	@echo "make looks     every page of the website in every width and theme, to axe"
 	@echo "make engines   every engine that is installed on every scene: docs/engines.md"
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make campaign  random heaps from clean starts: does their energy ever rise?"
@@ -71,6 +73,11 @@ docs: develop
 crashes: develop
 	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_crashes.py
 
+# Every page in every width and theme to axe; `make test` shows it each page in two of the eight.
+looks: develop
+	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
+	SPOOK_TEST_EVERY_LOOK=1 $(BIN)/pytest -q --timeout 1800 tests/test_site_access.py
+
 hostile: develop
 	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py
 
@@ -114,6 +121,9 @@ engines: develop
 
 bench-publish: develop
 	$(BIN)/python bench/bench_publish.py
+
+bench-replay: develop
+	$(BIN)/python bench/bench_replay.py
 
 bench-heaps: develop
 	$(BIN)/python bench/bench_heaps.py

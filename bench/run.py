@@ -1,8 +1,8 @@
 """`make bench`: every timing claim of the project, as ratios measured side by side in one run.
 
 Runs each bench_*.py of this folder in turn, or only those named: `python bench/run.py particles storage`.
-Absolute times do not carry over between machines; the ratios do. Exit code 1 if a limit is missed. Heaps take
-minutes and run when named: `make bench-heaps`.
+Absolute times do not carry over between machines; the ratios do. Exit code 1 if a limit is missed. Heaps and the
+frames of a browser take minutes and run when named: `make bench-heaps`, `make bench-replay`.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
+BY_NAME = ("heaps", "replay")
 
 
 def main() -> int:
     known = {path.stem.removeprefix("bench_"): path for path in sorted(HERE.glob("bench_*.py"))}
-    asked = sys.argv[1:] or [name for name in known if name != "heaps"]
+    asked = sys.argv[1:] or [name for name in known if name not in BY_NAME]
     unknown = [name for name in asked if name not in known]
     if unknown:
         print(f"no benchmark named {unknown[0]!r}; there are {', '.join(known)}", file=sys.stderr)
