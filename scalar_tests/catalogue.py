@@ -53,6 +53,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "scissor_lift": "scissor_lift",
     "gears": "gears",
     "robot_arm": "robot_arm",
+    "arm_path": "arm_path",
     "conveyor": "conveyor",
     "turntable": "turntable",
     "sorting": "sorting",

@@ -1,0 +1,332 @@
+"""Do torques computed from a path lead a six-joint arm along it, and do drives at their limits let it fall as they must?"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    ConstraintForce,
+    Hinge,
+    JointCoordinate,
+    Load,
+    Method,
+    Motor,
+    Result,
+    Scene,
+    Sinusoid,
+    Table,
+    Trace,
+)
+from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.robot_arm import POSES, inverse_dynamics, kinematics
+from spook_tracker.scalar_tests.robot_arm import scene as driven
+from spook_tracker.scalar_tests.sweep import line, told
+
+JOINTS = range(6)
+AMPLITUDE = np.array((0.5, 0.4, -0.6, 0.7, 0.5, -0.9))  # rad
+RATE = 3.0  # rad/s
+DURATION = 0.5  # s
+KNOTS = 120  # of the tables of torques
+TIME_STEP = 1.0 / 60.0  # s
+FINE = 1e-3  # s, of the driven arm
+READ = (0.2, 0.4)  # s, when its torques are read
+WEAK = {1: 40.0, 2: 10.0}  # N m, bounds of the drives of the second and the third joint
+FALL = 15  # steps
+STILL = np.zeros(6)
+
+
+def path(time: float) -> tuple[Any, Any, Any]:
+    """Angles, speeds and accelerations wanted at a time."""
+    return (
+        AMPLITUDE * (1.0 - math.cos(RATE * time)),
+        AMPLITUDE * RATE * math.sin(RATE * time),
+        AMPLITUDE * RATE**2 * math.cos(RATE * time),
+    )
+
+
+def drives(motors: list[Motor | None], pose: Any = POSES[0]) -> Scene:
+    """The arm of the other question at rest in a pose, with these drives."""
+    still = driven(pose)
+    joints = (joint for joint in still.constraints if isinstance(joint, Hinge))
+    return replace(
+        still,
+        constraints=tuple(replace(joint, motor=one) for joint, one in zip(joints, motors, strict=True)),
+    )
+
+
+@functools.cache
+def led() -> Scene:
+    """No drives: the torques of inverse dynamics along the path as loads; what drives a joint pushes back the link before."""
+    times = [DURATION * k / KNOTS for k in range(KNOTS + 1)]
+    pushes = np.zeros((len(times), 6, 3))
+    for row, time in zip(pushes, times, strict=True):
+        torques, _, _ = inverse_dynamics(*path(time))
+        for k, (_, axis, _, _) in enumerate(kinematics(path(time)[0])):
+            row[k] += torques[k] * axis
+            if k > 0:
+                row[k - 1] -= torques[k] * axis
+    loads = tuple(
+        Load(
+            name=f"torque {k + 1} {'xyz'[c]}",
+            body=f"link {k + 1}",
+            torque=tuple(float(c == i) for i in range(3)),
+            factor=Table(tuple(times), tuple(pushes[:, k, c])),
+        )
+        for k in JOINTS
+        for c in range(3)
+    )
+    return replace(drives([None] * 6), forces=loads)
+
+
+@functools.cache
+def guided() -> Scene:
+    """Drives that follow the speeds of the path."""
+    return drives(
+        [Motor(speed=Sinusoid(amplitude=a * RATE, frequency=RATE / (2.0 * math.pi))) for a in AMPLITUDE]
+    )
+
+
+@functools.cache
+def falling() -> Scene:
+    """Held in the second pose by drives of which two are too weak."""
+    return drives([Motor(speed=0.0, max_force=WEAK.get(k)) for k in JOINTS], POSES[1])
+
+
+ANGLES: dict[str, Observable] = {f"q{k}": Trace(quantity=JointCoordinate(f"joint {k + 1}")) for k in JOINTS}
+
+
+def angles(result: Result) -> Any:
+    """Of the joints, at every sample [rad]."""
+    return np.stack([result[f"q{k}"] for k in JOINTS], axis=1)
+
+
+def strays(simulate: Simulate, time_step: float, method: Method = PLAIN) -> Any:
+    """How far every joint is from the path, at every step [rad]."""
+    result = simulate(led(), time_step=time_step, duration=DURATION, method=method, observe=ANGLES)
+    return angles(result) - np.array([path(time)[0] for time in result.sample_times["q0"]])
+
+
+def lead(simulate: Simulate) -> dict[str, float]:
+    """Half a second along the path by torques alone."""
+    return {"path_error": float(np.abs(strays(simulate, TIME_STEP)).max())}
+
+
+def guide(simulate: Simulate) -> dict[str, float]:
+    """The drives' torques on the path, which speeds up and slows down."""
+    observe: dict[str, Observable] = {
+        f"{k}": Trace(quantity=ConstraintForce(f"joint {k + 1}")) for k in JOINTS
+    }
+    result = simulate(guided(), time_step=FINE, duration=max(READ), observe=observe)
+    worst = 0.0
+    for time in READ:
+        right, _, _ = inverse_dynamics(*path(time))
+        axes = [axis for _, axis, _, _ in kinematics(path(time)[0])]
+        found = [axes[k] @ result[f"{k}"][round(time / FINE), 3:] for k in JOINTS]
+        worst = max(worst, float(np.abs(found - right).max() / np.abs(right).max()))
+    return {"torque_error": worst}
+
+
+def late() -> float:
+    """Two steps' change of the torques on the path, over the largest torque."""
+    worst = 0.0
+    for time in READ:
+        now, before = (inverse_dynamics(*path(t))[0] for t in (time, time - 2.0 * FINE))
+        worst = max(worst, float(np.abs(now - before).max() / np.abs(now).max()))
+    return worst
+
+
+def fall(simulate: Simulate) -> dict[str, float]:
+    """A quarter of a second with two drives at their bounds."""
+    observe = ANGLES | {f"{k}": Trace(quantity=ConstraintForce(f"joint {k + 1}")) for k in WEAK}
+    result = simulate(falling(), time_step=TIME_STEP, steps=FALL, observe=observe)
+    turned, worst = angles(result), 0.0
+    for step in range(1, FALL + 1):
+        arm = kinematics(np.asarray(POSES[1]) + turned[step - 1])
+        for k, bound in WEAK.items():
+            worst = max(worst, abs(abs(float(arm[k][1] @ result[f"{k}"][step, 3:])) / bound - 1.0))
+    held = [k for k in JOINTS if k not in WEAK]
+    return {
+        "bound_error": worst,
+        "fall_error": float(np.abs(turned[-1, list(WEAK)] - fallen()[0]).max()),
+        "held_error": float(np.abs(turned[:, held]).max()),
+    }
+
+
+def gained(turned: Any, speeds: Any) -> Any:
+    """Accelerations [rad/s²] of the weak joints under their bounds, the others held: inverse dynamics' columns, solved."""
+    free = list(WEAK)
+    pose, moving = np.array(POSES[1]), np.zeros(6)
+    pose[free] += turned
+    moving[free] = speeds
+    bias = inverse_dynamics(pose, moving, STILL)[0][free]
+    rest = inverse_dynamics(pose, STILL, STILL)[0][free]
+    units = [inverse_dynamics(pose, STILL, np.eye(6)[k])[0][free] - rest for k in free]
+    return np.linalg.solve(np.array(units).T, np.array([-bound for bound in WEAK.values()]) - bias)
+
+
+@functools.cache
+def fallen() -> tuple[Any, Any]:
+    """How far the weak joints have turned at the end [rad] and how fast they turn, by Runge and Kutta."""
+    q, v, h = np.zeros(2), np.zeros(2), 0.2 * FALL * TIME_STEP
+    for _ in range(5):
+        a1 = gained(q, v)
+        a2 = gained(q + 0.5 * h * v, v + 0.5 * h * a1)
+        a3 = gained(q + 0.5 * h * v + 0.25 * h * h * a1, v + 0.5 * h * a2)
+        a4 = gained(q + h * v + 0.5 * h * h * a2, v + h * a3)
+        q, v = q + h * v + h * h / 6.0 * (a1 + a2 + a3), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    return q, v
+
+
+def held_limit() -> float:
+    """Rows of hinges between links that turn lag by (1 + 2 τ/h)/4 (h ω)² [rad], τ = 2 h."""
+    return 1.25 * (TIME_STEP * float(np.abs(fallen()[1]).sum())) ** 2
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Largest distance of a joint from the path [rad]."""
+    return float(np.abs(strays(simulate, time_step, method)).max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same half second with nothing observed."""
+    return simulate(led(), time_step=time_step, duration=DURATION, method=method)
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Every joint's distance from the path at 1/60 s."""
+    off = strays(simulate, TIME_STEP)
+    times = TIME_STEP * np.arange(len(off))
+    return Drawing(
+        curves=tuple(line(f"joint {k + 1}", times, off[:, k]) for k in JOINTS),
+        x_label="time [s]",
+        y_label="angle less that of the path [rad]",
+        note=f"By torques alone no joint is further than {told(float(np.abs(off).max()))} rad from its path of up to "
+        f"{told(2.0 * float(np.abs(AMPLITUDE).max()))} rad.",
+    )
+
+
+PATH_LIMIT, FALL_LIMIT = 0.1055, 0.0295  # rad, by the steps of joint coordinates; the test finds them again
+
+TEST = ScalarTest(
+    title="Robot arm along a path",
+    question="Do torques computed from a path lead a six-joint arm along it, and do weak drives let it fall as they must?",
+    why="Computed torque is how robots are controlled: the model's torques are sent to the arm. An engine whose arm answers "
+    "otherwise than Newton and Euler trains controllers for another machine.",
+    model="The six-joint arm: led without drives by loads that are its inverse dynamics along a path; its drives following the "
+    "speeds of the path; and held by drives of which two have less than half of what that takes.",
+    parameters=(
+        ("path", "amplitudes of 0.4 to 0.9 rad times 1 − cos 3t, for 0.5 s"),
+        ("weak drives", "40 N m on the second joint, 10 N m on the third, for 0.25 s"),
+        (
+            "time step",
+            f"1/60 s; 1 ms for the torques of drives, two steps of which are {told(100.0 * late())} % of them: at 1/60 s "
+            f"{told(100.0 * late() * TIME_STEP / FINE)} %",
+        ),
+        ("gravity", "9.81 m/s²"),
+    ),
+    theory=(
+        "τ = M(q) q'' + c(q, q') + g(q), by recursive Newton–Euler; sent to the arm, it moves along q.",
+        "A step takes torques at its start: it leads by h/2, and an arm without feedback leaves its path with what that grows "
+        "to. Rows know how joints move a step late, two at most.",
+        "A drive at its bound carries the bound; the joint falls with M⁻¹ of what is left.",
+        "Nothing can run away here but the arm itself, which has no feedback.",
+    ),
+    reference="Recursive Newton–Euler; the fall by Runge and Kutta with its columns for a mass matrix.",
+    conclusion="Green: the arm answers torques as its model says. Red: loads, drives' bounds or inertias act wrongly.",
+    source="ours; robots are asked for in the thesis, section 5.4",
+    measurements=(
+        ask(
+            lead,
+            (
+                error(
+                    "path_error",
+                    "largest distance of a joint from the path in half a second",
+                    "rad",
+                    PATH_LIMIT,
+                    "steps of joint coordinates v₊ = v + h M⁻¹(τ − c − g), q₊ = q + h v₊ stray by 0.074, and by 0.031 more "
+                    "or less with c of two steps before",
+                ),
+            ),
+            "led by torques",
+            TIME_STEP,
+        ),
+        ask(
+            guide,
+            (
+                error(
+                    "torque_error",
+                    "largest error of a drive's torque on the path, over the largest torque",
+                    "1",
+                    late(),
+                    "rows learn of the motion a step late: two steps of the torques' change",
+                ),
+            ),
+            "drives that follow the path",
+            FINE,
+            "driven",
+        ),
+        ask(
+            fall,
+            (
+                error(
+                    "bound_error",
+                    "largest relative difference of a weak drive's torque from its bound, two joints, 15 steps",
+                    "1",
+                    1e-9,
+                    "a multiplier at its bound is the bound",
+                ),
+                error(
+                    "fall_error",
+                    "how far a weak joint is from where integration takes it after 0.25 s",
+                    "rad",
+                    FALL_LIMIT,
+                    "the same steps of joint coordinates, and what c of two steps before makes of them",
+                ),
+                error(
+                    "held_error",
+                    "how far the joints turn whose drives are strong enough",
+                    "rad",
+                    held_limit(),
+                    "rows of hinges lag by (1 + 2 τ/h)/4 (h ω)²",
+                    "companion",
+                ),
+            ),
+            "two weak drives",
+            TIME_STEP,
+            "weak",
+        ),
+    ),
+    example=lambda: Example(scene=led(), time_step=TIME_STEP, duration=DURATION),
+    figures=(Figure(name="path", title="Distance from the path", draw=draw),),
+    ladders=(
+        Ladder(
+            name="path",
+            description="largest distance of a joint from the path in half a second",
+            unit="rad",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 480, 1 / 120)),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.02,
+            target_seconds=0.01,
+        ),
+    ),
+)

@@ -1,0 +1,101 @@
+"""What the limits of the arm along a path come from: steps of joint coordinates, without the engine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.scalar_tests import arm_path, robot_arm
+from tests.limits import measurement
+
+STILL = np.zeros(6)
+
+
+def motion_part(pose: Any, speeds: Any) -> Any:
+    """The torques that speeds alone ask for: c(q, q')."""
+    return (
+        robot_arm.inverse_dynamics(pose, speeds, STILL)[0] - robot_arm.inverse_dynamics(pose, STILL, STILL)[0]
+    )
+
+
+def mass_matrix(pose: Any) -> Any:
+    """From the kinetic energy of the links' velocities, a pair of joints at a time; not from torques."""
+    moving = [robot_arm.inverse_dynamics(pose, one, STILL)[1:] for one in np.eye(6)]
+    found = np.zeros((6, 6))
+    for link, ((_, _, _, turn), (_, _, _, mass, inertia)) in enumerate(
+        zip(robot_arm.kinematics(pose), robot_arm.LINKS, strict=True)
+    ):
+        v, w = (np.array([joint[i][link] for joint in moving]) for i in (0, 1))
+        found += mass * v @ v.T + w @ turn @ np.diag(inertia) @ turn.T @ w.T
+    return found
+
+
+def stepped(torques: Any, pose: Any, free: list[int], h: float, steps: int, late: int) -> Any:
+    """Angles after every step v₊ = v + h M⁻¹(τ − c − g), q₊ = q + h v₊ of the free joints, c of so many steps before."""
+    q, v = np.array(pose, dtype=float), np.zeros(6)
+    known, found = [(q, v)] * 3, []
+    for step in range(steps):
+        rest = torques(step * h) - motion_part(*known[-1 - late])
+        rest -= robot_arm.inverse_dynamics(q, STILL, STILL)[0]
+        gain = np.zeros(6)
+        gain[free] = np.linalg.solve(mass_matrix(q)[np.ix_(free, free)], rest[free])
+        v = v + h * gain
+        q = q + h * v
+        known.append((q, v))
+        found.append(q)
+    return np.array(found)
+
+
+def test_an_arm_led_by_torques_strays_as_steps_of_its_joints_do() -> None:
+    a = arm_path
+    h, steps = a.TIME_STEP, round(a.DURATION / a.TIME_STEP)
+    wanted = np.array([a.path((k + 1) * h)[0] for k in range(steps)])
+    led = [
+        np.abs(
+            stepped(lambda t: robot_arm.inverse_dynamics(*a.path(t))[0], STILL, [*range(6)], h, steps, late)
+            - wanted
+        ).max()
+        for late in (0, 2)
+    ]
+    (gate,) = measurement("arm_path", "plain").metrics
+
+    assert gate.limit == pytest.approx(led[0] + abs(led[1] - led[0]), rel=0.01)
+
+
+def test_two_weak_joints_fall_as_steps_of_theirs_do() -> None:
+    a = arm_path
+    free, bounds = [*a.WEAK], np.zeros(6)
+    bounds[free] = [-bound for bound in a.WEAK.values()]
+    right = np.array(a.POSES[1])[free] + a.fallen()[0]
+    on_time, later = (
+        stepped(lambda t: bounds, a.POSES[1], free, a.TIME_STEP, a.FALL, late)[-1][free] for late in (0, 2)
+    )
+    limits = {m.name: m.limit for m in measurement("arm_path", "weak").metrics}
+    off = np.abs(on_time - right) + np.abs(later - on_time)
+
+    assert limits["fall_error"] == pytest.approx(off.max(), rel=0.02)
+    # The reference by itself: what the weight gives and the drives take is the energy of motion at the end.
+    pose = np.array(a.POSES[1])
+    pose[free] += a.fallen()[0]
+    moving = np.zeros(6)
+    moving[free] = a.fallen()[1]
+    lifted = sum(
+        mass * 9.81 * (after[2][2] - before[2][2])
+        for (_, _, _, mass, _), before, after in zip(
+            robot_arm.LINKS, robot_arm.kinematics(a.POSES[1]), robot_arm.kinematics(pose), strict=True
+        )
+    )
+    kinetic = 0.5 * moving @ mass_matrix(pose) @ moving
+    assert kinetic + lifted == pytest.approx(float(bounds[free] @ a.fallen()[0]), rel=1e-4)
+
+
+def test_torques_of_a_guided_arm_are_two_steps_late_at_most() -> None:
+    """And those of inverse dynamics with accelerations are mass matrix, motion and weight."""
+    (gate,) = measurement("arm_path", "driven").metrics
+    assert gate.limit == arm_path.late()
+    for time in arm_path.READ:
+        q, v, a = arm_path.path(time)
+        whole = mass_matrix(q) @ a + motion_part(q, v) + robot_arm.inverse_dynamics(q, STILL, STILL)[0]
+        np.testing.assert_allclose(robot_arm.inverse_dynamics(q, v, a)[0], whole, atol=1e-9)
