@@ -9,7 +9,7 @@ import pytest
 from spook_tracker.tracker.website import printed
 from spook_tracker.tracker.website.folder import YOUNG, replacing
 from tests.browser import MISSING, programs
-from tests.synthetic_history import DocumentHistory, history
+from tests.synthetic_history import SEVEN, DocumentHistory, history
 
 
 @pytest.fixture(scope="module")
@@ -36,16 +36,86 @@ def test_without_a_browser_it_says_so(tmp_path, monkeypatch):
         printed.print_pdf(tmp_path / "a.html", tmp_path / "a.pdf")
 
 
-def test_the_pdf_has_pages(tmp_path, page):
+@pytest.fixture(scope="module")
+def pdf(tmp_path_factory, page):
+    """The document as it is printed, read by a library that did not make it."""
     if programs() is None:
         pytest.skip(MISSING)
-    source = tmp_path / "night.html"
-    source.write_text(page, encoding="utf-8")
-    printed.print_pdf(source, tmp_path / "night.pdf")
-    made = (tmp_path / "night.pdf").read_bytes()
+    pypdf = pytest.importorskip("pypdf")
+    folder = tmp_path_factory.mktemp("printed")
+    (folder / "night.html").write_text(page, encoding="utf-8")
+    printed.print_pdf(folder / "night.html", folder / "night.pdf")
+    return pypdf.PdfReader(folder / "night.pdf")
 
-    assert made.startswith(b"%PDF-")
-    assert len(re.findall(rb"/Type\s*/Page\b", made)) > 5
+
+def words(text):
+    return re.sub(r"\s+", " ", text)
+
+
+def test_the_pdf_has_pages_of_a4_each_with_its_number(pdf):
+    count = len(pdf.pages)
+    assert count > 8
+    for number, page in enumerate(pdf.pages, 1):
+        size = [float(length) * 25.4 / 72.0 for length in (page.mediabox.width, page.mediabox.height)]  # mm
+        assert size == pytest.approx([210.0, 297.0], abs=0.5)
+        assert f"{number} / {count}" in words(page.extract_text())
+
+
+def test_the_contents_name_every_test_and_the_page_it_stands_on(pdf):
+    """Titles are read as text, numbers are compared with where the links lead."""
+    contents = words(pdf.pages[0].extract_text())
+    places = {
+        name[3:]: pdf.get_destination_page_number(place)
+        for name, place in pdf.named_destinations.items()
+        if name.startswith("/t-")
+    }
+
+    assert len(places) == len(SEVEN) + 1  # and a hostile one
+    for name, (title, *_) in SEVEN.items():
+        at = places[name]
+        assert re.search(rf"{re.escape(title)} [A-Z ]*{at + 1}\b", contents), title
+        assert title in words(pdf.pages[at].extract_text())
+
+
+def test_the_outline_of_the_pdf_leads_to_every_test(pdf):
+    def leaves(entries):
+        for entry in entries:
+            yield from leaves(entry) if isinstance(entry, list) else [entry]
+
+    outline = {words(entry.title): pdf.get_destination_page_number(entry) for entry in leaves(pdf.outline)}
+    for title, *_ in SEVEN.values():
+        (page,) = {
+            page for head, page in outline.items() if re.fullmatch(f"{re.escape(title)} ?[A-Z ]+", head)
+        }
+        assert title in words(pdf.pages[page].extract_text())
+
+
+def test_the_figures_of_the_pdf_are_drawn_and_not_copied(pdf):
+    """No picture of points anywhere; lines and curves where the figures are, with their axes as text."""
+    assert not any(page.images for page in pdf.pages)
+    at = pdf.get_destination_page_number(pdf.named_destinations["/t-pendulum"])
+    drawn = b"".join(page.get_contents().get_data() for page in pdf.pages[at : at + 3])
+    assert len(re.findall(rb"\bl\b", drawn)) > 100
+
+
+def test_pages_are_only_told_where_a_browser_told_them():
+    html = '<span class="page-of" data-of="t-a"></span><span class="page-of" data-of="t-b"></span>'
+
+    assert printed.pages_of(b"%PDF-1.7 of another printer") == {}
+    assert printed.with_pages(html, {}) == html
+    assert printed.with_pages(html, {"t-b": 12}) == html.replace('"t-b">', '"t-b">12')
+
+
+def test_the_conclusions_are_tonight_s_and_the_figures_have_their_notes(page):
+    """A red night is told by its red side, a green one by its green."""
+    told = {}
+    for broken in (10**9, 2):
+        text = words(re.sub("<[^>]*>", "", printed.one_file(history(3, broken=broken))))
+        told[broken] = text[text.index("Friction", text.index("Every gate")) :]
+
+    assert "Green: " not in told[2] and "Green: " not in told[10**9]
+    assert "Red tonight" in told[2] and "Red tonight" not in told[10**9]
+    assert "chart-note" in page
 
 
 def test_what_a_killed_publication_left_is_swept_and_a_running_one_is_not(tmp_path):

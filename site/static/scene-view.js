@@ -318,7 +318,7 @@ class SceneView {
     }
     this.solids = [];
     for (const [key, items] of kinds) {
-      const detail = items.length > 800 ? [10, 6] : [28, 18];
+      const detail = items.length > 4000 ? [7, 5] : items.length > 800 ? [10, 6] : [28, 18];
       const shape = key.split(" ")[0], fixed = key.endsWith("fixed");
       const geometry = () => shape === "facets" ? this.facets(key.split(" ")[1].split(",").map(Number)) : shape === "sphere" ? new THREE.SphereGeometry(1, ...detail) : shape === "box" ? new THREE.BoxGeometry(1, 1, 1) :
         new THREE.CapsuleGeometry(...key.split(" ")[1].split(",").map(Number), 6, 16).rotateX(Math.PI / 2);

@@ -11,6 +11,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import spaced
 from spook_tracker.tracker.website.causes import hit_row, told
+from spook_tracker.tracker.website.charts import drawable
 from spook_tracker.tracker.website.comparisons import Comparisons, choice, pair_name
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
@@ -26,6 +27,7 @@ from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
 from spook_tracker.tracker.website.page_rows import Page, address, row
+from spook_tracker.tracker.website.page_test import concluded
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
 
@@ -177,13 +179,15 @@ def document(book: Book, events: Sequence[Event]) -> Page:
         for gate in test.gates():
             gates.append({**vars(_row(gate, test)), "slug": name})
         scalars = test.gates() + test.companions() + test.reported() + test.of_kind("order")
-        pictures = [picture(figure_chart(f, f"{name}-")) for f in test.figures]
-        pictures += [
-            picture(chart)
+        charts = [figure_chart(f, f"{name}-") for f in test.figures]
+        charts += [
+            chart
             for chart in ladder_charts(test, f"{name}-", earlier=book.earlier[:1])
             if chart.name.endswith("-seconds")
         ]
-        pictures += [grid_picture(map_grid(m, f"{name}-")) for m in test.maps]
+        pictures = [(picture(chart, shown := drawable(chart)), shown.note) for chart in charts]
+        grids = [map_grid(m, f"{name}-") for m in test.maps]
+        pictures += [(grid_picture(grid), grid.note) for grid in grids]
         tests.append(
             {
                 "card": test.card,
@@ -194,6 +198,7 @@ def document(book: Book, events: Sequence[Event]) -> Page:
                 "left_out": sum(not s.kept for s in test.card.stages),
                 "rows": [_row(t, test) for t in [*scalars, *test.of_kind("break_point")]],
                 "pictures": pictures,
+                "conclusions": concluded(test.card.conclusion, [gate.state for gate in test.gates()]),
             }
         )
     context = {"summary": summary(book), "gates": gates, "tests": tests}

@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from spook_tracker.tracker.document.errors import TrackerError
@@ -43,29 +43,67 @@ def one_file(
 
 
 def print_pdf(html: Path, pdf: Path) -> None:
-    """Print an HTML file as PDF with the browser that is here. PrintError if there is none, or it fails."""
+    """Print an HTML file as PDF, with an outline and the pages of its contents, by the browser that is here.
+
+    Only what is printed tells on which page it stands: it is printed once to learn that, and again with the numbers.
+    PrintError if there is no browser, or it fails.
+    """
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         raise PrintError(
             f"a PDF is printed by a browser, and none of {', '.join(BROWSERS)} is here; install one, or ask "
             "for --html and print that"
         )
-    with tempfile.TemporaryDirectory() as profile:
-        made = Path(profile) / "made.pdf"
-        command = [
-            browser, "--headless=new", "--disable-gpu", "--no-pdf-header-footer", "--disable-dev-shm-usage",
-            f"--user-data-dir={profile}/profile", f"--print-to-pdf={made}",
-        ]  # fmt: skip
-        if hasattr(os, "geteuid") and os.geteuid() == 0:
-            command.append("--no-sandbox")
-        try:
-            done = subprocess.run(
-                [*command, html.absolute().as_uri()], capture_output=True, text=True, timeout=PATIENCE
-            )
-        except subprocess.TimeoutExpired:
-            raise PrintError(f"{browser} did not finish printing within {PATIENCE:.0f} s") from None
-        if not made.exists():
-            last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-            raise PrintError(f"{browser} printed nothing: {last[:200]}")
+    with tempfile.TemporaryDirectory() as folder:
+        made = _printed(browser, html, Path(folder))
+        text = html.read_text(encoding="utf-8")
+        numbered = with_pages(text, pages_of(made.read_bytes()))
+        if numbered != text:
+            again = Path(folder) / "numbered.html"
+            again.write_text(numbered, encoding="utf-8")
+            made = _printed(browser, again, Path(folder))
         pdf.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(made, pdf)
+
+
+def with_pages(html: str, pages: Mapping[str, int]) -> str:
+    """The document with the page of each test in its contents, as far as they are known."""
+
+    def numbered(found: re.Match[str]) -> str:
+        page = pages.get(found[1])
+        return found[0] if page is None else f"{found[0]}{page}"
+
+    return re.sub(r'<span class="page-of" data-of="([^"]*)">', numbered, html)
+
+
+def pages_of(pdf: bytes) -> dict[str, int]:
+    """The page on which each place that is linked to stands, as browsers write it; empty where one writes otherwise."""
+    order = re.findall(rb"\n(\d+) 0 obj\s*<<\s*/Type /Page\b", pdf)
+    number = {page: place for place, page in enumerate(order, 1)}
+    named = re.search(rb"/Dests (\d+) 0 R", pdf)
+    told = named and re.search(rb"\n%s 0 obj\s*<<(.*?)>>" % named[1], pdf, re.DOTALL)
+    if not told:
+        return {}
+    found = re.findall(rb"/(\S+) \[(\d+) 0 R", told[1])
+    return {name.decode("ascii", "replace"): number[page] for name, page in found if page in number}
+
+
+def _printed(browser: str, html: Path, folder: Path) -> Path:
+    made = folder / "made.pdf"
+    made.unlink(missing_ok=True)
+    command = [
+        browser, "--headless=new", "--disable-gpu", "--no-pdf-header-footer", "--disable-dev-shm-usage",
+        "--generate-pdf-document-outline", f"--user-data-dir={folder}/profile", f"--print-to-pdf={made}",
+    ]  # fmt: skip
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        command.append("--no-sandbox")
+    try:
+        done = subprocess.run(
+            [*command, html.absolute().as_uri()], capture_output=True, text=True, timeout=PATIENCE
+        )
+    except subprocess.TimeoutExpired:
+        raise PrintError(f"{browser} did not finish printing within {PATIENCE:.0f} s") from None
+    if not made.exists():
+        last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise PrintError(f"{browser} printed nothing: {last[:200]}")
+    return made
