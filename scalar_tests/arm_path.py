@@ -85,7 +85,7 @@ def led() -> Scene:
         Load(
             name=f"torque {k + 1} {'xyz'[c]}",
             body=f"link {k + 1}",
-            torque=tuple(float(c == i) for i in range(3)),
+            torque=(float(c == 0), float(c == 1), float(c == 2)),
             factor=Table(tuple(times), tuple(pushes[:, k, c])),
         )
         for k in JOINTS

@@ -57,6 +57,11 @@ MASS = CHASSIS + 4.0 * WHEEL
 INERTIA = 0.5 * WHEEL * RADIUS**2  # kg m², of a wheel about its axle
 ROLLING = MASS * GRAVITY * math.sin(math.atan(SLOPE)) / (MASS + 4.0 * INERTIA / RADIUS**2)  # m/s²
 BRAKING = FRICTION * GRAVITY  # m/s²
+STOPPED = 5.0  # m/s, from which it comes to stand within a second
+TORQUE = 300.0  # N m, of each rear wheel's drive, up the slope
+CLIMBING = (2.0 * TORQUE / RADIUS - MASS * GRAVITY * math.sin(math.atan(SLOPE))) / (
+    MASS + 4.0 * INERTIA / RADIUS**2
+)  # m/s²
 WHEELS = {
     "front left": (FRONT, 1),
     "front right": (FRONT, -1),
@@ -66,8 +71,11 @@ WHEELS = {
 HALF = math.sqrt(0.5)
 
 
-def scene(slope: float = 0.0, speed: float = 0.0, locked: bool = False, rise: float = RISE) -> Scene:
-    """The vehicle on a plane, x ahead; gravity is tilted by atan(slope) ahead. `locked`: the brakes hold its wheels."""
+def scene(
+    slope: float = 0.0, speed: float = 0.0, locked: bool = False, rise: float = RISE, torque: float = 0.0
+) -> Scene:
+    """The vehicle on a plane, x ahead; gravity is tilted by atan(slope) ahead. `locked`: the brakes hold its wheels.
+    `torque` [N m]: of each rear wheel's drive, which wants to turn faster than it ever will."""
     rough = Material(friction=FRICTION, compliance=0.5 * COMPLIANCE)
     road = RigidBody(name="road", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
     chassis = RigidBody(
@@ -91,13 +99,14 @@ def scene(slope: float = 0.0, speed: float = 0.0, locked: bool = False, rise: fl
         )
         for name, (x, side) in WHEELS.items()
     ]
+    drive = Motor(speed=1000.0, max_force=torque) if torque > 0.0 else None
     axles = [
         Hinge(
             name=f"{name} axle",
             between=("chassis", name),
             axis=(0.0, 1.0, 0.0),
             compliance=0.0,
-            motor=Motor(speed=0.0) if locked else None,
+            motor=Motor(speed=0.0) if locked else drive if name.startswith("rear") else None,
         )
         for name in WHEELS
     ]
@@ -142,26 +151,66 @@ def brake(simulate: Simulate) -> dict[str, float]:
     observe |= {name: Final(quantity=ContactForce(name, "road")) for name in WHEELS}
     result = simulate(scene(0.0, SPEED, locked=True), time_step=TIME_STEP, duration=DURATION, observe=observe)
     exact = SPEED - BRAKING * result.sample_times["v"]
+    stop = simulate(
+        scene(0.0, STOPPED, locked=True),
+        time_step=TIME_STEP,
+        duration=DURATION,
+        observe={"x": Final(quantity=Position("chassis")), "v": Final(quantity=Velocity())},
+    )
     front = float(result["front left"][2] + result["front right"][2])
     rear = float(result["rear left"][2] + result["rear right"][2])
     return {
         "speed_error": float(np.abs(result["v"][:, 0] - exact).max()),
+        "stopping_error": float(stop["x"][0]) - stopping(TIME_STEP),
+        "stands": float(np.abs(stop["v"]).max()),
         "transfer_error": front / front_load(-BRAKING) - 1.0,
         "load_error": (front + rear) / (MASS * GRAVITY) - 1.0,
     }
 
 
+def stopping(time_step: float) -> float:
+    """The way it slides [m], summed at the ends of steps until it stands: v²/(2 µ g), v h/2 less to first order."""
+    steps = np.arange(1, round(DURATION / time_step) + 1)
+    return time_step * float(np.maximum(0.0, STOPPED - BRAKING * time_step * steps).sum())
+
+
+def climb(simulate: Simulate) -> dict[str, float]:
+    """Driven up the slope by its rear wheels."""
+    observe: dict[str, Observable] = {
+        "v": Trace(quantity=Velocity("chassis")),
+        "w": Trace(quantity=AngularVelocity("front left")),
+    }
+    observe |= {name: Final(quantity=ContactForce(name, "road")) for name in WHEELS}
+    asked = scene(-SLOPE, torque=TORQUE)
+    result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
+    exact = CLIMBING * result.sample_times["v"]
+    front = float(result["front left"][2] + result["front right"][2])
+    return {
+        "speed_error": float(np.abs(result["v"][:, 0] - exact).max()),
+        "spin_error": float(np.abs(RADIUS * result["w"][:, 1] - exact).max()),
+        "transfer_error": front / climbing_load() - 1.0,
+    }
+
+
+def climbing_load() -> float:
+    """What the front wheels carry [N]: gravity pulls back at the height of each weight, and spinning the wheels up takes
+    4 I a/r of moment."""
+    tilt = math.atan(SLOPE)
+    held = front_load(CLIMBING + GRAVITY * math.sin(tilt), GRAVITY * math.cos(tilt))
+    return held - 4.0 * INERTIA * CLIMBING / RADIUS / (FRONT + REAR)
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Stopping way against v²/(2 µ g) [m]."""
     observe = {"x": Final(quantity=Position("chassis"))}
-    asked = scene(0.0, 5.0, locked=True)
-    result = simulate(asked, time_step=time_step, duration=1.0, method=method, observe=observe)
-    return float(result["x"][0]) - 25.0 / (2.0 * BRAKING)
+    asked = scene(0.0, STOPPED, locked=True)
+    result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return float(result["x"][0]) - STOPPED**2 / (2.0 * BRAKING)
 
 
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same stop with nothing observed."""
-    return simulate(scene(0.0, 5.0, locked=True), time_step=time_step, duration=1.0, method=method)
+    return simulate(scene(0.0, STOPPED, locked=True), time_step=time_step, duration=DURATION, method=method)
 
 
 # Over the front wheels it goes when they carry all: µ g (m_c (r + rise) + 4 m_w r) = g (m_c FRONT + 2 m_w L).
@@ -210,6 +259,7 @@ def draw(simulate: Simulate) -> Drawing:
 SINK = COMPLIANCE * front_load(-BRAKING) / 4.0
 TURNED = "constant forces are exact in a step, but the road gives way by ε F = 0.19 µm, a part of the wheel's radius"
 ROLLED = SINK / RADIUS * ROLLING * DURATION  # m/s
+DRIVEN = SINK / RADIUS * 2.0 * TORQUE / RADIUS / MASS * DURATION  # m/s
 STATICS = "moments about the rear footprints, with heights that sink by ε F = 0.19 µm"
 SETTLING = "the wheels sink by ε F = 0.19 µm in the first steps: by less than that in one"
 
@@ -218,18 +268,20 @@ TEST = ScalarTest(
     question="Does a vehicle on four wheels roll down a slope, brake and shift its weight as mechanics says?",
     why="Wheels, axles, contact and friction act at once: a slip of the wheel, a lost moment or a soft axle shows at once "
     "in the acceleration or in the loads of the axles.",
-    model="A rigid chassis of 1000 kg on four wheels of 25 kg, cylinders on hinges. It rolls freely down a slope, and "
-    "slides with all wheels locked. There are no tyres and no suspension.",
+    model="A rigid chassis of 1000 kg on four wheels of 25 kg, cylinders on hinges. It rolls freely down a slope, is driven "
+    "up it by its rear wheels, and slides with all wheels locked until it stands. There are no tyres and no suspension.",
     parameters=(
         ("time step", "1/60 s"),
         ("chassis", "1000 kg, centre 0.6 m over the road"),
         ("wheels", "25 kg, radius 0.3 m, width 0.2 m"),
         ("axles", "1.2 m before and 1.5 m behind the centre, track 1.5 m"),
+        ("drive", "300 N m on each rear wheel"),
         ("road", "µ = 0.7, slope 0.1"),
         ("gravity", "9.81 m/s²"),
     ),
     theory=(
         "Rolling: a = g sin θ · M/(M + 4 I/r²).",
+        "Driven up: a = (Σ T/r − M g sin θ)/(M + 4 I/r²), while the wheels do not slip.",
         "Locked: a = −µ g. Σ m a h about the rear footprints moves load to the front: N_f L = (m_c b + 2 m_w L) g + "
         "µ g (m_c h + 4 m_w r).",
         "The stopping way is v²/(2 µ g), v h/2 less when summed at the ends of steps.",
@@ -275,6 +327,21 @@ TEST = ScalarTest(
                     SETTLING,
                 ),
                 error(
+                    "stopping_error",
+                    "way from 5 m/s to standing, less the sum of the steps' speeds by −µ g",
+                    "m",
+                    SINK / TIME_STEP * DURATION,
+                    f"{SETTLING}, of speed for a second",
+                ),
+                error(
+                    "stands",
+                    "largest speed of any part after that",
+                    "m/s",
+                    SINK / TIME_STEP,
+                    SETTLING,
+                    "companion",
+                ),
+                error(
                     "transfer_error",
                     "load of the front wheels over statics, minus one",
                     "1",
@@ -293,6 +360,37 @@ TEST = ScalarTest(
             "all wheels locked",
             TIME_STEP,
             "braking",
+        ),
+        ask(
+            climb,
+            (
+                error(
+                    "speed_error",
+                    "largest difference of the speed to a t",
+                    "m/s",
+                    DRIVEN,
+                    "a wheel that has sunk by ε F drives with that part of its radius more force",
+                ),
+                error(
+                    "spin_error",
+                    "largest difference of r w of a front wheel to a t",
+                    "m/s",
+                    DRIVEN + SINK / RADIUS * CLIMBING * DURATION,
+                    "the same, and that part of the radius",
+                    "companion",
+                ),
+                error(
+                    "transfer_error",
+                    "load of the front wheels over moments, minus one",
+                    "1",
+                    SINK / RADIUS,
+                    STATICS,
+                    "companion",
+                ),
+            ),
+            "driven up a slope",
+            TIME_STEP,
+            "driven",
         ),
     ),
     example=lambda: Example(scene=scene(SLOPE), time_step=TIME_STEP, duration=3.0),

@@ -153,6 +153,18 @@ def test_the_loads_of_a_braking_vehicle_balance_its_moments() -> None:
     assert v.front_load(-v.BRAKING) == pytest.approx(front, rel=1e-12)
     assert v.front_load(-v.BRAKING, rise=v.TIPPING) == pytest.approx(weights, rel=1e-12)
     assert rear > 0.0 and pytest.approx(0.19e-6, rel=0.02) == v.SINK
+    # Driven up: what T and the weights do along the slope, and moments about the rear footprints with every a and I a/r.
+    tilt, a = math.atan(v.SLOPE), v.CLIMBING
+    back = v.GRAVITY * math.sin(tilt)
+    assert pytest.approx(v.MASS * (a + back) + 4.0 * v.INERTIA * a / v.RADIUS**2) == 2.0 * v.TORQUE / v.RADIUS
+    base = v.FRONT + v.REAR
+    about = sum(m * (v.GRAVITY * math.cos(tilt) * (x + v.REAR) - (a + back) * z) for m, x, z in parts)
+    assert v.climbing_load() * base == pytest.approx(about - 4.0 * v.INERTIA * a / v.RADIUS, rel=1e-12)
+    grip = v.FRICTION * (v.MASS * v.GRAVITY * math.cos(tilt) - v.climbing_load())
+    assert grip > 2.0 * v.TORQUE / v.RADIUS  # the driven wheels do not slip
+    assert v.stopping(1e-6) == pytest.approx(v.STOPPED**2 / (2.0 * v.BRAKING), rel=1e-5)
+    short = v.stopping(v.TIME_STEP) - v.STOPPED**2 / (2.0 * v.BRAKING)
+    assert short == pytest.approx(-0.5 * v.STOPPED * v.TIME_STEP, rel=0.01)
 
 
 def ring_balance(
