@@ -13,6 +13,8 @@ const { LiveEngine, simulateLive, observedOrder } = require(path.resolve(process
       start: movie.solids.map((solid) => solid.position),
       position: Buffer.from(movie.position.buffer).toString("base64"),
       energy: Buffer.from(movie.energy.buffer).toString("base64"),
+      orientation: movie.orientation ? Buffer.from(movie.orientation.buffer).toString("base64") : null,
+      ratio: movie.ratio ? Array.from(movie.ratio, (v) => (Number.isFinite(v) ? v : null)) : null,
       order: order ? observedOrder(engine, scene, parameters) : null,
     }));
   }

@@ -25,6 +25,7 @@ from spook_tracker.engine import (
     Lock,
     Material,
     Method,
+    Orientation,
     Particle,
     Plane,
     Position,
@@ -139,13 +140,18 @@ CASES = [
     (chain, {"method": "order 4", "rate": 60, "links": 26, "compliance": -12}),
     (slope, {"friction": "cone", "rate": 60, "angle": 20, "direction": 0, "mu": 0.5}),
     (slope, {"friction": "cone", "rate": 60, "angle": 40, "direction": 35, "mu": 0.5}),
+    (slope, {"friction": "scaled_box", "rate": 60, "angle": 35, "direction": 25, "mu": 0.4}),
     (slope, {"friction": "box", "rate": 120, "angle": 35, "direction": 60, "mu": 0.3}),
     (oscillator, {"rate": 60, "stiffness": 50, "damping": 0}),
     (oscillator, {"rate": 60, "stiffness": 200, "damping": 2.25}),
     (planetarium, {"method": "plain", "rate": 60, "speed": 0.8}),
+    (planetarium, {"method": "order 6", "rate": 30, "speed": 0.7}),
+    (chain, {"method": "order 6", "rate": 60, "links": 5, "compliance": -9}),
     (planetarium, {"method": "order 8", "rate": 20, "speed": 1.1}),
     (beam, {"rate": 60, "boxes": 12, "compliance": -4}),
     (pile, {"friction": "cone", "solver": "direct", "rate": 60, "count": 3, "mu": 0.4, "restitution": 0.1}),
+    (pile, {"friction": "scaled_box", "solver": "hybrid", "rate": 120, "count": 7, "mu": 0.6, "restitution": 0.0}),
+    (pile, {"friction": "cone", "solver": "hybrid", "rate": 60, "count": 10, "mu": 0.4, "restitution": 0.1}),
     (pile, {"friction": "cone", "solver": "iterative", "rate": 60, "count": 10, "mu": 0.4, "restitution": 0.5}),
 ]  # fmt: skip
 
@@ -178,23 +184,41 @@ def answers():
 @pytest.mark.parametrize(
     "case", range(len(CASES)), ids=[f"{b.__name__}-{i}" for i, (b, _) in enumerate(CASES)]
 )
-def test_every_position_of_a_thousand_steps_has_the_same_bits(answers, case):
+def test_every_sample_of_a_thousand_steps_has_the_same_bits(answers, case):
+    """Positions, orientations of rigid bodies and energy."""
     build, parameters = CASES[case]
     page = answers[case]
     h = 1.0 / parameters["rate"]
     scene, method = build(parameters, h, page)
 
-    native = simulate(
-        scene, time_step=h, steps=STEPS, method=method,
-        observe={"position": Trace(quantity=Position()), "energy": Trace(quantity=Energy())},
-    )  # fmt: skip
+    turning = any(isinstance(body, RigidBody) for body in scene.bodies)
+    asked = {"position": Position(), "energy": Energy()} | ({"orientation": Orientation()} if turning else {})
+    observe = {name: Trace(quantity=quantity) for name, quantity in asked.items()}
+
+    native = simulate(scene, time_step=h, steps=STEPS, method=method, observe=observe)
 
     assert page["status"] == native.status
     assert page["hash"] == native.state_hash
-    for name in ("position", "energy"):
+    assert (page["orientation"] is not None) == turning
+    for name in asked:
         here = np.frombuffer(base64.b64decode(page[name]), dtype="<f8")
         assert np.array_equal(here.view("<u8"), np.asarray(native.partial[name]).ravel().view("<u8"))
     assert np.ptp(np.asarray(native.partial["position"]), axis=0).max() > 0.0 or build is slope
+
+
+def test_friction_over_normal_force_is_what_coulomb_says(answers):
+    """The tangent of the slope while the box stands, mu where it slides: closed forms, for the cone in any direction."""
+    stood, slid = 0, 0
+    for (build, p), page in zip(CASES, answers, strict=False):
+        if build is not slope or p["friction"] != "cone":
+            continue
+        ratio = np.array(page["ratio"][1:], dtype=float)
+        slope_of_it = math.tan(math.radians(p["angle"]))
+        slides = slope_of_it > p["mu"]
+        stood, slid = stood + (not slides), slid + slides
+        assert page["ratio"][0] is None, "no step has ended yet"
+        np.testing.assert_allclose(ratio[1:], min(slope_of_it, p["mu"]), rtol=1e-9)
+    assert stood and slid
 
 
 def test_the_order_a_reader_sees_is_that_of_the_method(answers):

@@ -342,6 +342,70 @@ def test_a_slider_of_the_live_page_runs_the_engine_again(driver, site):
     assert complaints(driver) == []
 
 
+LIVE = ("pendulum", "chain", "slope", "oscillator", "planetarium", "beam", "pile")
+FACT = "return document.querySelector('[data-fact=\"{}\"]').textContent"
+
+
+@pytest.mark.skipif(not (ROOT / "site" / "static" / "live.wasm").exists(), reason="not built: make wasm")
+@pytest.mark.parametrize("scene", LIVE)
+def test_a_live_scene_opens_runs_and_a_link_restores_what_a_slider_says(driver, site, scene):
+    """By the keyboard: one press on its last slider is one step of it, in the address and in the run."""
+    from selenium.webdriver.common.keys import Keys
+
+    visit(driver, site, f"live.html#scene={scene}")
+    wait_for(driver, "!!document.querySelector('.live').page")
+    assert driver.execute_script("return Object.keys(LIVE_SCENES)") == list(LIVE)
+    assert driver.execute_script(FACT.format("outcome")) == "completed"
+    first = driver.execute_script(FACT.format("final state"))
+    slider = driver.find_elements("css selector", ".live-form input[type=range]")[-1]
+    name = slider.get_attribute("id").removeprefix("live-")
+    low, high, step, value = (float(slider.get_attribute(key)) for key in ("min", "max", "step", "value"))
+    key = Keys.ARROW_RIGHT if value + step <= high else Keys.ARROW_LEFT
+    slider.send_keys(key)
+    state = "document.querySelector('[data-fact=\"final state\"]').textContent"
+    wait_for(driver, f"{state} !== {json.dumps(first)}")
+    second, address = driver.execute_script(f"return {state}"), driver.current_url
+    moved = value + (step if key == Keys.ARROW_RIGHT else -step)
+
+    query = dict(part.split("=") for part in address.partition("#")[2].split("&"))
+    assert query["scene"] == scene
+    assert float(query[f"p.{name}"]) == pytest.approx(moved)
+    driver.get("about:blank")
+    driver.get(address)
+    wait_for(driver, "!!document.querySelector('.live').page")
+    assert driver.execute_script("return document.getElementById('live-scene').value") == scene
+    assert float(
+        driver.execute_script(f"return document.getElementById('live-{name}').value")
+    ) == pytest.approx(moved)
+    assert driver.execute_script(f"return {state}") == second
+    player = "document.querySelector('.live figure').querySelector('canvas')"
+    assert driver.execute_script(
+        f"return {player}.width > 100 && document.querySelector('.live').page.player.movie.count > 10"
+    )
+    assert complaints(driver) == []
+
+
+@pytest.mark.skipif(not (ROOT / "site" / "static" / "live.wasm").exists(), reason="not built: make wasm")
+@pytest.mark.parametrize(("angle", "ratio"), [(20, 0.36397), (35, 0.5)], ids=["stands", "slides"])
+def test_the_box_on_a_slope_shows_friction_over_normal_force_while_it_runs(driver, site, angle, ratio):
+    """tan 20° while it stands, mu = .5 where it slides (tan 35° = .7): in the list, and as a curve with the clock."""
+    visit(driver, site, f"live.html#scene=slope&p.angle={angle}")
+    wait_for(driver, "!!document.querySelector('.live').page")
+    told = driver.execute_script(FACT.format("friction / normal force"))
+    curve = driver.execute_script("""
+      const p = document.querySelector('.live').page.player;
+      p.seek(60);
+      const box = [...document.querySelectorAll('.curve')].find((c) => c.textContent.includes('friction / normal'));
+      return [box.querySelectorAll('path.line').length, box.querySelector('.value').textContent];
+    """)
+
+    assert float(told.split()[0]) == pytest.approx(ratio, abs=1e-4)
+    assert "µ = 0.5" in told
+    lines, value = curve
+    assert lines == 2
+    assert [float(v) for v in value.split(" · ")] == pytest.approx([ratio, 0.5], abs=1e-4)
+
+
 def test_ten_thousand_bodies_are_drawn_in_one_picture(driver, site):
     """Instanced: three.js is asked for one draw call a shape. (How long it takes is a matter of `make bench`.)"""
     replay(driver, site)

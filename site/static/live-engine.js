@@ -202,8 +202,8 @@ const LIVE_SCENES = {
     },
   },
   slope: {
-    title: "Box on an inclined plane", about: "The plane is drawn level and gravity is tilted instead. Below the friction angle the box stays; beyond it slides.",
-    duration: 3, smooth: false,
+    title: "Box on an inclined plane", about: "The plane is drawn level and gravity is tilted instead. Below the friction angle the box stays, and friction over normal force is the tangent of the slope; beyond it slides, and the ratio is µ.",
+    duration: 3, smooth: false, ratio: true,
     parameters: { friction: choice("friction model", FRICTIONS, "cone"), rate: stepsPerSecond(), angle: number("slope", 0, 60, 0.5, 20, "°"), direction: number("direction", 0, 90, 5, 0, "°"), mu: number("friction µ", 0, 1.5, 0.05, 0.5) },
     build(engine, p, h) {
       const tilt = (p.angle * Math.PI) / 180, along = (p.direction * Math.PI) / 180, pull = -10 * engine.sine(tilt);
@@ -271,7 +271,19 @@ function simulateLive(engine, name, parameters, { steps = 0, finer = 1, every = 
   const scene = LIVE_SCENES[name], p = { ...defaults(name), ...parameters };
   const h = 1 / (p.rate * finer);
   scene.build(engine, p, h);
-  return engine.run(steps || Math.round(scene.duration * p.rate) * finer, every * finer, limit);
+  const movie = engine.run(steps || Math.round(scene.duration * p.rate) * finer, every * finer, limit);
+  return scene.ratio ? { ...movie, ratio: forceRatio(movie), bound: p.mu } : movie;
+}
+
+// Friction over normal force of all that touches the level ground, at each sample; no number where nothing presses.
+function forceRatio(movie) {
+  const ratio = new Float64Array(movie.count);
+  for (let i = 0; i < movie.count; i += 1) {
+    let x = 0, y = 0, z = 0;
+    for (let k = 3 * i * movie.bodies; k < 3 * (i + 1) * movie.bodies; k += 3) { x += movie.contact[k]; y += movie.contact[k + 1]; z += movie.contact[k + 2]; }
+    ratio[i] = z > 0 ? Math.sqrt(x * x + y * y) / z : NaN;
+  }
+  return ratio;
 }
 
 // Order of accuracy by halving the step twice: log2 |x(h) − x(h/2)| / |x(h/2) − x(h/4)|, over the first second.

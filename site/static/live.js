@@ -95,6 +95,7 @@ class LivePage {
       ["steps", `${movie.steps} of h = ${figureOf(movie.timeStep)} s`],
       ["run time", `${figureOf(perStep * 1e6, 3)} µs a step, ${figureOf(movie.seconds * 1e3, 3)} ms in all`],
       ["largest change of energy", `${figureOf(drift)} J`],
+      ...(movie.ratio ? [["friction / normal force", `${figureOf(movie.ratio[movie.count - 1])} in the end; µ = ${movie.bound}, tan of the slope ${figureOf(Math.tan((this.parameters().angle * Math.PI) / 180))}`]] : []),
       ...(largest === null ? [] : [["largest violation", `${figureOf(largest)} ${movie.violationUnit || "m"}`]]),
       ["order of accuracy", "…"],
       ["final state", movie.stateHash],

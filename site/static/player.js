@@ -88,7 +88,7 @@ class TimeCurve {
     const x = (share * WIDE).toFixed(1);
     this.cursor.setAttribute("d", `M${x} 0V${HIGH}`);
     const told = this.curves.map((curve) => figureOf(curve.values[Math.round(share * (curve.values.length - 1))]));
-    this.value.textContent = `${told.join(" · ")} ${this.unit}`;
+    this.value.textContent = `${told.join(" · ")} ${this.unit}`.trim();
   }
 }
 
@@ -181,6 +181,7 @@ class Player {
     if (movie.rows) { movie.largest = largestEach(movie.violation, movie.rows, movie.count); given.push(["largest violation", movie.violationUnit || "m", [{ values: movie.largest, colour: 1 }]]); }
     if (movie.energy) { given.push(["energy", "J", movie.ghost && movie.ghost.energy ? [{ values: movie.energy, colour: 0 }, { values: movie.ghost.energy, colour: 1 }] : [{ values: movie.energy, colour: 0 }]]); }
     if (movie.penetration) { given.push(["deepest penetration", "m", [{ values: movie.penetration, colour: 3 }]]); }
+    if (movie.ratio) { given.push(["friction / normal force, and µ", "", [{ values: movie.ratio, colour: 0 }, { values: movie.ratio.map(() => movie.bound), colour: 1 }]]); }
     this.worst.hidden = !movie.error && !movie.largest;
     this.worst.textContent = movie.error ? "Largest distance" : "Largest violation";
     this.curves = given.map(([title, unit, curves]) => new TimeCurve(title, unit, curves, (share) => { this.pause(); this.seek(share * (this.movie.count - 1)); this.remember(); }));
