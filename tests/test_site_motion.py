@@ -359,7 +359,7 @@ def test_a_live_scene_opens_runs_and_a_link_restores_what_a_slider_says(driver, 
     first = driver.execute_script(FACT.format("final state"))
     slider = driver.find_elements("css selector", ".live-form input[type=range]")[-1]
     name = slider.get_attribute("id").removeprefix("live-")
-    low, high, step, value = (float(slider.get_attribute(key)) for key in ("min", "max", "step", "value"))
+    _, high, step, value = (float(slider.get_attribute(key)) for key in ("min", "max", "step", "value"))
     key = Keys.ARROW_RIGHT if value + step <= high else Keys.ARROW_LEFT
     slider.send_keys(key)
     state = "document.querySelector('[data-fact=\"final state\"]').textContent"
