@@ -232,6 +232,8 @@ TEST = ScalarTest(
             configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),
             error=ladder_error,
             run=ladder_run,
+            target_error=1e-9,
+            target_seconds=0.1,
         ),
     ),
     figures=(Figure(name="storeys", title="Friction a house of cards needs", draw=draw),),

@@ -14,10 +14,12 @@ from spook_tracker.scalar_tests import (
     cornering,
     floating_box,
     gears,
+    grasp,
     loose_bearing,
     motor,
     robot_arm,
     rope,
+    scissor_lift,
     sinking_sphere,
     slider_crank,
     suspension,
@@ -283,3 +285,33 @@ def test_a_chassis_on_four_springs_rolls_fastest() -> None:
     squares = np.linalg.eigvals(np.diag((1.0 / s.MASS, 1.0 / s.PITCHING, 1.0 / s.ROLLING)) @ stiff).real
 
     np.testing.assert_allclose(np.sort(np.sqrt(squares)), (s.BOUNCE, s.PITCH, s.ROLL), rtol=1e-12)
+
+
+def test_a_load_so_many_arms_heavy_is_seen_through_the_floor_of_pivots() -> None:
+    """An arm gives way by 4/m at its ends and by 1/m in its middle, pushed across; a load by 1/M."""
+    s = scissor_lift
+    moment = s.ARM * s.BAR**2 / 12.0
+    yielding = [1.0 / s.ARM + x**2 / moment for x in (0.0, 0.5 * s.BAR)]
+    assert yielding == pytest.approx([1.0 / s.ARM, 4.0 / s.ARM])
+    ratio = s.RATIOS[-1]
+    off = s.FLOOR * yielding[1] * ratio * s.ARM  # of a pivot 1/M, by a floor of the diagonal's
+    assert s.loaded(ratio) == pytest.approx(off**2)
+    assert s.loaded(s.TEST.stability[0].expected[0]) == pytest.approx(1e-6)  # type: ignore[index]
+    assert s.loaded(s.TEST.stability[0].expected[1]) == pytest.approx(1.0)  # type: ignore[index]
+    # Lift rate and force are one leverage: height n √(l² − w²) by the width.
+    for angle in s.ANGLES:
+        w, d = s.BAR * math.cos(angle), 1e-6
+        rate = (math.sqrt(s.BAR**2 - (w - d) ** 2) - math.sqrt(s.BAR**2 - (w + d) ** 2)) / (2.0 * d)
+        assert s.holding_force(7, angle, 3.0, 0.0) == pytest.approx(4.0 * s.GRAVITY * 7.0 * rate, rel=1e-6)
+
+
+def test_what_is_pressed_a_little_too_weakly_has_slipped_a_millimetre_in_a_second() -> None:
+    g = grasp
+    (study,) = (s for s in g.TEST.stability if s.name == "least-force")
+    assert study.expected is not None
+    assert g.slips_after(study.expected[0]) < g.DURATION
+    assert g.slips_after(0.9999) > g.DURATION
+    weight, pressed = g.MASS * g.GRAVITY, 2.0 * g.FRICTION * g.LEAST
+    assert pressed == pytest.approx(weight)
+    fallen = 0.5 * g.acceleration(0.99) * g.slips_after(0.99) ** 2
+    assert fallen == pytest.approx(g.SLIPPED)
