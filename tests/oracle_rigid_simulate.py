@@ -9,9 +9,13 @@ import numpy as np
 from spook_tracker.engine import (
     PLAIN,
     AngularMomentum,
+    AngularVelocity,
+    ConstraintForce,
     Energy,
     JointCoordinate,
+    KineticEnergy,
     Method,
+    Orientation,
     Position,
     Result,
     Scene,
@@ -34,10 +38,17 @@ def reading(quantity: Quantity, oracle: RigidOracle) -> Array:
     if isinstance(quantity, JointCoordinate):
         assert quantity.joint is not None
         return np.array(joints[quantity.joint].coordinate(oracle.x, oracle.q, oracle)[0])
-    if isinstance(quantity, Energy):
+    if isinstance(quantity, Orientation) and quantity.body is not None:
+        return oracle.q[oracle.index[quantity.body]].copy()
+    if isinstance(quantity, AngularVelocity) and quantity.body is not None:
+        return np.asarray(oracle.angular_velocity()[oracle.index[quantity.body]])
+    if isinstance(quantity, ConstraintForce) and quantity.constraint is not None:
+        return oracle.loads[oracle.joints.index(joints[quantity.constraint])].copy()
+    if isinstance(quantity, Energy | KineticEnergy):
         moving = 0.5 * float(oracle.mass @ np.sum(oracle.v**2, axis=1))
         turning = 0.5 * float(np.sum(oracle.ell * oracle.angular_velocity()))
-        return np.array(moving + turning - float(oracle.mass @ (oracle.x @ np.array(oracle.scene.gravity))))
+        above = -float(oracle.mass @ (oracle.x @ np.array(oracle.scene.gravity)))
+        return np.array(moving + turning + (above if isinstance(quantity, Energy) else 0.0))
     if isinstance(quantity, AngularMomentum):
         arm = oracle.x - np.array(quantity.about)
         return np.asarray(oracle.mass @ np.cross(arm, oracle.v) + oracle.ell.sum(axis=0))

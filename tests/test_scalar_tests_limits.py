@@ -91,6 +91,7 @@ def test_the_chain_prototype_gives_what_is_published(
         "length_deviation_early": float(stretch[:241].max()),
         "weakest_link": float(stretch.max(axis=0).argmax()) + 1.0,
         "energy_at_10_s": float(energy[600]),
+        "energy_at_the_end": float(energy[-1]),
         "energy_gain": float(energy.max()),
     }
 

@@ -1,0 +1,188 @@
+"""Every limit and set point of ours is rounding, found again by a test without the engine, or called a choice."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import math
+import re
+
+import pytest
+
+from spook_tracker.scalar_tests.case import Metric
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+
+ROUNDING = (
+    1e-7  # a closed form, a kept quantity or statics to so much: what rounding and a solver's tolerance leave
+)
+CHOICES = {
+    ("pile", "overlap"),
+    ("pile", "missing_load"),
+}  # no theory: what would still be called a pile at rest
+OPEN = {  # evaluated beside the test from the formula its source states, and found again by nothing else yet
+    *(
+        ("vehicle", name)
+        for name in ("speed_error", "spin_error", "sideways", "transfer_error", "load_error")
+    ),
+    *(("rolling_coin", name) for name in ("rate_error", "lean_error", "centre_error", "energy_error")),
+    *(("rocking_block", name) for name in ("kept_error", "first_blow_late", "swing_error")),
+    *(("slider_crank", name) for name in ("place_error", "torque_error")),
+    ("suspension", "pitch_error"),
+}
+L, C, M, F, S, E = (
+    f"tests.test_scalar_tests_{name}"
+    for name in ("limits", "contact_limits", "machine_limits", "found_limits", "string_limits", "contacts")
+)
+PROTOTYPE = f"{L}.test_the_dense_prototype_gives_what_is_published"
+CHAIN = f"{L}.test_the_chain_prototype_gives_what_is_published"
+ORBIT = f"{L}.test_the_orbit_errs_as_its_map_iterated_by_itself"
+SMALL = f"{L}.test_string_stiffness_costs_what_its_map_of_small_motion_costs"
+BENT = f"{F}.test_the_cantilever_bends_as_large_deflection_has_it"
+BALL = f"{F}.test_a_discrete_ball_bounces_as_high_and_as_long_as_the_limits_allow"
+RIGID = f"{F}.test_the_rigid_prototype_gives_the_first_step_of_the_door_and_the_flip_of_the_box"
+SEARCH = f"{F}.test_a_search_is_as_exact_as_its_resolution"
+RODS = f"{F}.test_loaded_rods_swing_as_their_modes_do_step_by_step"
+EDGE = f"{E}.test_the_limit_at_the_edge_is_that_of_its_own_step"
+WINCH = f"{M}.test_a_winch_is_faster_by_what_the_turning_of_its_drum_leaves_out"
+DRUM = f"{M}.test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say"
+WAVE = f"{M}.test_a_discrete_oscillation_is_shorter_by_the_cube_of_its_step"
+ARCH = f"{C}.test_an_arch_is_as_thin_as_limit_analysis_allows"
+BRIDGE = f"{C}.test_a_bridge_carries_what_limit_analysis_allows"
+BEND = f"{M}.test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by"
+BOWL = f"{M}.test_many_facets_make_a_round_bowl_and_few_of_them_slow_a_ball_down_at_corners"
+TURNING = f"{M}.test_a_turning_rope_is_longer_by_what_its_damped_rows_let_through"
+
+FOUND = {  # test: metric: what finds it again without the engine
+    "beam": {"sag_error": f"{F}.test_a_beam_of_compliant_locks_sags_by_its_stiffness_matrix"},
+    "door": {"weight_error": RIGID, "sideways_sum": RIGID},
+    "falling_object": {"position_error_read_late": f"{F}.test_the_fall_read_a_sample_late_is_a_sum"},
+    "pendulum": dict.fromkeys(
+        ("length_deviation", "energy_deviation", "energy_at_the_end", "tension_at_the_bottom", "period_error"), PROTOTYPE
+    ),
+    "n_pendulum": dict.fromkeys(
+        ("length_deviation", "length_deviation_early", "energy_at_10_s", "energy_at_the_end", "energy_gain"), CHAIN
+    ),
+    "planetarium": {
+        "energy_oscillation": ORBIT,
+        "radius_error": ORBIT,
+        "position_error": ORBIT,
+        "energy_oscillation_as_printed": f"{F}.test_the_printed_energy_swings_by_symplectic_euler_and_less_on_the_exact_orbit",
+    },
+    "cantilever": {
+        "tip_against_linear": BENT,
+        "tip_against_elastica": f"{L}.test_a_cantilever_of_pieces_differs_from_the_elastica_by_its_own_statics",
+        "self_weight_ratio": BENT,
+    },
+    "slip_angle": dict.fromkeys(
+        ("slip_slope_error", "bracket_held"), f"{F}.test_the_slope_at_which_a_box_slips_is_as_well_known_as_it_is_searched"
+    ),
+    "oscillator_damped": {"against_continuum": f"{L}.test_damping_leaves_the_continuum_as_far_as_the_map_does"},
+    "bouncing_ball": dict.fromkeys(("height_error", "stop_time_error", "rest_gap", "energy_gain"), BALL),
+    "edge_roll": dict.fromkeys(("sliding_error", "rolling_spin_error"), EDGE),
+    "card_house": {
+        "least_error": SEARCH
+    },
+    "rotating_box": {"flip_time_error": RIGID},
+    "swinging_door": dict.fromkeys(("period_error", "energy_deviation", "hinge_violation"), PROTOTYPE),
+    "pile": {"energy_rise": f"{F}.test_parting_lifts_a_pile_by_less_than_it_has_fallen"},
+    "hanging_chain": {
+        "path_error": SMALL,
+        "energy_lost": SMALL,
+        "energy_gain": SMALL,
+        "energy_cost": f"{L}.test_string_stiffness_costs_next_to_nothing_where_it_is_not_needed",
+    },
+    "loaded_rods": dict.fromkeys(("period_error", "width_change"), RODS),
+    "spinning_top": dict.fromkeys(("path_error", "rate_error", "nutation", "energy_deviation", "joint_violation"), PROTOTYPE),
+    "motor": {"angle_lead": f"{M}.test_the_motor_leads_by_the_sum_of_the_turns_of_its_steps"},
+    "double_pendulum": {"angle_error": f"{L}.test_the_double_pendulum_may_be_half_a_step_off"},
+    "floating_box": {"period_error": WAVE},
+    "sinking_sphere": {"swing_error": WAVE},
+    "wires": {"drum_error": DRUM},
+    "capstan": dict.fromkeys(("speed_error", "sinking_error", "sinking_pull"), WINCH),
+    "gears": dict.fromkeys(("ratio_error", "planet_error"), DRUM),
+    "robot_arm": {"driving_error": f"{M}.test_the_torques_of_a_driven_arm_are_two_steps_late_at_most"},
+    "turntable": {"rate_error": f"{C}.test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn"},
+    "sorting": dict.fromkeys(("steps_late",), SEARCH),
+    "masonry_arch": dict.fromkeys(("stands", "falls", "weight_error", "thrust"), ARCH),
+    "stone_bridge": dict.fromkeys(("stands", "falls", "weight_error", "thrust", "stays"), BRIDGE),
+    "suspension": {
+        "continuous_error": f"{F}.test_a_bounce_in_steps_is_faster_than_the_continuum_by_its_limit",
+    },
+    "cornering": dict.fromkeys(("yaw_error", "front_error", "slowed"), BEND),
+    "bowl": dict.fromkeys(("period_error", "smooth_error", "place_error", "slip"), BOWL),
+    "hanging_cable": {
+        "catenary_error": f"{S}.test_links_pull_less_than_a_smooth_cable_by_the_midpoint_rule",
+        "mode_error": f"{S}.test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links",
+        "speed_error": f"{S}.test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links",
+    },
+    "rope": {
+        "pull_error": TURNING,
+        "energy_error": TURNING,
+        "cost_error": f"{F}.test_the_ends_of_a_rope_cost_a_link_in_125",
+    },
+}  # fmt: skip
+
+
+def widths(metric: Metric) -> list[float]:
+    """What of a metric is ours to derive: how far its limit and its set point let a value go (rad for degrees)."""
+    found, unit = [], math.pi / 180.0 if metric.unit == "degrees" else 1.0
+    if metric.limit is not None and not metric.every_engine:
+        ends = metric.limit if isinstance(metric.limit, tuple) else None
+        one_sided = ends is None and metric.better in ("larger", "smaller") and metric.reference != 0.0
+        found.append(
+            0.5 * (ends[1] - ends[0]) if ends else abs(metric.limit) - one_sided * round(abs(metric.limit))
+        )  # type: ignore[arg-type, operator]
+    if metric.set_point is not None:
+        found.append(0.5 * (metric.set_point[1] - metric.set_point[0]))
+    return [unit * width for width in found]
+
+
+OURS = sorted(
+    {
+        (name, metric.name)
+        for name, test in CATALOGUE.items()
+        for asked in test.measurements
+        for metric in asked.metrics
+        if max(widths(metric), default=0.0) > ROUNDING
+    }
+)
+
+
+@pytest.mark.parametrize(("test", "name"), OURS)
+def test_every_limit_of_ours_is_found_again_or_called_a_choice(test: str, name: str) -> None:
+    if (test, name) in OPEN:
+        return
+    if (test, name) in CHOICES:
+        metrics = [m for asked in CATALOGUE[test].measurements for m in asked.metrics if m.name == name]
+        assert all(m.limit_source.startswith("a choice: ") for m in metrics)
+        return
+    assert name in FOUND.get(test, {}), f"nothing finds the limit of {test} {name} again without the engine"
+    module, _, function = FOUND[test][name].rpartition(".")
+    told = inspect.getsource(getattr(importlib.import_module(module), function))
+
+    assert re.search(rf"\b{test}\b", told), f"{function} does not ask about {test}"
+    assert "measurement" in told or "metric" in told or "limit" in told, f"{function} looks at no limit"
+
+
+def test_no_limit_is_listed_that_is_not_there() -> None:
+    asked = {
+        (name, metric.name)
+        for name, test in CATALOGUE.items()
+        for one in test.measurements
+        for metric in one.metrics
+    }
+
+    assert {(test, name) for test, names in FOUND.items() for name in names} <= asked
+
+
+def test_what_is_called_rounding_says_where_it_is_from() -> None:
+    for test in CATALOGUE.values():
+        for asked in test.measurements:
+            for metric in asked.metrics:
+                if metric.limit is not None and not metric.every_engine:
+                    assert metric.limit_source, metric.name
+
+
+def test_what_no_test_finds_yet_is_not_in_both_lists() -> None:
+    assert set(OURS) >= OPEN
+    assert {(test, name) for test, names in FOUND.items() for name in names}.isdisjoint(OPEN)
