@@ -68,6 +68,11 @@ def test_a_drum_and_a_train_of_gears_turn_more_than_their_rows_say() -> None:
     assert limits["drum_error"] == pytest.approx((wires.TIME_STEP * spin) ** 2 / 6.0 * share, rel=0.01)
     limits = {m.name: m.limit for m in measurement("gears", "plain").metrics}
     assert limits["ratio_error"] == pytest.approx(gears.standing(), rel=0.01)
+    # Newton and the steady turn of the set: each step turns by asin(h ω), one to five.
+    slow = gears.steady(gears.TIME_STEP)
+    assert gears.RATIO * math.asin(gears.TIME_STEP * slow) == pytest.approx(
+        math.asin(gears.TIME_STEP * gears.SPEED)
+    )
 
 
 def test_a_winch_is_faster_by_what_the_turning_of_its_drum_leaves_out() -> None:
@@ -315,3 +320,35 @@ def test_what_is_pressed_a_little_too_weakly_has_slipped_a_millimetre_in_a_secon
     assert pressed == pytest.approx(weight)
     fallen = 0.5 * g.acceleration(0.99) * g.slips_after(0.99) ** 2
     assert fallen == pytest.approx(g.SLIPPED)
+
+
+def test_a_small_roll_rights_itself_with_its_metacentre_and_a_little_more() -> None:
+    """The pendulum of GZ by quadrature of its period, no heave; and the heave that a roll drives is not near resonance."""
+    f = floating_box
+    u, weights = np.polynomial.legendre.leggauss(40)
+    for ratio in f.ROLLED:
+        amplitude = 0.01
+        # ½ φ'² = ∫ GZ g m/I: with φ = A sin s the quarter of the period is ∫ A cos s/φ' ds
+        s = 0.25 * math.pi * (u + 1.0)
+        gain = f.GRAVITY * 6.0 / f.SIDE**2
+        fine = np.polynomial.legendre.leggauss(12)
+
+        def work(low: float, high: float, ratio: float = ratio, fine: tuple = fine) -> float:
+            angles = 0.5 * (high - low) * (fine[0] + 1.0) + low
+            return (
+                0.5
+                * (high - low)
+                * sum(w * f.righting_arm(ratio, a) for a, w in zip(angles, fine[1], strict=True))
+            )
+
+        speeds = np.array([math.sqrt(2.0 * gain * work(amplitude * math.sin(x), amplitude)) for x in s])
+        quarter = float(np.sum(0.25 * math.pi * weights * amplitude * np.cos(s) / speeds))
+        faster = 0.5 * math.pi / quarter / f.roll_rate(ratio) - 1.0
+
+        assert abs(faster) < f.swing_limit(ratio) / f.NUDGE**2 * amplitude**2
+        assert not 0.75 < 2.0 * f.roll_rate(ratio) / f.heave_rate(ratio) < 1.33
+    for place in (f.LIGHT, f.HEAVY):
+        assert f.metacentric_height(place) == pytest.approx(0.0, abs=1e-15)
+        beyond = place + (f.blurred(place) - 1e-3 * place) * (1.0 if place < 0.5 else -1.0)
+        grows = math.sqrt(-f.GRAVITY * f.metacentric_height(beyond) * 6.0 / f.SIDE**2)
+        assert math.cosh(20.0 * grows) == pytest.approx(10.0, rel=0.01)
