@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from sqlalchemy import text
 
+from spook_tracker.engine import joints, theory
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.record import record
@@ -83,6 +85,34 @@ def test_the_python_beside_the_queries_runs(tmp_path: Path, monkeypatch: pytest.
 
     for block in blocks("how-to/sql.md", "python"):
         exec(block, {})
+
+
+def test_the_method_by_hand_is_what_the_engine_does() -> None:
+    """The page asserts it; a wrong sign in its step does not pass."""
+    (block,) = blocks("explanation/method.md", "python")
+
+    exec(block, {})
+
+    with pytest.raises(AssertionError):
+        exec(block.replace("-a * g + (1 - b)", "-a * g - (1 - b)"), {})
+
+
+def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
+    """Each stands on the page, and is found again from the closed forms or in the engine's defaults."""
+    page = (DOCS / "explanation" / "method.md").read_text(encoding="utf-8")
+
+    def left(steps_a_period: float) -> float:
+        """Of a vibration, ten steps of θ = 2 later: the larger eigenvalue of the undamped frequency's row."""
+        squared = (2.0 * np.pi / steps_a_period) ** 2
+        matrix = theory.one_row_matrix(1.0, 1.0 / squared, 2.0, 1.0)
+        return float(np.abs(np.linalg.eigvals(matrix)).max() ** 10)
+
+    assert f"{left(100):.3f}".lstrip("0") in page
+    assert f"{left(2):.1e}".replace("e-05", "e-5") in page
+    assert f"c = {joints.COMPLIANCE:.0e} m/N".replace("e-08", "e-8") in page
+    for number in ("2.1 mm", "0.4 %"):  # tests/test_engine_compliance.py measures both
+        assert number in (joints.__doc__ or "")
+        assert number in page
 
 
 def test_every_cell_of_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,6 @@
-"""The SQL for TimescaleDB and Citus, run on a real PostgreSQL whose extensions are stood in for by what they demand.
+"""The SQL that lays tables out by month runs on a real PostgreSQL with runs in it; everything answers as before.
+
+That for TimescaleDB and Citus is run on a real PostgreSQL whose extensions are stood in for by what they demand.
 
 TimescaleDB wants the time in every unique key of a hypertable; Citus the distribution column in every one, and that
 references from distributed tables go to reference tables. The stand-ins look all of this up in the server's catalogue.
@@ -6,12 +8,20 @@ references from distributed tables go to reference tables. The stand-ins look al
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from sqlalchemy import text
+from sqlalchemy.orm import Session
 
+from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.partition import is_large, statements
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.revisions import differences
+from tests.run_documents import definition, run, sample
 
 IN_EVERY_KEY = """
 CREATE FUNCTION in_every_key(laid regclass, wanted text) RETURNS void LANGUAGE plpgsql AS $$
@@ -70,4 +80,54 @@ def test_the_stand_in_would_see_a_key_without_the_time(postgresql_url: str) -> N
         connection.execute(text(IN_EVERY_KEY.replace(":", "\\:")))
         with pytest.raises(Exception, match="not in every unique key"):
             connection.execute(text("SELECT in_every_key('run', 'started_at')"))
+    engine.dispose()
+
+
+def night(month: int, value: float):
+    return run(
+        series=(definition("t/c/m"),),
+        samples=(sample("t/c/m", value),),
+        started=f"2026-{month:02}-03T03:00:00+00:00",
+    )
+
+
+def test_months_of_postgresql_hold_what_was_there_and_what_comes(postgresql_url: str) -> None:
+    engine = open_database(postgresql_url)
+    before = [night(9, 0.1), night(10, float("nan")), night(11, -0.0)]
+    with Session(engine) as session:
+        for document in before:
+            record(session, document)
+        told = [encode(History(session).document(document.id)) for document in before]
+
+    with engine.connect() as connection:
+        driver = connection.connection.driver_connection
+        driver.autocommit = True
+        driver.execute("\n".join(statements("postgresql")))  # as psql does
+        driver.autocommit = False
+    engine.dispose()
+
+    engine = open_database(postgresql_url)  # nothing to upgrade, nothing to refuse
+    later = [night(12, 0.4), run(samples=(), series=(), started="2199-01-01T00:00:00+00:00")]
+    with Session(engine) as session:
+        for document in later:
+            assert record(session, document)
+        assert [encode(History(session).document(document.id)) for document in before] == told
+        assert len(History(session).runs()) == 5
+        (kept,) = session.execute(text("SELECT count(*) FROM months.sample_2026_10")).one()
+        assert kept == 1
+        assert len(session.execute(text("SELECT * FROM gate_values")).all()) == 4
+    with engine.connect() as connection:
+        assert differences(connection) == []
+        connection.rollback()
+
+        def read(condition: str) -> set[str]:
+            plan = connection.execute(text(f"EXPLAIN SELECT * FROM sample WHERE {condition}")).scalars()
+            return set(re.findall(r"sample_(\d{4}_\d\d|other)", "\n".join(plan)))
+
+        assert read("started_at = '2026-10-03 03:00:00+00'") == {"2026_10"}
+        since = "started_at >= '2026-11-01 00:00:00+00' AND started_at < '2026-12-15 00:00:00+00'"
+        assert read(since) == {"2026_11", "2026_12"}
+        assert {"2026_09", "2026_10", "other"} < read("series_id = 7")
+    with engine.begin() as connection:  # a year later
+        connection.execute(text("SELECT months.make(now(), INTERVAL '3 years')"))
     engine.dispose()

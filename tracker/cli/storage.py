@@ -160,13 +160,13 @@ def copy(source: str, target: str) -> None:
     )
 
 
-@db.command(epilog=example("tracker db partition timescaledb | psql postgresql://host/tracker"))
-@click.argument("extension", type=click.Choice(["timescaledb", "citus"]))
-def partition(extension: Any) -> None:
-    """Print the SQL that splits the large tables of a PostgreSQL database by time, or over several servers."""
+@db.command(epilog=example("tracker db partition postgresql | psql postgresql://host/tracker"))
+@click.argument("kind", type=click.Choice(["postgresql", "timescaledb", "citus"]))
+def partition(kind: Any) -> None:
+    """Print the SQL that splits the large tables of a PostgreSQL database by month, or over several servers."""
     from spook_tracker.tracker.store.partition import statements
 
-    click.echo("\n".join(statements(extension)))
+    click.echo("\n".join(statements(kind)))
 
 
 @db.command(epilog=example("tracker db stats"))

@@ -1,4 +1,5 @@
-"""SQL that lays the large tables out by time (TimescaleDB) or over several servers (Citus), from the models.
+"""SQL that lays the large tables out by time (PostgreSQL itself, TimescaleDB) or over several servers (Citus), from the
+models.
 
 It is printed, not run: whoever looks after a server of that size wants to read it first. The keys need no change,
 because the time leads the key of every large table and nobody refers to them.
@@ -9,17 +10,78 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from sqlalchemy import Table
+from sqlalchemy import MetaData, Table, make_url
+from sqlalchemy.schema import (
+    CreateIndex,
+    CreateTable,
+    ExecutableDDLElement,
+    SetColumnComment,
+    SetTableComment,
+)
 
-from spook_tracker.tracker.store.models import Base
+from spook_tracker.tracker.store import views
+from spook_tracker.tracker.store.models import NAMING, Base
 
-Extension = Literal["timescaledb", "citus"]
+Kind = Literal["postgresql", "timescaledb", "citus"]
 CHUNK = "1 month"  # of time in one piece of a table: thirty nights, some hundred thousand samples of ours
 TIME = "started_at"
+MAKE = """
+CREATE OR REPLACE FUNCTION months.make(since timestamptz, ahead interval) RETURNS void LANGUAGE plpgsql AS $$
+DECLARE
+    large text;
+    month timestamp;  -- begin, in UTC
+BEGIN
+    FOREACH large IN ARRAY ARRAY[{large}] LOOP
+        FOR month IN SELECT generate_series(
+            date_trunc('month', since AT TIME ZONE 'UTC'), (now() AT TIME ZONE 'UTC') + ahead, INTERVAL '1 month')
+        LOOP
+            EXECUTE format('CREATE TABLE IF NOT EXISTS months.%I PARTITION OF %I FOR VALUES FROM (%L) TO (%L)',
+                large || to_char(month, '_YYYY_MM'), large, month AT TIME ZONE 'UTC',
+                (month + INTERVAL '1 month') AT TIME ZONE 'UTC');
+        END LOOP;
+        EXECUTE format('CREATE TABLE IF NOT EXISTS months.%I PARTITION OF %I DEFAULT', large || '_other', large);
+    END LOOP;
+END $$;"""
+AHEAD = "2 years"  # months that are made in advance; what comes later is kept in a part for all the rest
 
 
-def statements(extension: Extension) -> Iterator[str]:
+def statements(kind: Kind) -> Iterator[str]:
     """The statements in their order, each with its semicolon."""
+    if kind == "postgresql":
+        yield from _by_month()
+    else:
+        yield from _of_extension(kind)
+
+
+def _by_month() -> Iterator[str]:
+    """PostgreSQL's own partitions, a month each, in a schema `months`; what is there moves along, in one transaction."""
+    here = MetaData(naming_convention=NAMING)
+    tables = [table.to_metadata(here) for table in Base.metadata.sorted_tables]
+    large = [table for table in tables if is_large(table)]
+    dialect = make_url("postgresql+psycopg://").get_dialect()()
+    yield "BEGIN;"
+    yield "SELECT pg_advisory_xact_lock(5755);"  # as whoever records a run
+    yield from (f"DROP VIEW IF EXISTS {name};" for name in reversed([*views.VIEWS, "column_comments"]))
+    yield "CREATE SCHEMA months;"
+    yield "CREATE SCHEMA before;"
+    for table in large:
+        yield f"ALTER TABLE {table.name} SET SCHEMA before;"  # with its indexes, so that their names are free
+        table.dialect_options["postgresql"]["partition_by"] = f"RANGE ({TIME})"
+        made: list[ExecutableDDLElement] = [CreateTable(table), *map(CreateIndex, table.indexes)]
+        made += [SetTableComment(table), *(SetColumnComment(c) for c in table.columns if c.comment)]
+        yield from (f"{str(part.compile(dialect=dialect)).strip()};" for part in made)
+    yield MAKE.strip().format(large=", ".join(f"'{table.name}'" for table in large))
+    yield f"SELECT months.make(coalesce((SELECT min({TIME}) FROM run), now()), INTERVAL '{AHEAD}');"
+    for table in large:
+        names = ", ".join(column.name for column in table.columns)
+        yield f"INSERT INTO {table.name} ({names}) SELECT {names} FROM before.{table.name};"
+        yield f"DROP TABLE before.{table.name};"
+    yield "DROP SCHEMA before;"
+    yield from (f"{view.replace(chr(92) + chr(58), chr(58))};" for view in views.statements("postgresql"))
+    yield "COMMIT;"
+
+
+def _of_extension(extension: Kind) -> Iterator[str]:
     yield f"CREATE EXTENSION IF NOT EXISTS {extension};"
     large = [table for table in Base.metadata.sorted_tables if is_large(table)]
     if extension == "timescaledb":
