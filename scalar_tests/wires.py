@@ -47,7 +47,7 @@ HEAVY, LIGHT = 3.0, 2.0  # kg
 DRUM, RADIUS = 0.08, 0.2  # kg m², m
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 2.0  # s
-STRANDS = 4
+STRANDS = (2, 3, 4, 5, 6, 7, 8)
 STONE, PULLER, FAST, SLACK = 5.0, 2.0, 3.0, 0.4  # kg, kg, m/s, m: one tows the other on a slack rope
 IDEAL = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT)  # m/s²
 TURNING = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT + DRUM / RADIUS**2)
@@ -97,12 +97,14 @@ def drum() -> Scene:
     return Scene(bodies=tuple(bodies), constraints=(*rails, axle, *wound), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def tackle(load: float) -> Scene:
-    """A block of `load` [kg] on four strands, one weight of 1 kg at the end of the wire."""
-    eyes = [(WORLD, (0.0, 0.0, 3.0 + k)) for k in range(STRANDS // 2)]
+def tackle(load: float, strands: int = 4) -> Scene:
+    """A block of `load` [kg] on so many strands, one weight of 1 kg at the end of the wire: with an even number its other
+    end is in the world, with an odd one at the block."""
     through: list[tuple[str, tuple[float, float, float]]] = []
-    for eye in eyes:
-        through += [eye, ("block", (0.0, 0.0, 0.0))]
+    if strands % 2 == 1:
+        through += [("block", (0.0, 0.0, 0.0))]
+    for k in range(strands // 2):
+        through += [(WORLD, (0.0, 0.0, 3.0 + k)), ("block", (0.0, 0.0, 0.0))]
     through += [(WORLD, (0.0, 0.0, 9.0)), (WORLD, (4.0, 0.0, 9.0)), ("weight", (4.0, 0.0, 0.0))]
     return Scene(
         bodies=(
@@ -141,21 +143,26 @@ def fall(simulate: Simulate) -> dict[str, float]:
     wire = simulate(atwood(), time_step=TIME_STEP, duration=1.0, observe=speed | pull)
     wound = simulate(drum(), time_step=TIME_STEP, duration=DURATION, observe=speed)
     still: dict[str, Observable] = {"v": MaximumAbsolute(quantity=Velocity())}
-    held = simulate(tackle(float(STRANDS)), time_step=TIME_STEP, duration=1.0, observe=still | pull)
-    lifted = simulate(
-        tackle(2.0 * STRANDS),
-        time_step=TIME_STEP,
-        duration=0.5,
-        observe={"v": Final(quantity=Velocity("block"))},
-    )
-    sinks = (2.0 * STRANDS - STRANDS) * GRAVITY / (2.0 * STRANDS + STRANDS**2)
-    return {
+    worst = {"tackle_motion": 0.0, "tackle_pull": 0.0, "tackle_error": 0.0}
+    for n in STRANDS:
+        held = simulate(tackle(float(n), n), time_step=TIME_STEP, duration=1.0, observe=still | pull)
+        lifted = simulate(
+            tackle(2.0 * n, n),
+            time_step=TIME_STEP,
+            duration=0.5,
+            observe={"v": Final(quantity=Velocity("block"))},
+        )
+        sinks = (2.0 * n - n) * GRAVITY / (2.0 * n + n**2)
+        for name, value in (
+            ("tackle_motion", float(held["v"].max())),
+            ("tackle_pull", abs(float(held["pull"]) / GRAVITY - 1.0)),
+            ("tackle_error", abs(-float(lifted["v"][2]) / (0.5 * sinks) - 1.0)),
+        ):
+            worst[name] = max(worst[name], value)
+    return worst | {
         "wire_error": -float(wire["v"][2]) / IDEAL - 1.0,
         "pull_error": float(wire["pull"]) * (HEAVY + LIGHT) / (2.0 * HEAVY * LIGHT * GRAVITY) - 1.0,
         "drum_error": -float(wound["v"][2]) / (TURNING * DURATION) - 1.0,
-        "tackle_motion": float(held["v"].max()),
-        "tackle_pull": float(held["pull"]) / GRAVITY - 1.0,
-        "tackle_error": -float(lifted["v"][2]) / (0.5 * sinks) - 1.0,
     }
 
 
@@ -228,12 +235,12 @@ TEST = ScalarTest(
     question="Do wires over pulleys share their loads, and does a rope that snaps taut give the right blow?",
     why="Cranes, lifts and winches hang on wires that only pull. A wire that pushes, loses load at a pulley or throws "
     "energy in when it snaps taut drives machines that do not exist.",
-    model="Atwood's machine over eyes without friction, and over a drum on which the wire does not slip; a tackle of four "
-    "strands; a puller that runs off with a slack rope to a stone at rest, plastic and with restitution ½.",
+    model="Atwood's machine over eyes without friction, and over a drum on which the wire does not slip; tackles of two "
+    "to eight strands; a puller that runs off with a slack rope to a stone at rest, plastic and with restitution ½.",
     parameters=(
         ("time step", "1/60 s"),
         ("Atwood", "3 kg and 2 kg; drum of 0.08 kg m² and 0.2 m"),
-        ("tackle", "four strands, 1 kg against 4 kg and 8 kg"),
+        ("tackle", "n = 2 … 8 strands, 1 kg against n and 2 n kg"),
         ("tow", "5 kg and 2 kg, 3 m/s, 0.4 m of slack"),
         ("gravity", "9.81 m/s²; none for the tow"),
     ),
@@ -241,7 +248,8 @@ TEST = ScalarTest(
         "Atwood: a = (m₁ − m₂) g/(m₁ + m₂ + I/r²); pull 2 m₁ m₂ g/(m₁ + m₂) with I = 0.",
         "Tackle of n strands: M = n m balances; else a = (M − n m) g/(M + n² m) of the block.",
         "Snap: the parting speed u becomes −e u, momentum stays, ½ µ u² (1 − e²) is lost, µ = m M/(m + M).",
-        "The rope is one row with λ ≤ 0: an open gap may close and no more, then the blow acts.",
+        "The rope is one row with λ ≤ 0: an open gap may close and no more, then the blow acts. Nothing here can run away: "
+        "wires are rigid along their length and hang straight, so they have no swing.",
     ),
     reference="Mechanics in closed form.",
     conclusion="Green: wires pull alike on both sides of every eye and ropes let go. Red: a wire pushes, or a blow "
@@ -259,16 +267,16 @@ TEST = ScalarTest(
                 ),
                 error(
                     "tackle_motion",
-                    "largest speed of a balanced tackle in 1 s",
+                    "largest speed of a balanced tackle in 1 s, n = 2 … 8",
                     "m/s",
                     1e-12,
                     STEADY,
                     "companion",
                 ),
-                error("tackle_pull", "relative error of its pull", "1", 1e-11, STEADY, "companion"),
+                error("tackle_pull", "largest relative error of its pull", "1", 1e-11, STEADY, "companion"),
                 error(
                     "tackle_error",
-                    "relative error of the block's speed, out of balance",
+                    "largest relative error of the block's speed, out of balance, n = 2 … 8",
                     "1",
                     1e-11,
                     STEADY,
