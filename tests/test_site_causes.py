@@ -1,6 +1,7 @@
 """A red night on the website: one cause with its commit, what it hit and how badly, and the way to the moment."""
 
 import hashlib
+import json
 import re
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
@@ -179,6 +180,27 @@ def test_one_click_leads_from_the_first_page_to_the_moment_it_goes_wrong(driver,
     assert sample == recorded[0].count // 2
     assert 0 <= top < 900
     assert "against=friction-" in against and "t=" in against
+
+
+def test_subject_and_author_stand_wherever_a_version_is_chosen_or_listed(site):
+    assert f"{SUBJECT} by {AUTHOR}" in Words(site / "versions.html").text
+    (choices,) = re.findall(r'id="comparisons">(.*?)</script>', (site / "compare.html").read_text())
+    labels = [label for _, label, _ in json.loads(choices)["nights"]]
+    assert [SUBJECT in label and AUTHOR in label for label in labels] == [
+        n == BROKEN for n in range(TONIGHT + 1)
+    ]
+    for name, night, subject, author in (
+        ("nights", "run", "subject", "author"),
+        ("regressions", "first_bad", "first_bad_subject", "first_bad_author"),
+    ):
+        lines = json.loads((site / "data" / f"{name}.json").read_text())
+        told = {
+            (line[subject], line[author])
+            for line in lines
+            if line[night] in (f"run-spook-{BROKEN:04d}", document(BROKEN).engine.git_hash)
+        }
+        assert told == {(SUBJECT, AUTHOR)}
+        assert f"{subject},{author}" in (site / "data" / f"{name}.csv").read_text().splitlines()[0]
 
 
 def test_the_list_is_searched_and_filtered_and_the_address_keeps_it(driver, site):

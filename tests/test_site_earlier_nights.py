@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from datetime import timedelta
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +13,7 @@ import msgspec
 from spook_tracker.tracker.website.diagrams import ladder_charts, view
 from spook_tracker.tracker.website.earlier_nights import earlier_nights
 from spook_tracker.tracker.website.nights import book
+from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import START, DocumentHistory, history
 
 
@@ -72,3 +75,14 @@ def test_the_table_of_a_chart_has_tonights_points_before_any_earlier_ones() -> N
         shown = view(chart)
         assert not shown.left_out, "no point of tonight was thinned out"
         assert not any("week" in row[0] or "month" in row[0] for row in shown.rows)
+
+
+def test_the_overview_offers_the_nights_that_are_there_and_speaks_of_no_other(tmp_path: Path) -> None:
+    publish(history(1), tmp_path / "one")
+    publish(history(24), tmp_path / "many")
+    one, many = ((tmp_path / name / "error-time.html").read_text() for name in ("one", "many"))
+
+    assert "short dashes" not in one and 'id="night"' not in one
+    assert "Short dashes of the same colour are an earlier night" in many
+    assert re.findall(r'<option value="([^"]*)">', many)[:2] == ["before", "week"]
+    assert "short dashes" not in (tmp_path / "one" / "tests" / "pendulum.html").read_text()

@@ -15,7 +15,7 @@ from spook_tracker.tracker.document.json_form import boxed
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, Known, compare
 from spook_tracker.tracker.judge.comparison_document import Side
-from spook_tracker.tracker.website.comparisons import value_in_words
+from spook_tracker.tracker.website.comparisons import value_in_words, worst_first
 from spook_tracker.tracker.website.judged_nights import Texts, accepted_fields, definition_fields
 from tests.synthetic_history import sample, series
 
@@ -24,7 +24,10 @@ PAIRS = 10_000
 ACCEPTED = (
     Accepted(series="t/plain/accepted*", low=-2.0, high=2.0, who="Ada", why="a better reference"),
     Accepted(series="t/plain/*", low=40.0, high=60.0, who="Bo", why="known", until=date(2026, 10, 3)),
-    Accepted(series="t/*/gone", low=math.inf, high=math.inf, who="Cy", why="removed", removed=True),
+    Accepted(
+        series="t/plain/known*", low=math.inf, high=math.inf, who="Di", why="not mended yet", expected=True
+    ),
+    Accepted(series="t/*/gone*", low=math.inf, high=math.inf, who="Cy", why="removed", removed=True),
 )
 KINDS = ("scalar", "scalar", "ladder", "order", "time", "break_point", "work")
 
@@ -61,7 +64,7 @@ def some_definition(rng, number):
     limit = rng.choice(
         [None, 10 ** rng.uniform(-9, 4), tuple(sorted((rng.uniform(-2, 2), rng.uniform(-2, 2))))]
     )
-    metric = rng.choice(["m", "accepted", "gone", "ladder:x:time-to-error"]) + f"{number}"
+    metric = rng.choice(["m", "accepted", "gone", "known", "ladder:x:time-to-error"]) + f"{number}"
     if metric.startswith("ladder"):
         metric = f"ladder{number}:time-to-error"
     return series(
@@ -167,7 +170,7 @@ def test_the_page_says_of_ten_thousand_pairs_what_the_judge_says():
         input=json.dumps(whole, allow_nan=False), capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert node.returncode == 0, node.stderr
-    told = json.loads(node.stdout)
+    told, order = (json.loads(node.stdout)[name] for name in ("told", "sorted"))
 
     words = Counter()
     for (given, expected), found in zip(asked, told, strict=True):
@@ -188,7 +191,19 @@ def test_the_page_says_of_ten_thousand_pairs_what_the_judge_says():
         assert (found["decades"] is None) == (decades is None)
         assert decades is None or found["decades"] == pytest.approx(decades, rel=1e-9, abs=1e-12)
 
-    every = {"missing", "removed", "regressed", "non_deterministic", "accepted", "not_comparable", "fixed"}
+    changes = [change for _, change in asked if change is not None]
+    assert order == [change.series for change in worst_first(changes)]
+
+    every = {
+        "missing",
+        "removed",
+        "regressed",
+        "non_deterministic",
+        "accepted",
+        "expected",
+        "not_comparable",
+        "fixed",
+    }
     assert every | {"improved", "changed", "new", "not_measured", "same", "identical"} == set(words)
     assert min(words.values()) >= 10, words
 

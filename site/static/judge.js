@@ -15,11 +15,13 @@ const numberOf = (value) => (value === "nan" ? NaN : value === "inf" ? Infinity 
 
 // --- numbers in words, as Python writes them ---
 function fixed(value, digits) {
-  const twice = value * 2 * 10 ** digits;  // a tie goes to the even digit
-  if (Number.isInteger(twice) && Math.abs(twice) % 2 === 1 && twice / (2 * 10 ** digits) === value) {
-    const low = Math.floor(twice / 2);
-    return ((low % 2 === 0 ? low : low + 1) / 10 ** digits).toFixed(digits);
+  const parts = value * 2 ** (digits + 1);
+  if (Number.isInteger(parts) && Math.abs(parts) % 2 === 1) {  // a tie goes to the even digit
+    const twice = BigInt(Math.abs(parts)) * 5n ** BigInt(digits), low = twice / 2n;
+    const text = String(low % 2n === 0n ? low : low + 1n).padStart(digits + 1, "0"), point = text.length - digits;
+    return `${value < 0 ? "-" : ""}${text.slice(0, point)}${digits ? "." : ""}${text.slice(point)}`;
   }
+  if (Math.abs(value) >= 1e21) { return `${BigInt(value)}${digits ? "." : ""}${"0".repeat(digits)}`; }
   return value.toFixed(digits);
 }
 
@@ -248,17 +250,20 @@ function judgeSeries(key, old, now, before, after, accepted) {
   const red = RED.includes(told.word);
   const change = { key, definition, ...told, red, stands: stands(definition, now, red), before: old ? old.value : null, after: now ? now.value : null, accepted: "", blame: "" };
   if (word) { change.word = word; }
-  if (red && now) {
-    const level = accepted.find((a) => a.keys.has(key) && Number.isFinite(now.value) && a.low <= now.value && now.value <= a.high && (!a.until || after.day <= a.until));
-    if (level) { Object.assign(change, { word: "accepted", red: false, stands: "accepted", accepted: level.said }); }
+  const gone = told.word === "removed";
+  if (red && (now || gone)) {
+    const within = (a) => a.expected || (Number.isFinite(now.value) && a.low <= now.value && now.value <= a.high);
+    const level = accepted.find((a) => a.keys.has(key) && (!a.until || after.day <= a.until) && (gone ? a.removed || a.expected : !a.removed && within(a)));
+    if (level) { Object.assign(change, { word: level.expected ? "expected" : "accepted", red: false, stands: "accepted", accepted: level.said }); }
   }
   if (change.red && now && now.blame) { change.blame = now.blame; }
   return change;
 }
 
-// Worst first: by class, then by what happened, gates before the rest, then by decades.
+// Worst first: by class, then by what happened, gates before the rest, then by decades, to a millionth: two
+// logarithms differ in their last bits.
 function worseFirst(one, other) {
-  const rank = (c) => [c.red ? 0 : 1, c.red ? STANDS.indexOf(c.stands) : 0, WORDS.indexOf(c.word), c.definition.role === "gate" ? 0 : 1, -(c.decades === null ? (c.red ? Infinity : 0) : Math.abs(c.decades))];
+  const rank = (c) => [c.red ? 0 : 1, c.red ? STANDS.indexOf(c.stands) : 0, WORDS.indexOf(c.word), c.definition.role === "gate" ? 0 : 1, -Math.floor((c.decades === null ? (c.red ? Infinity : 0) : Math.abs(c.decades)) * 1e6 + 0.5)];
   const a = rank(one), b = rank(other);
   for (let i = 0; i < a.length; i += 1) { if (a[i] !== b[i]) { return a[i] - b[i]; } }
   return one.key < other.key ? -1 : 1;

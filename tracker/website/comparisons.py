@@ -171,16 +171,24 @@ def page_files(told: Comparisons, book: Book, accepted: Sequence[Accepted]) -> b
 
 def choice(night: Night) -> dict[str, str]:
     """How a version is called in the list and in the address."""
-    return {"id": night.id, "label": night.label, "hash": short_hash(night.engine)}
+    subject, author = clean(night.engine.subject), clean(night.engine.author)
+    told = [shortened(subject, 60), f"({shortened(author, 30)})" if author else ""] if subject else []
+    label = " · ".join(filter(None, [night.label, " ".join(told).strip()]))
+    return {"id": night.id, "label": label, "hash": short_hash(night.engine)}
+
+
+def shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
 
 
 def worst_first(changes: Sequence[Change]) -> list[Change]:
-    """By class, then by what happened, gates before the rest, then by decades."""
+    """By class, then by what happened, gates before the rest, then by decades, to a millionth (as judge.js does)."""
 
     def rank(change: Change) -> tuple[bool, int, int, bool, float, str]:
         far = abs(change.decades) if change.decades is not None else math.inf if change.red else 0.0
         stands = CLASS_RANK[change.stands] if change.red else 0
-        return not change.red, stands, WORD_RANK[change.word], change.role != "gate", -far, change.series
+        told = math.floor(far * 1e6 + 0.5) if math.isfinite(far) else far
+        return not change.red, stands, WORD_RANK[change.word], change.role != "gate", -told, change.series
 
     return sorted(changes, key=rank)
 

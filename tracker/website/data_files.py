@@ -125,6 +125,7 @@ def regressions(events: Sequence[Event]) -> Table:
     """Every regression: what, from what to what, between which commits, and what became of it."""
     columns = (
         "series", "name", "sentence", "before", "after", "unit", "last_good", "first_bad", "first_bad_started",
+        "first_bad_subject", "first_bad_author",
         "standing", "ended", "accepted",
     )  # fmt: skip
     return columns, [_event_line(event) for event in events]
@@ -135,7 +136,7 @@ def _event_line(event: Event) -> list[Any]:
     return [
         event.definition.key, event.name, event.sentence, event.before, event.value,
         event.definition.unit, good.engine.git_hash if good else "", event.first.engine.git_hash,
-        event.first.started, event.standing, end.started if end else "", event.accepted,
+        event.first.started, event.first.engine.subject, event.first.engine.author, event.standing, end.started if end else "", event.accepted,
     ]  # fmt: skip
 
 
@@ -143,6 +144,7 @@ def nights(book: Book) -> Table:
     """All nights: what ran when, where, on which engine."""
     columns = (
         "run", "started", "finished", "trigger", "engine", "version", "git_hash", "changed_tree", "commit_time",
+        "subject", "author",
         "compiler", "flags", "machine", "processor", "cores", "operating_system", "float_environment", "tracker",
         "ci_address",
     )  # fmt: skip
@@ -153,7 +155,7 @@ def _night_line(night: Night) -> list[Any]:
     e, m = night.engine, night.machine
     return [
         night.id, night.started, night.finished, night.trigger, e.name, e.version, e.git_hash, e.dirty,
-        e.commit_time, e.compiler, e.flags, m.fingerprint, m.processor, m.cores, m.operating_system,
+        e.commit_time, e.subject, e.author, e.compiler, e.flags, m.fingerprint, m.processor, m.cores, m.operating_system,
         m.float_environment, night.tracker_version, night.ci_address,
     ]  # fmt: skip
 

@@ -109,9 +109,9 @@ def accepted_fields(accepted: Sequence[Accepted], keys: Sequence[str]) -> list[d
             "keys": [key for key in keys if level.names(key)],
             "low": boxed(level.low), "high": boxed(level.high),
             "until": level.until.isoformat() if level.until else "", "said": clean(str(level)),
+            "removed": level.removed, "expected": level.expected,
         }
         for level in accepted
-        if not level.removed
     ]  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
 from spook_tracker.tracker.website.page_rows import Page, address, row
-from spook_tracker.tracker.website.page_test import concluded
+from spook_tracker.tracker.website.page_test import concluded, earlier_choices
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
 
@@ -35,13 +35,16 @@ MOST_CAUSES = 200  # on the page of regressions; the file has all
 MOST_ROWS, FEW_ROWS = 500, 25  # series of all causes; of one that is over
 MOST_CHANGES = 100  # of a comparison read without scripts
 MOST_NIGHTS = 120
+MOST_EARLIER = 4  # nights to lay beside every ladder of all tests: each weighs as much as tonight
 
 
 def error_time(book: Book) -> Page:
     """What accuracy costs, for all tests."""
-    charts = []
+    charts, drawn = [], []
     for test in book.tests:
-        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name), book.earlier[:1]):
+        beside = book.earlier[:MOST_EARLIER]
+        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name), beside):
+            drawn.append(chart)
             shown = view(chart, table=False)
             axis = "work" if chart.name.endswith("-work") else "seconds"
             charts.append((axis, shown, address(test)))
@@ -50,6 +53,7 @@ def error_time(book: Book) -> Page:
     }
     context = {
         "charts": charts,
+        "earlier": earlier_choices(book, drawn),
         "orders": rows["order"],
         "scalars": rows["time"],
     }

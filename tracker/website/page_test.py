@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from spook_tracker.tracker.document.wording import clean, day, slug
 from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.charts import Chart
 from spook_tracker.tracker.website.diagrams import (
     figure_chart,
     grid_view,
@@ -33,7 +34,6 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     scalars = shown + test.reported()
     newest = max((t.nights[-1] for t in test.trends), default=book.tonight.index)
     charts = ladder_charts(test, peers=book.peers(test.name), earlier=book.earlier)
-    drawn = {line.night for chart in charts for line in chart.lines if line.night}
     contents = [("scene", "The question"), ("versions", "Over versions")]
     contents += [("figures", "Figures")] if test.figures else []
     contents += [("error-time", "Error against run time")] if charts else []
@@ -57,7 +57,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         ],
         "figures": [view(figure_chart(f)) for f in test.figures],
         "ladders": [view(c) for c in charts],
-        "earlier": [(one.key, one.told(book.nights[one.index])) for one in book.earlier if one.key in drawn],
+        "earlier": earlier_choices(book, charts),
         "orders": [every[id(t)] for t in [*test.of_kind("order"), *test.of_kind("time")]],
         "maps": [grid_view(map_grid(m)) for m in test.maps],
         "break_points": [every[id(t)] for t in break_points],
@@ -66,6 +66,12 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "scalars": [every[id(t)] for t in scalars],
     }
     return Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
+
+
+def earlier_choices(book: Book, charts: Sequence[Chart]) -> list[tuple[str, str]]:
+    """The earlier nights that stand in some chart, as a list to choose from: key and words."""
+    drawn = {line.night for chart in charts for line in chart.lines if line.night}
+    return [(one.key, one.told(book.nights[one.index])) for one in book.earlier if one.key in drawn]
 
 
 CONCLUSION = re.compile(r"Green: (.*?)\s+Red: (.*)", re.DOTALL)
