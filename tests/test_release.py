@@ -84,6 +84,9 @@ def test_a_release_dates_the_changelog_and_tags_it(clone: Clone) -> None:
     text = (clone.folder / "CHANGELOG.md").read_text()
     assert text == before.replace("## Unreleased\n", f"## Unreleased\n\n## 1.0.0 ({today})\n", 1)
     assert clone.git("status", "--porcelain") == ""
+    for name in (".github/workflows/track.yml", "action.yml", "examples/gitlab/.gitlab-ci.yml"):
+        text = (clone.folder / name).read_text()
+        assert re.findall(r"spook-tracker\[standard\](\S*?)\"?(?:\s|$)", text) == ["==1.0.0"], name
     assert clone.git("cat-file", "-t", "v1.0.0") == "tag"
     assert clone.git("rev-parse", "v1.0.0^{commit}") == clone.git("rev-parse", "HEAD")
     assert clone.version() == "1.0.0"

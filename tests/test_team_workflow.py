@@ -20,6 +20,7 @@ yaml = pytest.importorskip("yaml", reason="PyYAML is not installed here")
 from tests.workflow_service import Service  # noqa: E402 (needs yaml)
 
 ROOT = Path(__file__).resolve().parents[1]
+ACTION = ROOT / "action.yml"
 TRACK = ROOT / ".github" / "workflows" / "track.yml"
 EXAMPLE = ROOT / "examples" / "pebble"
 BUILD = "cmake -S . -B build && cmake --build build"
@@ -62,7 +63,8 @@ class Team:
         git(self.clone, "remote", "add", "origin", str(self.origin))
         programs = folder / "programs"
         programs.mkdir()
-        for name, line in (("pip", "exit 0"), ("tracker", f'exec {sys.executable} -m spook_tracker "$@"')):
+        pip = f'echo "$PIP_CONSTRAINT" "$@" >> {folder}/pip.log'
+        for name, line in (("pip", pip), ("tracker", f'exec {sys.executable} -m spook_tracker "$@"')):
             (programs / name).write_text(f"#!/bin/sh\n{line}\n")
             (programs / name).chmod(0o755)
         (programs / "gh").write_text(GH.format(folder=folder))
@@ -86,7 +88,10 @@ class Team:
         return found
 
     def night(self) -> dict:
-        return self.service.run(TRACK, "schedule", "main", build=BUILD, options="--quick --workers 1")
+        told = f'cp "$SUMMARY" "{self.clone.parent}/notified.md"'
+        return self.service.run(
+            TRACK, "schedule", "main", build=BUILD, options="--quick --workers 1", notify=told
+        )
 
     def pull_request(self, branch: str, **inputs: str) -> dict:
         return self.service.run(TRACK, "pull_request", branch, build=BUILD, **inputs)
@@ -114,6 +119,7 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     }, first["night"].log  # fmt: skip
     assert "measured for the first time" in first["night"].summary
     assert list(team.months().values()) == [1]
+    assert not (tmp_path / "notified.md").exists(), "nobody is called out for a green night"
 
     bad = team.change(
         "Pull a little harder", "main", GRAVITY, GRAVITY.replace("time_step", "1.01 * time_step")
@@ -123,6 +129,7 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     assert red["verdict"].result == "failure"
     assert "throw/default/height\\_error" in red["night"].summary
     assert bad[:10] in red["night"].summary
+    assert (tmp_path / "notified.md").read_text() == red["night"].summary
     assert re.search(r"^::error title=throw%3A .*height_error", red["night"].log, re.MULTILINE)
     assert list(team.months().values()) == [2]
 
@@ -159,6 +166,29 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     assert "::error" not in well["night"].log
     assert list(team.months().values()) == [3]
     assert len(git(team.origin, "log", "--format=%h", "tracker-history").splitlines()) == 3
+
+
+@pytest.mark.skipif(CMAKE is None, reason="CMake is not installed here")
+def test_the_composite_action_measures_a_night_and_a_change(tmp_path: Path) -> None:
+    team = Team(tmp_path)
+
+    first = team.service.act(ACTION, "schedule", "main", BUILD, constraints="pins.txt")
+
+    assert first.result == "success", first.log
+    assert "measured for the first time" in first.summary
+    assert (first.workspace / "public" / "index.html").is_file()
+    history = first.workspace / "history"
+    assert [path.name.endswith(".jsonl.xz") for path in history.iterdir()] == [True]
+    installed = (tmp_path / "pip.log").read_text()
+    assert installed.startswith("pins.txt install --quiet spook-tracker[standard]")
+
+    team.change("Pull harder", "worse", GRAVITY, GRAVITY.replace("time_step", "1.02 * time_step"))
+    worse = team.service.act(ACTION, "pull_request", "worse", BUILD, history, comment="said.md")
+
+    assert worse.result == "failure"
+    assert "**regressed**" in worse.summary
+    assert "worse than at pebble" in (worse.workspace / "said.md").read_text()
+    assert not (worse.workspace / "public").exists()
 
 
 WORKFLOWS = [*sorted((ROOT / ".github" / "workflows").glob("*.yml")), ROOT / "action.yml"]
@@ -229,6 +259,14 @@ def test_the_template_for_gitlab_is_yaml_and_shell() -> None:
         for line in (*job.get("before_script", ()), *job.get("script", ())):
             assert isinstance(line, str), line
             subprocess.run(["bash", "-n", "-c", line], check=True)
+
+
+def test_the_template_for_gitlab_names_one_image_and_one_tracker() -> None:
+    said = yaml.safe_load((ROOT / "examples" / "gitlab" / ".gitlab-ci.yml").read_text())
+
+    assert re.fullmatch(r"python:3\.\d+\.\d+-\w+", said["variables"]["IMAGE"]), "a tag that does not move"
+    assert {job.get("image", "$IMAGE") for job in said.values() if isinstance(job, dict)} == {"$IMAGE"}
+    assert said["variables"]["TRACKER"].startswith("spook-tracker[standard]")
 
 
 def test_a_team_needs_ten_lines() -> None:

@@ -33,6 +33,7 @@ class Ran:
     outputs: dict[str, str] = field(default_factory=dict)
     log: str = ""
     summary: str = ""
+    workspace: Path = Path()
 
 
 @dataclass
@@ -57,6 +58,32 @@ class Service:
             context = {"inputs": given, "github": self._github(event), "needs": jobs, "branch": branch}
             jobs[name] = self._job(name, job, context)
         return jobs
+
+    def act(
+        self, action: Path, event: str, branch: str, before: str, history: Path | None = None, **inputs: str
+    ) -> Ran:
+        """A composite action's steps, in a checkout where `before` has run and `history` lies in history/."""
+        said = yaml.safe_load(action.read_text(encoding="utf-8"))
+        assert said["runs"]["using"] == "composite"
+        given = {name: str(what.get("default", "")) for name, what in said["inputs"].items()} | inputs
+        assert set(given) == set(said["inputs"])
+        self.runs += 1
+        context: dict[str, Any] = {
+            "inputs": given,
+            "github": self._github(event),
+            "branch": branch,
+            "steps": {},
+        }
+        ran = Ran(workspace=self.folder / f"{self.runs}-action")
+        assert self._checkout({"fetch-depth": "0"}, ran.workspace, context)
+        if history is not None:
+            shutil.copytree(history, ran.workspace / "history")
+        for step in ({"shell": "bash", "run": before}, *said["runs"]["steps"]):
+            assert step["shell"] == "bash", "a composite action has to say so"
+            if not self._shell(step, ran.workspace, context, ran):
+                ran.result = "failure"
+                break
+        return ran
 
     def _github(self, event: str) -> dict[str, Any]:
         return {"event_name": event, "token": "token", "run_id": str(self.runs), "event": {"number": "7"}}
@@ -113,6 +140,7 @@ class Service:
             **{k: v for k, v in os.environ.items() if not k.startswith(("TRACKER", "GITHUB", "CI", "PIP"))},
             "PATH": f"{self.programs}{os.pathsep}{os.environ['PATH']}",
             "GITHUB_ACTIONS": "true",
+            "GITHUB_EVENT_NAME": context["github"]["event_name"],
             "GITHUB_SERVER_URL": self.origin.parent.as_uri(),
             "GITHUB_REPOSITORY": self.origin.name,
             **{name: str(file) for name, file in files.items()},
