@@ -72,6 +72,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "grasp": "grasp",
     "hanging_cable": "hanging_cable",
     "rope": "rope",
+    "falling_chain": "falling_chain",
     "rocking_block": "rocking_block",
     "shaken_block": "shaken_block",
     # the multibody benchmark library

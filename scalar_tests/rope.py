@@ -20,6 +20,7 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Momentum,
+    Position,
     Result,
     RigidBody,
     Scene,
@@ -28,7 +29,9 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -36,6 +39,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -44,7 +48,7 @@ LENGTH, MASS, THICK = 10.0, 5.0, 0.004  # m, kg, m: of the whole rope, however m
 LONG, SHORT = 1000, 125  # links
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 0.5  # s
-# Spun so slowly that T h²/(m l) = (w h N)²/8 stays below 0.15: from 0.3 on rigid links under tension run away.
+# Spun so slowly that T h²/(m l) = (w h N)²/8 stays below 0.15: from 1/3 on rigid links under tension run away, h ω > 2.
 SPIN = 0.06  # rad/s
 GRAVITY = 9.81  # m/s²
 THROWN, TUMBLE = (2.0, 0.5, 4.0), (1.0, 3.0, 0.5)  # m/s, rad/s: the ragdoll
@@ -57,8 +61,9 @@ def middle_pull() -> float:
 
 
 @functools.cache
-def rope(count: int) -> Scene:
-    """Thin rods on ball joints in a straight line along x, which turns about its middle; nothing else acts."""
+def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
+    """Thin rods on ball joints in a straight line along x, which turns about its middle; nothing else acts. `nudge` [rad/s]
+    tilts every other rod up and down."""
     length, mass = LENGTH / count, MASS / count
     across = mass * length**2 / 12.0
     links = []
@@ -72,8 +77,8 @@ def rope(count: int) -> Scene:
                 inertia=(across, across, 0.5 * mass * THICK**2),
                 position=(x, 0.0, 0.0),
                 orientation=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0),
-                velocity=(0.0, SPIN * x, 0.0),
-                angular_velocity=(0.0, 0.0, SPIN),
+                velocity=(0.0, spin * x, 0.0),
+                angular_velocity=(0.0, nudge if k % 2 == 0 else -nudge, spin),
             )
         )
     joints = [
@@ -174,6 +179,23 @@ def spin(simulate: Simulate) -> dict[str, float]:
         "turning_error": float(np.abs(turning / turning[0] - 1.0).max()),
         "energy_error": float(np.abs(energy / (0.5 * whole * SPIN) - 1.0).max()),
     }
+
+
+FEW = 40  # links of the study
+# At which h ω = 2 of its fastest swing across, by the eigenvalues of its links in the test.
+FASTEST = 2.50376  # rad/s
+
+
+def straight(simulate: Simulate, spin: float) -> bool:
+    """Whether a rope of few links that is nudged stays in its plane for 200 steps."""
+    observe = {"x": MaximumAbsolute(quantity=Position())}
+    result = simulate(rope(FEW, spin, 1e-8), time_step=TIME_STEP, steps=200, observe=observe)
+    return result.completed and float(result["x"].max(axis=0)[2]) < 1e-6
+
+
+def fastest(simulate: Simulate) -> BreakPoint:
+    """The fastest spin of a rope of few links."""
+    return break_point(functools.partial(straight, simulate), 0.4 * FASTEST, 2.0 * FASTEST, resolution=0.005)
 
 
 def cost(simulate: Simulate) -> dict[str, float]:
@@ -334,6 +356,18 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=ragdoll(), time_step=TIME_STEP, duration=1.0),
     figures=(Figure(name="cost", title="Work per link", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="fastest",
+            title="Fastest spin at which a rope of forty links stays straight",
+            configuration="plain",
+            definition="its links nudged by 1e-8 rad/s up and down it leaves its plane by less than 1e-6 m in 200 steps",
+            study=fastest,
+            unit="rad/s",
+            expected=(0.99 * FASTEST, 1.005 * FASTEST),
+            expected_source="h ω = 2 of the fastest swing across it, by eigenvalues: about T h²/(m l) = 1/3 in the middle",
+        ),
+    ),
     ladders=(
         Ladder(
             name="energy",

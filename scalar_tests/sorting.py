@@ -145,7 +145,7 @@ def on_the_belt(simulate: Simulate) -> dict[str, float]:
 
 def grown(time_step: float) -> float:
     """By how much the circle of a box that rides grows in half a second: a step along the tangent is √(1 + (Ω h)²) longer."""
-    return (1.0 + (RATE * time_step) ** 2) ** (0.25 / time_step) - 1.0
+    return math.exp(0.25 / time_step * math.log1p((RATE * time_step) ** 2)) - 1.0
 
 
 def on_the_table(simulate: Simulate) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from spook_tracker.scalar_tests import hanging_cable
+from spook_tracker.scalar_tests import hanging_cable, rope
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests.limits import measurement
 
@@ -93,3 +93,20 @@ def test_as_many_links_hang_still_as_swing_by_less_than_half_a_turn_a_step() -> 
     assert c.TIME_STEP * math.sqrt(shortest) == pytest.approx(2.0, rel=1e-9)
     low, high = band("hanging_cable", "tightest")
     assert low < c.tightest() < high
+
+
+def test_a_rope_spins_as_fast_as_its_shortest_waves_swing_by_half_a_turn_a_step() -> None:
+    length, mass = rope.LENGTH / rope.FEW, rope.MASS / rope.FEW
+    ends = length * np.arange(rope.FEW + 1) - 0.5 * rope.LENGTH
+    pulls = (
+        0.5 * rope.MASS / rope.LENGTH * (0.25 * rope.LENGTH**2 - ends**2)
+    )  # at 1 rad/s: what is outside of a joint
+    flat = mass * length / 12.0  # a rod that spins lies down by itself: m l²/12 w² of moment a radian
+    squares = eigh(*across(0.5 * (pulls[1:] + pulls[:-1]) + flat, mass, length), eigvals_only=True)
+    # The rope turns about its middle, which tilts it as a whole at its own rate: the slowest swings are 0 and w.
+    np.testing.assert_allclose(squares[:2], (0.0, 1.0), atol=1e-9)
+
+    assert rope.TIME_STEP * rope.FASTEST * math.sqrt(squares[-1]) == pytest.approx(2.0, rel=1e-4)
+    assert math.sqrt(8.0 / 3.0) / rope.FEW / rope.TIME_STEP == pytest.approx(rope.FASTEST, rel=0.03)
+    low, high = band("rope", "fastest")
+    assert low < rope.FASTEST < high
