@@ -31,7 +31,7 @@ from spook_tracker.engine.result import Array
 __all__ = ["Capabilities", "Configuration", "NotSupported", "Stepped", "Task", "World", "of_checkout"]
 
 LOOK = 0.05  # s of stepping after which the clock is looked at again, or sooner
-State = tuple[Array, Array] | tuple[Array, Array, Array, Array]
+BodyStates = tuple[Array, Array] | tuple[Array, Array, Array, Array]
 
 
 class World(Protocol):
@@ -41,7 +41,7 @@ class World(Protocol):
         """Take that many steps of `task.time_step`, in the engine's own loop."""
         ...
 
-    def state(self) -> State:
+    def state(self) -> BodyStates:
         """Positions (n, 3) m, velocities (n, 3) m/s; of rigid bodies also quaternions (n, 4), spins (n, 3) rad/s.
 
         Bodies in the order of the scene, world axes.
@@ -101,7 +101,7 @@ class Stepped(ABC):
         )
 
 
-def _whole(state: State) -> tuple[Array, Array, Array, Array]:
+def _whole(state: BodyStates) -> tuple[Array, Array, Array, Array]:
     """A copy of the state: the engine goes on writing where it has it."""
     positions, velocities, *turning = (np.array(part, dtype=np.float64) for part in state)
     orientations, spins = turning or (

@@ -28,7 +28,7 @@ ASKED: dict[str, Any] = {
 NIGHTS = 30
 
 
-class Night:
+class ScriptedNight:
     """Run times as scripted: by the time a ladder is timed, so many times what it usually takes."""
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
@@ -48,14 +48,14 @@ class Night:
         patch.setattr("spook_tracker.tracker.measure.ladder.interleaved", interleaved)
 
 
-def scripted(patch: pytest.MonkeyPatch) -> Night:
+def scripted(patch: pytest.MonkeyPatch) -> ScriptedNight:
     patch.syspath_prepend(str(Path(__file__).parent))
     patch.setattr(library, "publish", lambda *asked, **named: None)
-    return Night(patch)
+    return ScriptedNight(patch)
 
 
 @pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> Night:
+def measured(monkeypatch: pytest.MonkeyPatch) -> ScriptedNight:
     return scripted(monkeypatch)
 
 
@@ -114,7 +114,7 @@ def run_times(report: library.NightlyReport) -> list[Any]:
 
 
 def test_a_slow_measurement_that_does_not_repeat_stays_green_with_a_note(
-    measured: Night, history: str, tmp_path: Path
+    measured: ScriptedNight, history: str, tmp_path: Path
 ) -> None:
     ladders = len(set(toy().ladders))
     measured.factors = [1.3] * ladders + [1.0]
@@ -128,7 +128,7 @@ def test_a_slow_measurement_that_does_not_repeat_stays_green_with_a_note(
 
 
 def test_a_slow_engine_is_red_and_both_measurements_are_kept(
-    measured: Night, history: str, tmp_path: Path
+    measured: ScriptedNight, history: str, tmp_path: Path
 ) -> None:
     measured.factors = [1.3]
     report = night(history, tmp_path / "public")
@@ -144,7 +144,7 @@ def test_a_slow_engine_is_red_and_both_measurements_are_kept(
 
 
 def test_a_night_that_seems_as_fast_as_ever_is_timed_once(
-    measured: Night, history: str, tmp_path: Path
+    measured: ScriptedNight, history: str, tmp_path: Path
 ) -> None:
     measured.factors = [1.0]
     report = night(history, tmp_path / "public")
@@ -172,7 +172,7 @@ def test_the_measurement_that_was_disturbed_less_counts() -> None:
     assert ladder_timing([both, first]).again is None  # means over other rungs say nothing
 
 
-def test_a_comparison_counts_the_lesser_time_too(measured: Night) -> None:
+def test_a_comparison_counts_the_lesser_time_too(measured: ScriptedNight) -> None:
     before = library.run(**ASKED)
     measured.times, measured.factors = 0, [1.3]
     slow = library.run(**ASKED)
@@ -203,7 +203,7 @@ def test_whether_the_machine_was_quiet_is_asked_of_the_time_that_counts() -> Non
     assert unquiet(night_of(replace(loud, again=quiet))) == ""
 
 
-def test_what_was_timed_again_is_written_once(measured: Night, tmp_path: Path) -> None:
+def test_what_was_timed_again_is_written_once(measured: ScriptedNight, tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'tracker.db'}"
     first = library.run(**ASKED)
     library.record(first, url)

@@ -24,7 +24,7 @@ from spook_tracker.tracker.measure.commits import CommitError, full_hash
 
 FIRST_BAD = re.compile(r"^([0-9a-f]{40,64}) is the first bad commit", re.MULTILINE)
 Measure = Callable[[str], RunDocument]
-Word = Literal["good", "bad", "skip"]
+CommitWord = Literal["good", "bad", "skip"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Step:
     """One commit that was tried."""
 
     commit: str
-    word: Word
+    word: CommitWord
     why: str
 
 

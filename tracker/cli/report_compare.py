@@ -15,7 +15,7 @@ from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import QUIET, WORDS, spaced
+from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, spaced
 
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
@@ -182,7 +182,7 @@ def counted(document: CompareDocument) -> str:
 
 
 def _verdict(document: CompareDocument) -> str:
-    mark = {"regressed": "✗", "not_comparable": "?"}.get(document.verdict, "✓")
+    mark = OVERALL[document.verdict].mark
     words = f"{mark} {spaced(document.verdict)}: {counted(document) or 'nothing measured'}"
     return click.style(words, fg=COLOUR.get(mark), bold=True)
 

@@ -33,7 +33,7 @@ def number(value: float, digits: int = 6) -> str:
 
 def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> str:
     """The value with its unit, or the class of its failure; an unsettled one says both."""
-    value = float(sample.value)
+    value = sample.value
     if sample.outcome not in HAVE_VALUES and not math.isinf(value):
         return sample.outcome.replace("_", " ")
     said = " unsettled" if sample.outcome == "unsettled" else ""
@@ -57,7 +57,7 @@ def _unit(definition: SeriesDefinition) -> str:
 
 def margin(definition: SeriesDefinition, sample: Sample) -> str:
     """How far inside the limit: per cent, or decades where per cent says nothing; negative is outside."""
-    value, bound = float(sample.value), definition.limit
+    value, bound = sample.value, definition.limit
     if bound is None or not math.isfinite(value):
         return "-"
     if isinstance(bound, tuple):

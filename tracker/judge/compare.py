@@ -38,7 +38,7 @@ from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed,
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import NO_MAP, map_key, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
-from spook_tracker.tracker.judge.vocabulary import RED, WORD_RANK, Class, Word
+from spook_tracker.tracker.judge.vocabulary import OVERALL, RED, WORD_RANK, Class, Overall, Word
 from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
@@ -130,7 +130,7 @@ def compare_in(
     return compare(earlier, later, accepted, known(told, old.id, new.id))
 
 
-def overall(changes: Sequence[Change]) -> Literal["identical", "same", "regressed", "not_comparable"]:
+def overall(changes: Sequence[Change]) -> Overall:
     """Red before anything; then whether what decides could be compared at all."""
     if any(change.red for change in changes):
         return "regressed"
@@ -142,9 +142,9 @@ def overall(changes: Sequence[Change]) -> Literal["identical", "same", "regresse
     return "identical" if all(change.word == "identical" for change in told) else "same"
 
 
-def exit_code(verdict: str) -> Literal[0, 1, 3]:
+def exit_code(verdict: Overall) -> Literal[0, 1, 3]:
     """What a command ends with."""
-    return 1 if verdict == "regressed" else 3 if verdict == "not_comparable" else 0
+    return OVERALL[verdict].code
 
 
 def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> list[Change]:
@@ -166,7 +166,7 @@ def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> 
         elif old is not None and new is not None:
             if why := _another_question(old[0], new[0]):
                 verdict = Verdict(word="not_comparable", sentence=why)
-            elif new[0].kind == "time" and float(new[1].value) != float(old[1].value):
+            elif new[0].kind == "time" and new[1].value != old[1].value:
                 same_machine = before.side.machine == after.side.machine
                 verdict = _time_scalar(old, new, same_machine, history.usual.get(key))
                 verdict = to_be_confirmed(verdict) if key in history.suspected else verdict
@@ -229,7 +229,7 @@ def _time_scalar(
     verdict = judge(new[0], old[1], new[1], same_definition=old[0].test_version == new[0].test_version)
     if verdict.word in ("regressed", "improved", "changed") and old[1].outcome == new[1].outcome:
         if usual is not None:
-            return judge_time(usual, float(new[1].value), new[0].better == "larger")
+            return judge_time(usual, new[1].value, new[0].better == "larger")
         gross = abs(verdict.decades or 0.0) > DOUBLED
         words = f"{verdict.sentence}, of one timing session"
         return Verdict(word="changed" if gross else "same", sentence=words, decades=verdict.decades)
@@ -326,7 +326,7 @@ def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change
     gone = (change.kind == "map" and change.word == "missing") or change.word == "removed"
     if not change.red or (change.after is None and not gone):
         return change
-    value = math.nan if change.after is None else float(change.after)
+    value = math.nan if change.after is None else change.after
     level = acceptance(accepted, change.series, value, night, removed=gone)
     if level is None:
         return change

@@ -9,7 +9,7 @@ from typing import Literal
 
 from spook_tracker.tracker.document.json_form import Number, schema_hook
 from spook_tracker.tracker.document.run_document import Name, OutcomeClass, Struct, Text
-from spook_tracker.tracker.judge.vocabulary import Class, Word
+from spook_tracker.tracker.judge.vocabulary import Class, Overall, Word
 
 COMPARE_SCHEMA_VERSION = 1
 
@@ -71,7 +71,7 @@ class CompareDocument(Struct, frozen=True, kw_only=True):
     schema_version: Literal[1]
     before: Side
     after: Side
-    verdict: Literal["identical", "same", "regressed", "not_comparable"]
+    verdict: Overall
     exit_code: Literal[0, 1, 3]
     counts: dict[str, int]  # by word
     changes: tuple[Change, ...]  # the worst first

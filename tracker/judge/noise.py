@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.judge.shifts import (
@@ -31,6 +31,7 @@ from spook_tracker.tracker.judge.shifts import (
 )
 from spook_tracker.tracker.judge.slower import Usual, change_in_words, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
+from spook_tracker.tracker.judge.vocabulary import State
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.judge.shifts import Values
@@ -52,9 +53,6 @@ CREEP = 5  # nights in each median that is compared for drift
 BACK = 4  # nights whose mean must have come halfway back from a shift
 VISITS = 2  # to a level, before it is known as one of the machine's
 LONGER = 2  # times its longest visit, and it is no visit any more
-
-
-State = Literal["green", "detected", "accepted", "recovered", "suspected"]
 
 
 class Noisy(NamedTuple):

@@ -68,7 +68,7 @@ def visible(change: Change) -> bool:
     if change.kind in ("time", "run_time", "work") or change.before is None or change.after is None:
         return False
     outcomes = (str(change.before_outcome), str(change.after_outcome))
-    return moved(float(change.before), float(change.after), outcomes)
+    return moved(change.before, change.after, outcomes)
 
 
 def moved(before: float, after: float, outcomes: tuple[str, str]) -> bool:

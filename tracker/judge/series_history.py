@@ -286,9 +286,7 @@ def _judge_values(
 def red_class(own: Class, sample: Sample) -> Class:
     """A limit broken or no value is FAIL; what only became worse than it was is WATCH."""
     return (
-        "fail"
-        if own == "fail" or sample.outcome in NO_VALUE or not math.isfinite(float(sample.value))
-        else "watch"
+        "fail" if own == "fail" or sample.outcome in NO_VALUE or not math.isfinite(sample.value) else "watch"
     )
 
 

@@ -23,7 +23,7 @@ NO_VALUE = ("not_finite", "diverged", "crashed", "timed_out", "missing")
 
 def honest(sample: Sample) -> Sample:
     """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
-    if sample.outcome in (*NO_VALUE, NOT_SUPPORTED) or math.isfinite(float(sample.value)):
+    if sample.outcome in (*NO_VALUE, NOT_SUPPORTED) or math.isfinite(sample.value):
         return sample
     return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
 

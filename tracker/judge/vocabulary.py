@@ -26,6 +26,7 @@ Word = Literal[
     "identical",
 ]
 Class = Literal["fail", "watch", "accepted", "none", "pass", "followed"]
+Overall = Literal["regressed", "not_comparable", "same", "identical"]  # of two versions compared
 State = Literal["green", "detected", "accepted", "recovered", "suspected"]
 
 
@@ -58,6 +59,22 @@ RED = frozenset(word for word, said in WORDS.items() if said.red)
 QUIET = frozenset(word for word, said in WORDS.items() if said.quiet)
 WORD_RANK = {word: rank for rank, word in enumerate(WORDS)}
 
+
+@dataclass(frozen=True, slots=True)
+class SaidOverall:
+    """How a comparison as a whole is shown, and what its command ends with."""
+
+    mark: str
+    headline: str
+    code: Literal[0, 1, 3]
+
+
+OVERALL: dict[Overall, SaidOverall] = {  # the worst first
+    "regressed": SaidOverall("✗", "Regressed", 1),
+    "not_comparable": SaidOverall("?", "Not comparable", 3),
+    "same": SaidOverall("✓", "No regression", 0),
+    "identical": SaidOverall("✓", "Identical", 0),
+}
 CLASSES: dict[Class, tuple[str, str, str]] = {  # the worst first: mark, word, what it means
     "fail": ("✗", "FAIL", "a limit broken, a solve left unsettled, or no value"),
     "watch": ("!", "WATCH", "limits kept; a set point left, or worse than before"),

@@ -14,7 +14,7 @@ import msgspec
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
-from spook_tracker.tracker.document.json_form import Number, decode, encode
+from spook_tracker.tracker.document.json_form import Number, boxed, decode, encode
 from spook_tracker.tracker.store.identity import identity
 
 Row = dict[str, Any]
@@ -81,9 +81,9 @@ def stored_moment(value: datetime | str) -> datetime:
 
 
 def split(number: float) -> tuple[float | None, str | None]:
-    """A float64 as (value, special): every bit survives in databases that lose NaN or the sign of zero."""
+    """A float64 as (value, special): as JSON carries it, and the sign of zero, which databases lose, in words."""
     if not math.isfinite(number):
-        return None, str(Number(number))
+        return None, str(boxed(number))
     if number == 0.0 and math.copysign(1.0, number) < 0:
         return 0.0, "-0.0"
     return float(number), None

@@ -43,7 +43,7 @@ class HitTest:
 
 
 @dataclass
-class Told:
+class ToldCause:
     """A cause in words."""
 
     anchor: str
@@ -102,7 +102,7 @@ def lasting(found: Sequence[Cause]) -> list[Cause]:
     return [cause for cause in found if cause.standing == "detected"]
 
 
-def told(cause: Cause, book: Book) -> Told:
+def told(cause: Cause, book: Book) -> ToldCause:
     """A cause in words; its runs are the nights of the book."""
     night, good = cause.bad, cause.good
     red = [hit for hit in cause.hits if hit.standing == "detected"]
@@ -123,7 +123,7 @@ def told(cause: Cause, book: Book) -> Told:
         for name, hits in by_test.items()
     ]
     ends = sorted({hit.end.index: hit.end for hit in cause.hits if hit.end is not None}.items())
-    return Told(
+    return ToldCause(
         anchor=anchor(cause),
         state=state,
         said=SAID[cause.standing],

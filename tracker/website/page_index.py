@@ -13,7 +13,7 @@ from spook_tracker.tracker.document.wording import clean, day, quantity, short_h
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
-from spook_tracker.tracker.website.causes import Told, lasting, told
+from spook_tracker.tracker.website.causes import ToldCause, lasting, told
 from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, Row, address, row
 
@@ -149,7 +149,7 @@ def summary(book: Book) -> str:
     return " ".join(parts)
 
 
-def _blamed(new: Sequence[Told], old: Sequence[Told]) -> str:
+def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause]) -> str:
     """How many causes there are, new apart from old."""
     parts = []
     if new:

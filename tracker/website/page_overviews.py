@@ -9,7 +9,7 @@ from typing import Any
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.tonight import map_key
-from spook_tracker.tracker.judge.vocabulary import spaced
+from spook_tracker.tracker.judge.vocabulary import OVERALL, spaced
 from spook_tracker.tracker.website.causes import hit_row, told
 from spook_tracker.tracker.website.charts import drawable
 from spook_tracker.tracker.website.comparisons import Comparisons, choice, pair_name
@@ -110,11 +110,10 @@ def compare(told: Comparisons, book: Book) -> Page:
         before, after = told.nights[-2:]
         pair = told.pairs[pair_name(before, after)]
         counts = ", ".join(f"{n} {spaced(word)}" for word, n in pair["counts"].items())
-        headline = {"identical": "Identical", "same": "No regression", "regressed": "Regressed"}
         first = {
             "before": choice(before),
             "after": choice(after),
-            "headline": headline.get(pair["verdict"], "Not comparable"),
+            "headline": OVERALL[pair["verdict"]].headline,
             "counts": f"{counts}.",
             "changes": pair["changes"][:MOST_CHANGES],
             "left_out": max(0, len(pair["changes"]) - MOST_CHANGES),
