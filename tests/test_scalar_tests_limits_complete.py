@@ -27,6 +27,10 @@ OPEN = {  # evaluated beside the test from the formula its source states, and fo
     *(("rolling_coin", name) for name in ("rate_error", "lean_error", "centre_error", "energy_error")),
     *(("rocking_block", name) for name in ("kept_error", "first_blow_late", "swing_error")),
     *(("slider_crank", name) for name in ("place_error", "torque_error")),
+    *(("vehicle", name) for name in ("stopping_error", "stands")),
+    *(("arm_path", name) for name in ("path_error", "fall_error", "held_error")),
+    *(("loose_bearing", name) for name in ("place_error", "flight_error", "stuck_error")),
+    *(("shaken_block", name) for name in ("after_error", "before_error", "blow_late")),
     ("suspension", "pitch_error"),
 }
 L, C, M, F, S, E = (
@@ -40,6 +44,8 @@ SMALL = f"{L}.test_string_stiffness_costs_what_its_map_of_small_motion_costs"
 BENT = f"{F}.test_the_cantilever_bends_as_large_deflection_has_it"
 BALL = f"{F}.test_a_discrete_ball_bounces_as_high_and_as_long_as_the_limits_allow"
 RIGID = f"{F}.test_the_rigid_prototype_gives_the_first_step_of_the_door_and_the_flip_of_the_box"
+A = "tests.test_scalar_tests_arm_limits"
+METACENTRE = f"{M}.test_a_small_roll_rights_itself_with_its_metacentre_and_a_little_more"
 SEARCH = f"{F}.test_a_search_is_as_exact_as_its_resolution"
 RODS = f"{F}.test_loaded_rods_swing_as_their_modes_do_step_by_step"
 EDGE = f"{E}.test_the_limit_at_the_edge_is_that_of_its_own_step"
@@ -95,7 +101,8 @@ FOUND = {  # test: metric: what finds it again without the engine
     "spinning_top": dict.fromkeys(("path_error", "rate_error", "nutation", "energy_deviation", "joint_violation"), PROTOTYPE),
     "motor": {"angle_lead": f"{M}.test_the_motor_leads_by_the_sum_of_the_turns_of_its_steps"},
     "double_pendulum": {"angle_error": f"{L}.test_the_double_pendulum_may_be_half_a_step_off"},
-    "floating_box": {"period_error": WAVE},
+    "floating_box": {"period_error": WAVE, "roll_rate_error": METACENTRE, "continuous_error": METACENTRE},
+    "arm_path": {"torque_error": f"{A}.test_torques_of_a_guided_arm_are_two_steps_late_at_most"},
     "sinking_sphere": {"swing_error": WAVE},
     "wires": {"drum_error": DRUM},
     "capstan": dict.fromkeys(("speed_error", "sinking_error", "sinking_pull"), WINCH),
