@@ -199,11 +199,12 @@ def publish(
     title: str = "",
     home_page: str = "",
     mutants: Path | None = None,
+    colour: str = "",
 ) -> Any:
     """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
 
     `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
-    `title` and `home_page` say whose website it is. `mutants` is the record that `make mutants` writes.
+    `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links. `mutants` is the record that `make mutants` writes.
     """
     from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.page_mutants import read_mutants
@@ -211,7 +212,7 @@ def publish(
 
     offered = database_file(database) if database else None
     wrong = read_mutants(mutants) if mutants else ()
-    return build(history, out, accepted, offered, title, home_page, wrong)
+    return build(history, out, accepted, offered, title, home_page, wrong, colour)
 
 
 def judged_again(
@@ -257,11 +258,12 @@ def nightly(
     title: str = "",
     home_page: str = "",
     mutants: Path | None = None,
+    colour: str = "",
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
 
-    The database and `mutants` are opened first: no night is measured in vain. `tell` is called with the run
+    The database, `mutants` and `colour` are looked at first: no night is measured in vain. `tell` is called with the run
     document and with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded
     as far as it came (Interrupted says which run), neither judged nor published.
     """
@@ -269,7 +271,9 @@ def nightly(
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures
+    from spook_tracker.tracker.website.colours import accent
 
+    accent(colour)
     if mutants:
         from spook_tracker.tracker.website.page_mutants import read_mutants
 
@@ -289,5 +293,5 @@ def nightly(
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
         offered = database if with_database else ""
-        published = publish(history, out, accepted, offered, title, home_page, mutants)
+        published = publish(history, out, accepted, offered, title, home_page, mutants, colour)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

@@ -160,6 +160,7 @@ def nightly(
     with_database: bool,
     title: str,
     home_page: str,
+    colour: str,
     mutants: Path | None,
     executor: str,
     workers: int,
@@ -212,6 +213,7 @@ def nightly(
             with_database=with_database,
             title=title,
             home_page=home_page,
+            colour=colour,
             mutants=mutants,
             catalogue=catalogue,
             engine=first,
@@ -258,6 +260,7 @@ def publish(
     with_database: bool,
     title: str,
     home_page: str,
+    colour: str,
     mutants: Path | None,
     accepted: Path | None,
     database: str,
@@ -269,7 +272,7 @@ def publish(
 
     with History.open(database) as history:
         offered = database if with_database else ""
-        report = build(history, out, accepted_levels(accepted), offered, title, home_page, mutants)
+        report = build(history, out, accepted_levels(accepted), offered, title, home_page, mutants, colour)
     _say_published(report, out)
 
 
@@ -280,7 +283,13 @@ def publish(
 @accepted_option
 @database_option
 def report(
-    pdf: Path | None, html: Path | None, title: str, home_page: str, accepted: Path | None, database: str
+    pdf: Path | None,
+    html: Path | None,
+    title: str,
+    home_page: str,
+    colour: str,
+    accepted: Path | None,
+    database: str,
 ) -> None:
     """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
     import tempfile
@@ -293,7 +302,7 @@ def report(
     if pdf is None and html is None:
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
     with History.open(database) as history:
-        text = one_file(history, accepted_levels(accepted), title, home_page)
+        text = one_file(history, accepted_levels(accepted), title, home_page, colour)
     if html is not None:
         _write(html, text)
         say(f"wrote {html}")

@@ -67,14 +67,29 @@ def source_options(command: Command) -> Command:
     return command
 
 
+def _readable(context: click.Context, option: click.Parameter, colour: str) -> str:
+    """Before anything is measured."""
+    from spook_tracker.tracker.website.colours import accent
+
+    accent(colour)
+    return colour
+
+
 def website_options(command: Command) -> Command:
-    """--title and --home-page: whose website it is."""
+    """--title, --home-page and --colour: whose website it is."""
     for option in (
         click.option(
             "--home-page",
             metavar="URL",
             default="",
             help="Address of your project, for the foot of every page.",
+        ),
+        click.option(
+            "--colour",
+            metavar="#RRGGBB",
+            default="",
+            callback=_readable,
+            help="Colour of links and buttons, dark enough to be read on white.",
         ),
         click.option("--title", metavar="TEXT", default="", help="Title of the website."),
     ):

@@ -6,6 +6,7 @@
     accepted = "accepted.toml"
     title = "Pebble, every night"        # of the website
     home_page = "https://example.org/pebble"
+    colour = "#7a1fa2"                   # of its links and buttons
 
     [limits]                             # what your engine owes you, by series
     "falling_object/default/velocity_error/*" = 1e-9
@@ -36,6 +37,7 @@ KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an op
     "out": (str,),
     "title": (str,),
     "home_page": (str,),
+    "colour": (str,),
     "mutants": (str,),
     "executor": (str,),
     "workers": (int,),

@@ -24,12 +24,16 @@ class PrintError(TrackerError):
 
 
 def one_file(
-    history: Records, accepted: Sequence[Accepted] = (), title: str = "", home_page: str = ""
+    history: Records,
+    accepted: Sequence[Accepted] = (),
+    title: str = "",
+    home_page: str = "",
+    colour: str = "",
 ) -> str:
     """The newest night's document as one HTML file: style inside, no script, no reference to another file."""
     with tempfile.TemporaryDirectory() as folder:
         site = Path(folder) / "site"
-        publish(history, site, accepted, None, title, home_page)
+        publish(history, site, accepted, None, title, home_page, colour=colour)
         document = site / "document.html"
         if not document.exists():
             raise PrintError("no night is recorded yet; record one with: tracker run")

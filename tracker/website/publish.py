@@ -26,6 +26,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website import data_files, feed, judged_nights
 from spook_tracker.tracker.website.causes import causes_of
+from spook_tracker.tracker.website.colours import accent
 from spook_tracker.tracker.website.comparisons import (
     FILE,
     Comparisons,
@@ -96,11 +97,12 @@ def publish(
     title: str = "",
     home_page: str = "",
     mutants: Sequence[Mutant] = (),
+    colour: str = "",
 ) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
-    the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is. `mutants` are
+    the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links and buttons: ColourError if it cannot be read. `mutants` are
     engines that were wrong on purpose, and who noticed. What cannot be made says so in its place,
     and everything else is published.
     """
@@ -112,7 +114,11 @@ def publish(
     made = environment(templates)
     told = book(history, accepted)
     failed: list[str] = []
-    whose = {"site_title": clean(title) or TITLE, "home_page": web_address(home_page)}
+    whose = {
+        "site_title": clean(title) or TITLE,
+        "home_page": web_address(home_page),
+        "accent": accent(colour),
+    }
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
