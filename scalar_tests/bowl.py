@@ -10,6 +10,7 @@ import numpy as np
 from spook_tracker.engine import (
     PLAIN,
     AngularVelocity,
+    Final,
     Material,
     Method,
     Position,
@@ -22,7 +23,9 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -30,6 +33,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -52,7 +56,7 @@ def facet(count: int) -> tuple[float, float]:
 
 
 @functools.cache
-def scene(count: int = FACETS) -> Scene:
+def scene(count: int = FACETS, friction: float = FRICTION) -> Scene:
     """A trough whose cross-section is an arc of chords, and a ball at rest on one of them."""
     width, angle = facet(count)
     arc = [
@@ -64,7 +68,7 @@ def scene(count: int = FACETS) -> Scene:
     faces = tuple(
         face for k in range(count) for face in ((k, k + 1, back + k + 1), (k, back + k + 1, back + k))
     )
-    rough = Material(friction=FRICTION)
+    rough = Material(friction=friction)
     path = BOWL * math.cos(0.5 * width) - BALL  # m, from the bowl's axis to the way of the ball's centre
     bowl = RigidBody(
         name="bowl",
@@ -81,6 +85,29 @@ def scene(count: int = FACETS) -> Scene:
         material=rough,
     )
     return Scene(bodies=(bowl, ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+LEAST = (
+    2.0 / 7.0 * math.tan(facet(FACETS)[1])
+)  # µ of the first facet: 2/7 of the slope's pull spin the ball up
+
+
+def rolls(simulate: Simulate, friction: float) -> bool:
+    """Whether the ball rolls down half of its first facet without slip."""
+    observe: dict[str, Observable] = {
+        "v": Final(quantity=Velocity("ball")),
+        "w": Final(quantity=AngularVelocity("ball")),
+    }
+    result = simulate(scene(friction=friction), time_step=TIME_STEP, steps=100, observe=observe)
+    if not result.completed:
+        return False
+    slip = np.linalg.norm(result["v"]) - BALL * np.linalg.norm(result["w"])
+    return bool(abs(float(slip)) < 1e-6)
+
+
+def slippery(simulate: Simulate) -> BreakPoint:
+    """The least friction on which the ball rolls."""
+    return break_point(functools.partial(rolls, simulate), 4.0 * LEAST, 0.3 * LEAST, resolution=1e-3)
 
 
 def rolled(times: np.ndarray, count: int = FACETS) -> np.ndarray:
@@ -259,6 +286,20 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP, duration=4.0),
     figures=(Figure(name="swing", title="A ball in a bowl", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="least-friction",
+            title="Least friction on which the ball rolls down its first facet",
+            configuration="plain",
+            definition="after 100 steps the centre goes as fast as it rolls",
+            study=slippery,
+            unit="1",
+            better="smaller",
+            expected=(0.999 * LEAST, 1.002 * LEAST),
+            expected_source="2/7 of the pull along the slope spins the ball up: µ = 2/7 tan α = 0.0277, to the resolution of the "
+            "search; what rolls in a hollow has nothing else to break",
+        ),
+    ),
     ladders=(
         Ladder(
             name="place",

@@ -13,6 +13,7 @@ from scipy.optimize import linprog
 
 from spook_tracker.engine import RigidBody
 from spook_tracker.scalar_tests import (
+    bowl,
     card_house,
     grain,
     hanging_cable,
@@ -430,3 +431,18 @@ def least_friction_of_a_house(storeys: int) -> float:
 @pytest.mark.parametrize("storeys", [1, 2, 3, 5, 12])
 def test_a_house_of_cards_needs_the_friction_that_no_sharing_of_forces_undercuts(storeys: int) -> None:
     assert card_house.need(storeys) == pytest.approx(least_friction_of_a_house(storeys), rel=1e-9)
+
+
+def test_what_rolls_needs_the_friction_that_spins_it_up_or_bends_its_way() -> None:
+    slope = bowl.facet(bowl.FACETS)[1]
+    # m a = m g sin α − F, ⅖ m r² a/r = F r: two equations; the floor presses with m g cos α.
+    _, force = np.linalg.solve(np.array(((1.0, 1.0), (0.4, -1.0))), (9.81 * math.sin(slope), 0.0))
+    assert force / (9.81 * math.cos(slope)) == pytest.approx(bowl.LEAST, rel=1e-12)
+    motion = rolling_coin.COIN
+    places = [motion.circle * np.exp(1j * motion.rate * t) for t in (-1e-4, 0.0, 1e-4)]
+    bent = abs(places[0] - 2.0 * places[1] + places[2]) / 1e-8
+    assert bent / rolling_coin.GRAVITY == pytest.approx(rolling_coin.LEAST, rel=1e-5)
+    low, high = next(s.expected for s in CATALOGUE["rolling_coin"].stability) or (math.nan, math.nan)
+    assert 0.5 * (high - low) / rolling_coin.LEAST == pytest.approx(
+        abs(motion.spin) * rolling_coin.step(motion), rel=1e-9
+    )
