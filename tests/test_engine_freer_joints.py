@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,13 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Orientation,
+    Particle,
     Planar,
     PointOnLine,
     Position,
     RigidBody,
     Scene,
+    SceneError,
     Trace,
     Violation,
     recorded_joints,
@@ -145,3 +148,47 @@ def test_other_engines_are_not_asked_for_what_they_lack() -> None:
     assert unsupported(able, masses(), {}) == ("the joint wire",)
     assert "the joint relation" in unsupported(able, pair(), {})
     assert unsupported(able, hung(strength=1.0), {}) == ("a joint that breaks", "functions of time")
+
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "no direction": ({"axis": (0.0, 0.0, 0.0)}, "axis"),
+    "a direction of NaN": ({"axis": (math.nan, 0.0, 1.0)}, "axis"),
+    "an endless direction": ({"axis": (math.inf, 0.0, 1.0)}, "axis"),
+    "two numbers": ({"axis": (0.0, 1.0)}, "axis"),
+    "itself": ({"between": ("body", "body")}, "itself"),
+    "a place": ({"between": ((0.0, 0.0, 0.0), "body")}, "names"),
+    "at two numbers": ({"at": (0.0, 0.0)}, "at"),
+    "at NaN": ({"at": (0.0, 0.0, math.nan)}, "at"),
+    "less than soft": ({"compliance": -1e-9}, "compliance"),
+    "as many as none": ({"compliance": (0.0,) * 6}, "compliance"),
+    "damping of NaN": ({"damping": math.nan}, "damping"),
+    "no strength": ({"strength": 0.0}, "strength"),
+    "no name": ({"name": ""}, "name"),
+}
+
+
+@pytest.mark.parametrize("kind", [PointOnLine, Cylindrical, Planar])
+@pytest.mark.parametrize("what", BAD)
+def test_what_cannot_be_is_refused_in_a_sentence_that_names_it(kind: Any, what: str) -> None:
+    fields, word = BAD[what]
+    with pytest.raises(SceneError, match=word) as caught:
+        kind(**({"name": "guide", "between": (WORLD, "body")} | fields))
+    assert "\n" not in str(caught.value)
+    if "name" not in fields:
+        assert "'guide'" in str(caught.value) and kind.kind in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [PointOnLine, Cylindrical, Planar])
+@pytest.mark.parametrize(
+    ("other", "word"), [("ghost", "'ghost'"), ("dot", "particle"), ("wall", "neither end can move")]
+)
+def test_an_end_that_cannot_be_held_is_refused(kind: Any, other: str, word: str) -> None:
+    bodies = (
+        RigidBody(name="body", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)),
+        RigidBody(name="wall", motion="static", position=(1.0, 0.0, 0.0)),
+        Particle(name="dot", mass=1.0, position=(0.0, 1.0, 0.0)),
+    )
+    joint = kind(name="guide", between=(WORLD, other))
+    with pytest.raises(SceneError, match=word) as caught:
+        Scene(bodies=bodies, constraints=(joint,))
+    assert "'guide'" in str(caught.value) and "\n" not in str(caught.value)

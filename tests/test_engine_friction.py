@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -99,6 +100,27 @@ def test_t11_a_slip_compliance_creeps_by_gamma_times_force() -> None:
     assert np.linalg.norm(v[-1]) == pytest.approx(
         2.0 * gamma * one / 4.0, rel=1e-6
     )  # gammas of both surfaces add
+
+
+@pytest.mark.parametrize("solver", ["direct", "hybrid", "iterative"])
+@pytest.mark.parametrize("viscosity", [0.5, 20.0])
+def test_viscous_friction_is_a_force_as_large_as_the_slip(solver: Any, viscosity: float) -> None:
+    """F = c v of each of four points, 1/c both surfaces' together, under a friction that is never reached; a step takes it at
+    its end, v₊ = v/(1 + 4 c h/m), which is e^(−4ct/m) to first order."""
+    oil = Material(friction=1e6, slip_compliance=0.5 / viscosity)
+    scene = slope(0.0, 0.0, oil)
+    pushed = replace(scene, bodies=(scene.bodies[0], replace(scene.bodies[1], velocity=(0.3, -0.4, 0.0))))
+    observe = {"v": Trace(quantity=Velocity("box")), "f": Trace(quantity=ContactForce("box"))}
+    result = simulate(
+        pushed, time_step=H, steps=60, observe=observe, method=Method(solver=solver, iterations=2000)
+    )
+    v, drag = result["v"], 4.0 * viscosity
+
+    slower = (1.0 + drag * H / MASS) ** -np.arange(61.0)
+    np.testing.assert_allclose(v[:, :2], np.outer(slower, (0.3, -0.4)), atol=1e-9)
+    np.testing.assert_allclose(result["f"][1:, :2], -drag * v[1:, :2], atol=1e-6)
+    exact = np.exp(-drag * H / MASS * np.arange(61.0))
+    assert np.abs(slower - exact).max() < 0.5 * drag * H / MASS * math.exp(-1.0) * 1.1  # ½ (c h/m) · x e^(−x)
 
 
 def test_friction_of_two_materials_is_their_geometric_mean() -> None:

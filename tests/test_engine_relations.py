@@ -97,6 +97,27 @@ def test_a_rack_and_a_screw_turn_a_push_into_a_turn() -> None:
         assert state["pinion"][12] == pytest.approx(-a / coefficient, rel=1e-8)
 
 
+@pytest.mark.parametrize(("near", "far"), [(0.3, 0.1), (0.1, 0.4)])
+def test_a_belt_turns_both_pulleys_the_same_way_and_pulls_with_one_force(near: float, far: float) -> None:
+    """r₁ φ₁ = r₂ φ₂, whatever lies between: I₁ a₁ = T − r₁ S, I₂ a₂ = r₂ S, S the pull of one side over the other."""
+    belt = Relation(name="belt", terms=(("near axle", near), ("far axle", -far)), compliance=0.0)
+    scene = Scene(
+        bodies=(rotor("near", 1.0), rotor("far", 2.0)),
+        constraints=(axle("near"), axle("far"), belt),
+        forces=(Load(name="push", body="near", torque=(0.0, 0.0, 1e-3)),),
+    )
+    observe = {"pull": Final(quantity=ConstraintForce("belt"))}
+    result = simulate(scene, time_step=H, steps=100, observe=observe)
+    moments = (scene.bodies[0].inertia[2], scene.bodies[1].inertia[2])
+    first, pull = np.linalg.solve(
+        np.array(((moments[0], near), (moments[1] * near / far, -far))), (1e-3, 0.0)
+    )
+    w = result.final_state["near"][12], result.final_state["far"][12]
+
+    assert w == pytest.approx((100 * H * first, 100 * H * first * near / far), rel=1e-8)
+    assert abs(float(result["pull"])) == pytest.approx(pull, rel=1e-7)
+
+
 def test_a_differential_gives_both_sides_half_the_torque() -> None:
     wheels = (rotor("left", 1.0), rotor("right", 2.0, 1.0), rotor("cage", 0.5, 2.0))
     relation = Relation(
