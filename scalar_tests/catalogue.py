@@ -71,6 +71,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "seams": "seams",
     "grasp": "grasp",
     "hanging_cable": "hanging_cable",
+    "taut_rope": "taut_rope",
     "rope": "rope",
     "falling_chain": "falling_chain",
     "rocking_block": "rocking_block",

@@ -1,12 +1,9 @@
-"""Does a cable of rigid links hang in its catenary, pull as statics says, and carry waves at √(T/ρ)?"""
+"""Does a cable of rigid links hang in its catenary, and pull at its ends as statics says?"""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import Any
-
-import numpy as np
 
 from spook_tracker.engine import (
     PLAIN,
@@ -15,17 +12,14 @@ from spook_tracker.engine import (
     Capsule,
     ConstraintForce,
     Final,
-    Load,
     MaximumAbsolute,
     Method,
     Position,
-    Prismatic,
     Result,
     RigidBody,
     Scene,
-    Trace,
 )
-from spook_tracker.scalar_tests.bracket import break_count, break_point
+from spook_tracker.scalar_tests.bracket import break_count
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -48,9 +42,6 @@ DURATION = 1.0  # s
 # Links, and a step that carries them: a pull along a link acts across it where the step starts, an explicit spring whose
 # fastest swing must turn by less than half a turn a step, h ω < 2.
 ASKED = ((10, TIME_STEP), (25, TIME_STEP), (50, TIME_STEP / 4.0))
-PULL, PIECES = 50.0, 20  # N, links of the taut rope, the same rope as the cable
-SWAY = 1e-4  # m, of its modes
-MODES = (1, 2, 3)
 
 
 def angles(count: int, pull: float) -> list[float]:
@@ -123,115 +114,13 @@ def smoothing(count: int) -> float:
     return float(further / (2.0 * a * (math.asinh(half / a) - half / a / math.sqrt(bent))))
 
 
-@functools.cache
-def taut(mode: int, count: int = PIECES, pull: float = PULL, sway: float = SWAY) -> Scene:
-    """Links of the same rope in a row, bent into a mode and at rest, drawn by `pull` at a slide of a link's mass."""
-    length, mass = LENGTH / count, MASS / count
-    bent = [sway * math.sin(mode * math.pi * k / count) for k in range(count + 1)]
-    rods, joints, x = [], [], 0.0
-    for k in range(count):
-        along = math.sqrt(length**2 - (bent[k + 1] - bent[k]) ** 2)
-        turn = 0.5 * (0.5 * math.pi - math.atan2(bent[k + 1] - bent[k], along))
-        rods.append(
-            RigidBody(
-                name=f"link {k}",
-                mass=mass,
-                shape=Capsule(0.02, length - 0.04),
-                inertia=(mass * length**2 / 12.0, mass * length**2 / 12.0, 1e-5),
-                position=(x + 0.5 * along, 0.0, 0.5 * (bent[k] + bent[k + 1])),
-                orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
-            )
-        )
-        before = WORLD if k == 0 else f"link {k - 1}"
-        joints.append(
-            Ball(name=f"joint {k}", between=(before, f"link {k}"), at=(x, 0.0, bent[k]), compliance=0.0)
-        )
-        x += along
-    end = RigidBody(name="slide", mass=mass, inertia=(mass,) * 3, position=(x, 0.0, bent[count]))
-    last = Ball(name="end", between=(f"link {count - 1}", "slide"), at=(x, 0.0, bent[count]), compliance=0.0)
-    guide = Prismatic(name="guide", between=(WORLD, "slide"), axis=(1.0, 0.0, 0.0), compliance=0.0)
-    return Scene(
-        bodies=(*rods, end),
-        constraints=(*joints, last, guide),
-        forces=(Load(name="pull", body="slide", force=(pull, 0.0, 0.0)),),
-        contacts=False,
-    )
-
-
-def rate(mode: int, count: int = PIECES, pull: float = PULL) -> float:
-    """ω of a mode of taut links [rad/s]: T/l (2 − 2 cos θ) against m/3 (2 + cos θ), θ = π mode/links."""
-    turn = math.cos(math.pi * mode / count)
-    return math.sqrt(6.0 * pull * count**2 / (MASS * LENGTH) * (1.0 - turn) / (2.0 + turn))
-
-
-def discrete(frequency: float, time_step: float) -> float:
-    """What the step makes of it [rad/s]: cos φ = 1 − (h ω)²/2."""
-    return math.acos(1.0 - 0.5 * (time_step * frequency) ** 2) / time_step
-
-
-def swing(simulate: Simulate, mode: int, time_step: float, method: Method = PLAIN) -> float:
-    """Frequency of a mode [rad/s] over a second: x₊ + x₋ = 2 x cos φ, by least squares."""
-    observe = {"x": Trace(quantity=Position())}
-    result = simulate(taut(mode), time_step=time_step, duration=DURATION, method=method, observe=observe)
-    shape = np.sin(mode * math.pi * (np.arange(PIECES) + 0.5) / PIECES)
-    x: Any = result["x"][:, :PIECES, 2] @ shape
-    inner = x[1:-1]
-    return math.acos(0.5 * float(inner @ (x[2:] + x[:-2])) / float(inner @ inner)) / time_step
-
-
-def wave(simulate: Simulate) -> dict[str, float]:
-    """The first modes of the taut rope."""
-    found = {mode: swing(simulate, mode, TIME_STEP) for mode in MODES}
-    return {
-        "mode_error": max(abs(one / discrete(rate(mode), TIME_STEP) - 1.0) for mode, one in found.items()),
-        "speed_error": found[1] * LENGTH / math.pi / math.sqrt(PULL * LENGTH / MASS) - 1.0,
-    }
-
-
-def pulsing() -> float:
-    """Relative change of the pull by the sway of the highest mode asked for: the end comes in by A²κ²L/4 (1 + cos 2ωt),
-    which pulls at the rope's mass and at the slide's."""
-    slope = MODES[-1] * math.pi * SWAY / LENGTH
-    return (1.0 + 1.0 / PIECES) * 0.5 * (slope * MODES[-1] * math.pi) ** 2
-
-
-def wave_error(simulate: Simulate, time_step: float, method: Method) -> float:
-    """Relative error of the third mode's frequency."""
-    return swing(simulate, 3, time_step, method) / rate(3) - 1.0
-
-
-def wave_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(taut(3), time_step=time_step, duration=DURATION, method=method)
-
-
-def tightest() -> float:
-    """The pull [N] at which the fastest swing of ten links turns by half a turn a step: h ω = 2."""
-    return (2.0 / (TIME_STEP * rate(9, 10, 1.0))) ** 2
-
-
-def stays(result: Result, allowed: float) -> bool:
-    """Whether nothing has moved by more than `allowed` [m]."""
-    return result.completed and float(result["x"].max()) < allowed
-
-
-def strongest(simulate: Simulate) -> BreakPoint:
-    """The largest pull under which ten links stay straight."""
-    observe = {"x": MaximumAbsolute(quantity=Position(), from_start=True)}
-
-    def straight(pull: float) -> bool:
-        asked = taut(9, 10, pull, 1e-7)
-        return stays(simulate(asked, time_step=TIME_STEP, steps=200, observe=observe), 1e-4)
-
-    return break_point(straight, 0.4 * tightest(), 2.0 * tightest(), resolution=0.005)
-
-
 def finest(simulate: Simulate) -> BreakPoint:
     """The largest number of links whose cable hangs still at 1/60 s."""
     observe = {"x": MaximumAbsolute(quantity=Position(), from_start=True)}
 
     def still(count: int) -> bool:
-        return stays(simulate(scene(count), time_step=TIME_STEP, steps=300, observe=observe), 1e-6)
+        result = simulate(scene(count), time_step=TIME_STEP, steps=300, observe=observe)
+        return result.completed and float(result["x"].max()) < 1e-6
 
     return break_count(still, (10, 20, 40, 80))
 
@@ -318,20 +207,15 @@ def _asked(count: int, time_step: float) -> Measurement:
     )
 
 
-FASTER = ((math.pi / PIECES) ** 2 + (TIME_STEP * rate(1)) ** 2) / 24.0
-
 TEST = ScalarTest(
     title="Hanging cable",
-    question="Does a cable of rigid links hang in its catenary, pull as statics says, and carry waves at √(T/ρ)?",
-    why="A cable's pull comes from its shape alone: joints that give way, or forces that leak along the chain, change it. "
-    "Drawn tight it carries waves, whose speed is its pull over its mass.",
-    model="Thin uniform rods on ball joints hang between two points of the same height, at rest where statics puts them. "
-    "The same rope, drawn tight without gravity, is bent by 0.1 mm into one of its first three modes and let go.",
+    question="Does a cable of rigid links hang in its catenary, and pull at its ends as statics says?",
+    why="A cable's pull comes from its shape alone: joints that give way, or forces that leak along the chain, change it.",
+    model="Thin uniform rods on ball joints hang between two points of the same height, at rest where statics puts them.",
     parameters=(
         ("span", "8 m"),
         ("cable", "10 m, 5 kg, in 10, 25 and 50 links"),
         ("gravity", "9.81 m/s²"),
-        ("taut rope", "20 links, drawn by 50 N: waves of 10 m/s"),
         (
             "time step",
             "1/60 s; 1/240 s with 50 links, for more than 49 swing by over half a turn in 1/60 s: h ω > 2",
@@ -341,39 +225,13 @@ TEST = ScalarTest(
         "Moments about the middle of link k: tan φ_k = V_k/H, V_k the weight between it and the lowest point.",
         "H follows from the span: Σ l cos φ_k = 8 m. The ends carry half of the weight each.",
         "With ever shorter links it becomes the catenary of length L and span s, as 1/N²: L = 2 a sinh(s/2a), H = a w.",
-        "Taut links in the mode θ = π k/N swing with ω² = 6 T/(m l) (1 − cos θ)/(2 + cos θ), which is √(T/ρ) k π/L and "
-        "θ²/24 more; the step makes cos φ = 1 − (h ω)²/2 of it.",
-        "No step carries h ω > 2: for the shortest waves, ω² = 12 T/(m l), that is T h²/(m l) = 1/3.",
+        "No step carries h ω > 2; the shortest waves of links under tension have ω² = 12 T/(m l).",
     ),
-    reference="Statics of the links (closed form but for H, found by halving); dispersion relation of links and step.",
-    conclusion="Green: joints carry the cable's weight and pull, and waves run as fast as they must. Red: they give way or "
-    "forces are wrong.",
+    reference="Statics of the links (closed form but for H, found by halving).",
+    conclusion="Green: joints carry the cable's weight and pull. Red: they give way or forces are wrong.",
     source="ours; the catenary is J. Bernoulli's problem of 1690",
     measurements=(
         *(_asked(*asked) for asked in ASKED),
-        ask(
-            wave,
-            (
-                error(
-                    "mode_error",
-                    "largest relative error of a frequency against the discrete dispersion relation, modes 1 to 3",
-                    "1",
-                    pulsing(),
-                    "the sway shortens the rope and so pulls at its mass: (π k)² (π k A/L)²/2 of the pull",
-                ),
-                error(
-                    "speed_error",
-                    "speed of the first mode's wave over √(T/ρ), minus one",
-                    "1",
-                    1.01 * FASTER,
-                    f"(π/N)²/24 of the links and (h ω)²/24 of the step, {told(FASTER)} together",
-                    "companion",
-                ),
-            ),
-            "waves of a taut rope",
-            TIME_STEP,
-            "taut",
-        ),
     ),
     example=lambda: Example(scene=scene(10), time_step=TIME_STEP, duration=2.0),
     figures=(Figure(name="shape", title="A hanging cable", draw=draw),),
@@ -389,29 +247,8 @@ TEST = ScalarTest(
             target_error=1e-9,
             target_seconds=0.01,
         ),
-        Ladder(
-            name="wave",
-            description="relative error of the third mode's frequency of the taut rope against that of links",
-            unit="1",
-            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=2.0),),
-            error=wave_error,
-            run=wave_run,
-            target_error=1e-3,
-            target_seconds=0.02,
-        ),
     ),
     stability=(
-        StabilityStudy(
-            name="tightest",
-            title="Largest pull under which a rope of ten links stays straight at 1/60 s",
-            configuration="plain",
-            definition="bent by 1e-7 m into its shortest waves it moves by less than 1e-4 m in 200 steps",
-            study=strongest,
-            unit="N",
-            expected=(0.99 * tightest(), 1.005 * tightest()),
-            expected_source="h ω = 2 of the shortest waves of ten links, to the resolution of the search",
-        ),
         StabilityStudy(
             name="finest",
             title="Most links whose cable hangs still at 1/60 s",

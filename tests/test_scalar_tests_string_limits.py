@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from spook_tracker.scalar_tests import hanging_cable, rope
+from spook_tracker.scalar_tests import hanging_cable, rope, taut_rope
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests.limits import measurement
 
@@ -32,12 +32,12 @@ def across(tensions: Any, mass: float, length: float) -> tuple[Any, Any]:
 
 
 def test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links() -> None:
-    c = hanging_cable
+    c = taut_rope
     stiff, inert = across([c.PULL] * c.PIECES, c.MASS / c.PIECES, c.LENGTH / c.PIECES)
     found = np.sqrt(eigh(stiff[1:-1, 1:-1], inert[1:-1, 1:-1], eigvals_only=True))
     for mode in (*c.MODES, c.PIECES - 1):
         assert c.rate(mode) == pytest.approx(found[mode - 1], rel=1e-9)
-    limits = {m.name: m.limit for m in measurement("hanging_cable", "taut").metrics}
+    limits = {m.name: m.limit for m in measurement("taut_rope", "plain").metrics}
     # One step v₊ = v − h ω² x, x₊ = x + h v₊ turns by φ.
     h, w = c.TIME_STEP, found[0]
     turn = np.angle(np.linalg.eigvals(np.array(((1.0 - (h * w) ** 2, h), (-h * w * w, 1.0))))).max()
@@ -88,11 +88,12 @@ def test_as_many_links_hang_still_as_swing_by_less_than_half_a_turn_a_step() -> 
     low, high = band("hanging_cable", "finest")
     assert c.TIME_STEP * fastest(int(low)) < 2.0 < c.TIME_STEP * fastest(int(high) + 1)
     assert all(step * fastest(count) < 2.0 for count, step in c.ASKED)
-    stiff, inert = across([c.tightest()] * 10, c.MASS / 10, c.LENGTH / 10)
+    t = taut_rope
+    stiff, inert = across([t.tightest()] * 10, t.MASS / 10, t.LENGTH / 10)
     shortest = eigh(stiff[1:-1, 1:-1], inert[1:-1, 1:-1], eigvals_only=True)[-1]
-    assert c.TIME_STEP * math.sqrt(shortest) == pytest.approx(2.0, rel=1e-9)
-    low, high = band("hanging_cable", "tightest")
-    assert low < c.tightest() < high
+    assert t.TIME_STEP * math.sqrt(shortest) == pytest.approx(2.0, rel=1e-9)
+    low, high = band("taut_rope", "tightest")
+    assert low < t.tightest() < high
 
 
 def test_a_rope_spins_as_fast_as_its_shortest_waves_swing_by_half_a_turn_a_step() -> None:
