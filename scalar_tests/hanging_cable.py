@@ -230,9 +230,7 @@ TEST = ScalarTest(
     reference="Statics of the links (closed form but for H, found by halving).",
     conclusion="Green: joints carry the cable's weight and pull. Red: they give way or forces are wrong.",
     source="ours; the catenary is J. Bernoulli's problem of 1690",
-    measurements=(
-        *(_asked(*asked) for asked in ASKED),
-    ),
+    measurements=(*(_asked(*asked) for asked in ASKED),),
     example=lambda: Example(scene=scene(10), time_step=TIME_STEP, duration=2.0),
     figures=(Figure(name="shape", title="A hanging cable", draw=draw),),
     ladders=(

@@ -28,7 +28,6 @@ OPEN = {  # evaluated beside the test from the formula its source states, and fo
     *(("rocking_block", name) for name in ("kept_error", "first_blow_late", "swing_error")),
     *(("slider_crank", name) for name in ("place_error", "torque_error")),
     *(("vehicle", name) for name in ("stopping_error", "stands")),
-    *(("arm_path", name) for name in ("path_error", "fall_error", "held_error")),
     *(("loose_bearing", name) for name in ("place_error", "flight_error", "stuck_error")),
     *(("shaken_block", name) for name in ("after_error", "before_error", "blow_late")),
     ("suspension", "pitch_error"),
@@ -102,7 +101,13 @@ FOUND = {  # test: metric: what finds it again without the engine
     "motor": {"angle_lead": f"{M}.test_the_motor_leads_by_the_sum_of_the_turns_of_its_steps"},
     "double_pendulum": {"angle_error": f"{L}.test_the_double_pendulum_may_be_half_a_step_off"},
     "floating_box": {"period_error": WAVE, "roll_rate_error": METACENTRE, "continuous_error": METACENTRE},
-    "arm_path": {"torque_error": f"{A}.test_torques_of_a_guided_arm_are_two_steps_late_at_most"},
+    "arm_path": {
+        "torque_error": f"{A}.test_torques_of_a_guided_arm_are_two_steps_late_at_most",
+        "path_error": f"{A}.test_an_arm_led_by_torques_strays_as_steps_of_its_joints_do",
+        "fall_error": f"{A}.test_two_weak_joints_fall_as_steps_of_theirs_do",
+        "held_error": f"{A}.test_two_weak_joints_fall_as_steps_of_theirs_do",
+    },
+    "falling_chain": {"sunk": f"{S}.test_an_end_that_turns_comes_in_by_what_its_path_bends_in_a_step"},
     "sinking_sphere": {"swing_error": WAVE},
     "wires": {"drum_error": DRUM},
     "capstan": dict.fromkeys(("speed_error", "sinking_error", "sinking_pull"), WINCH),
@@ -119,9 +124,10 @@ FOUND = {  # test: metric: what finds it again without the engine
     "bowl": dict.fromkeys(("period_error", "smooth_error", "place_error", "slip"), BOWL),
     "hanging_cable": {
         "catenary_error": f"{S}.test_links_pull_less_than_a_smooth_cable_by_the_midpoint_rule",
-        "mode_error": f"{S}.test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links",
-        "speed_error": f"{S}.test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links",
     },
+    "taut_rope": dict.fromkeys(
+        ("mode_error", "speed_error"), f"{S}.test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links"
+    ),
     "rope": {
         "pull_error": TURNING,
         "energy_error": TURNING,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from spook_tracker.scalar_tests import hanging_cable, rope, taut_rope
+from spook_tracker.scalar_tests import falling_chain, hanging_cable, rope, taut_rope
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests.limits import measurement
 
@@ -111,3 +111,13 @@ def test_a_rope_spins_as_fast_as_its_shortest_waves_swing_by_half_a_turn_a_step(
     assert math.sqrt(8.0 / 3.0) / rope.FEW / rope.TIME_STEP == pytest.approx(rope.FASTEST, rel=0.03)
     low, high = band("rope", "fastest")
     assert low < rope.FASTEST < high
+
+
+def test_an_end_that_turns_comes_in_by_what_its_path_bends_in_a_step() -> None:
+    """A part turns about its middle by h v/length, v of a fall from the greatest height: how far its end leaves a line."""
+    c = falling_chain
+    height = c.DROP + c.LINKS * c.LENGTH
+    for configuration, tall, long in (("plain", height, c.LENGTH), ("ragdoll", -c.FLOOR, 0.4)):
+        limits = {m.name: m.limit for m in measurement("falling_chain", configuration).metrics}
+        turn = math.sqrt(2.0 * c.GRAVITY * tall) * c.TIME_STEP / long
+        assert limits["sunk"] == pytest.approx(0.5 * long * (1.0 - math.cos(turn)), rel=0.05)
