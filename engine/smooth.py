@@ -43,7 +43,13 @@ def check_smooth(scene: Scene, method: Method) -> None:
 
 
 def check_wide_rows(scene: Scene, method: Method) -> None:
-    """A relation or wire over more than two moving bodies is a row that only the plain direct solve carries."""
+    """A relation or wire over more than two moving bodies is a row that only plain steps carry."""
+    asked = [f"corrections={method.corrections}"] if method.corrections else []
+    asked += ["half_step_velocities"] if method.half_step_velocities else []
+    asked += ["string_stiffness"] if method.string_stiffness else []
+    asked += [f"composition {method.composition!r}"] if method.composition != "none" else []
+    if not asked:
+        return
     joints = {joint.name: joint for joint in scene.constraints}
     fixed = {body.name for body in scene.bodies if isinstance(body, RigidBody) and body.motion == "static"}
     for row in scene.constraints:
@@ -56,25 +62,10 @@ def check_wide_rows(scene: Scene, method: Method) -> None:
             continue
         if len(held - fixed - {WORLD}) <= 2:
             continue
-        loose = next((f"{_bounded(j)} in {j.name!r}" for j in scene.constraints if _bounded(j)), None)
-        surfaces = [b for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None]
-        beyond = (
-            method.solver != "direct"
-            or method.corrections
-            or method.half_step_velocities
-            or method.string_stiffness
-            or method.composition != "none"
+        raise MethodError(
+            f"method: {row.kind} {row.name!r} ties more than two moving bodies, which only plain steps can do, and "
+            f"here is {asked[0]}; leave that out"
         )
-        why = (
-            loose
-            or ("surfaces that may touch" if scene.contacts and len(surfaces) > 1 else None)
-            or ("a method beyond the plain direct one" if beyond else None)
-        )
-        if why is not None:
-            raise MethodError(
-                f"method: {row.kind} {row.name!r} ties more than two moving bodies, which only plain direct steps of "
-                f"rows that never let go can do, and here is {why}; leave that out"
-            )
 
 
 def check_rigid(scene: Scene, method: Method, touching: bool) -> None:

@@ -1,15 +1,22 @@
 #include "contacts/contact_islands.hpp"
 
 #include <algorithm>
+#include <deque>
 #include <numeric>
 #include <utility>
 
 namespace spook {
 
+void add_ties(const RowBlock& block, std::vector<Islands::Tie>& ties) {
+    ties.push_back({block.first, block.second});
+    for (const Beyond& other : block.beyond)
+        ties.push_back({std::max(block.first, block.second), other.body});
+}
+
 Islands find_islands(const MixedSystem& system) {
     std::vector<Islands::Tie> ties;
     ties.reserve(system.rows.size());
-    for (const RowBlock& block : system.rows) ties.push_back({block.first, block.second});
+    for (const RowBlock& block : system.rows) add_ties(block, ties);
     return find_islands(static_cast<int>(system.mass.size()), ties);
 }
 
@@ -57,6 +64,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     std::vector<std::vector<FrictionPoint>> part_points(islands.count);
     std::vector<int> first_body(islands.count, -1), place(bodies, -1), row_island(system.rows.size()),
         row_place(system.rows.size());
+    std::deque<std::vector<Beyond>> beyond;  // with the places of their bodies
     system.velocity.resize(bodies);
     for (int b = 0; b < bodies; ++b) {
         const int island = islands.of_body[b];
@@ -82,6 +90,10 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         RowBlock& copy = parts[island].rows.back();
         if (copy.first >= 0) copy.first = place[copy.first];
         if (copy.second >= 0) copy.second = place[copy.second];
+        if (copy.beyond.empty()) continue;
+        std::vector<Beyond>& own = beyond.emplace_back(copy.beyond.begin(), copy.beyond.end());
+        for (Beyond& other : own) other.body = place[other.body];
+        copy.beyond = own;
     }
     for (FrictionPoint& point : points) {
         if (!open[row_island[point.block]]) {
@@ -110,9 +122,11 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         if (!open[row_island[k]]) continue;
         const int first = system.rows[k].first, second = system.rows[k].second;
+        const std::span<const Beyond> others = system.rows[k].beyond;
         system.rows[k] = parts[row_island[k]].rows[row_place[k]];
         system.rows[k].first = first;
         system.rows[k].second = second;
+        system.rows[k].beyond = others;
     }
     std::vector<std::size_t> next(islands.count, 0);
     for (FrictionPoint& point : points) {

@@ -18,8 +18,10 @@ struct Islands {
     std::vector<int> of_body;
     int count = 0;
 };
+/// A tie per block of rows, and one for each body beyond its first two: one of the first two always moves by itself.
+void add_ties(const RowBlock& block, std::vector<Islands::Tie>& ties);
 Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties);
-Islands find_islands(const MixedSystem& system);  // a tie per block of rows
+Islands find_islands(const MixedSystem& system);
 
 /// Splits a system into its islands and solves each with a solver of its own, which keeps its analysis as long as
 /// the island does not change. Islands are done in order on one thread: equal input gives equal bits.

@@ -18,6 +18,11 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
         solve_six(factor_six(system.mass[body]), x);
         own += dot(jacobian, x);
     }
+    for (const auto& [body, jacobian] : block.beyond) {
+        Vec6 x = jacobian;
+        solve_six(factor_six(system.mass[body]), x);
+        own += dot(jacobian, x);
+    }
     return own;
 }
 
@@ -35,6 +40,8 @@ double nearly_own(const MixedSystem& system, const RowBlock& block, int i) {
         const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
         for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
     }
+    for (const auto& [body, jacobian] : block.beyond)
+        for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
     return own;
 }
 
@@ -144,7 +151,7 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints,
     const std::size_t bodies = system.mass.size();
     share.assign(bodies, 1.0);
     std::vector<Islands::Tie> ties;
-    for (std::size_t k = 0; k < joints; ++k) ties.push_back({system.rows[k].first, system.rows[k].second});
+    for (std::size_t k = 0; k < joints; ++k) add_ties(system.rows[k], ties);
     for (const Point& point : points_)
         ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
     const Islands islands = find_islands(static_cast<int>(bodies), ties);

@@ -150,7 +150,7 @@ void ContactStage::note_parted(const MixedSystem& parting, std::vector<Islands::
     for (const Touch& touch : touches_)
         if (touch.normal > 0.0 || touch.impact > 0.0)
             ties.push_back({unknown_[touch.contact.first], unknown_[touch.contact.second]});
-    for (const RowBlock& block : parting.rows) ties.push_back({block.first, block.second});
+    for (const RowBlock& block : parting.rows) add_ties(block, ties);
     parting_.velocity = parting.velocity;
     parting_.islands = find_islands(static_cast<int>(parting.mass.size()), ties);
     parting_.grounded.assign(parting_.islands.count, 0);

@@ -328,9 +328,11 @@ ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point
 
 void ContactStage::mark_held(const MixedSystem& system) {
     held_.assign(system.mass.size(), 0);
-    for (const RowBlock& block : system.rows)
+    for (const RowBlock& block : system.rows) {
         for (const int body : {block.first, block.second})
             if (body >= 0) held_[body] = 1;
+        for (const Beyond& other : block.beyond) held_[other.body] = 1;
+    }
 }
 
 /// Velocities of all bodies after a solve; those without rows fly freely.

@@ -69,7 +69,11 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     roots_.clear();
     chained_ = false;
     stamp_ = 0;
-    for (int k = 0; k < joint_count_; ++k) link(k, system.rows[k].first, system.rows[k].second);
+    for (int k = 0; k < joint_count_; ++k) {
+        const RowBlock& rows = system.rows[k];
+        for (const Beyond& other : rows.beyond) join(std::max(rows.first, rows.second), other.body);
+        link(k, rows.first, rows.second);
+    }
 }
 
 int ContactSweeps::add(const SweepContact& given) {
@@ -134,25 +138,25 @@ void ContactSweeps::link(int item, int first, int second) {
     const int body = first >= 0 ? first : second;
     body_of_.push_back(body);
     if (body < 0) return;
-    if (first >= 0 && second >= 0) {
-        int a = root(first), b = root(second);
-        if (a != b) {
-            if (a > b) std::swap(a, b);
-            parent_[b] = a;
-            if (chained_ && head_[b] >= 0) {
-                if (head_[a] >= 0) {
-                    next_[tail_[a]] = head_[b];
-                    roots_.erase(std::find(roots_.begin(), roots_.end(), b));
-                } else {
-                    head_[a] = head_[b];
-                    *std::find(roots_.begin(), roots_.end(), b) = a;
-                }
-                tail_[a] = tail_[b];
-                head_[b] = -1;
-            }
-        }
-    }
+    if (first >= 0 && second >= 0) join(first, second);
     if (chained_) chain(item);
+}
+
+void ContactSweeps::join(int first, int second) {
+    int a = root(first), b = root(second);
+    if (a == b) return;
+    if (a > b) std::swap(a, b);
+    parent_[b] = a;
+    if (!chained_ || head_[b] < 0) return;
+    if (head_[a] >= 0) {
+        next_[tail_[a]] = head_[b];
+        roots_.erase(std::find(roots_.begin(), roots_.end(), b));
+    } else {
+        head_[a] = head_[b];
+        *std::find(roots_.begin(), roots_.end(), b) = a;
+    }
+    tail_[a] = tail_[b];
+    head_[b] = -1;
 }
 
 void ContactSweeps::chain(int item) {

@@ -74,6 +74,7 @@ private:
     void push(const Contact& contact, Vec3 impulse) noexcept;
     int root(int body) noexcept;
     void link(int item, int first, int second);
+    void join(int first, int second);
     void chain(int item);
     void fetch(int item) const noexcept;
     double sweep_island(int root) noexcept;

@@ -136,9 +136,9 @@ bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& 
     if (points.empty() && system.rows.size() <= few_blocks) return false;
     if (std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.row != 1; }))
         return false;  // it knows no friction of turning
-    // Rigid joints need the factor of the whole, not a relief.
+    // Rigid joints need the factor of the whole, not a relief; and its units tie two bodies.
     return std::all_of(system.rows.begin(), system.rows.end(),
-                       [](const RowBlock& block) { return block.lower[0] == 0.0; });
+                       [](const RowBlock& block) { return block.lower[0] == 0.0 && block.beyond.empty(); });
 }
 
 /// Takes over what multipliers and velocities say: who pushes, who sticks, and which way the others slide.
@@ -365,6 +365,8 @@ bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& po
                     missing[block.first][a] += block.first_jacobian[i][a] * block.multiplier[i];
                 if (block.second >= 0)
                     missing[block.second][a] += block.second_jacobian[i][a] * block.multiplier[i];
+                for (const Beyond& other : block.beyond)
+                    missing[other.body][a] += other.jacobian[a] * block.multiplier[i];
             }
     for (const Vec6& part : missing)
         for (const double impulse : part)

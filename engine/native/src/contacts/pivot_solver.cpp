@@ -48,7 +48,11 @@ bool PivotSolver::analyse(const MixedSystem& system) {
     std::vector<Pattern> pattern(system.rows.size());
     for (std::size_t k = 0; k < pattern.size(); ++k)
         pattern[k] = {system.rows[k].first, system.rows[k].second, system.rows[k].size};
-    if (bodies == bodies_ && pattern == pattern_) return false;
+    std::vector<int> beyond;
+    for (std::size_t k = 0; k < pattern.size(); ++k)
+        for (const Beyond& other : system.rows[k].beyond)
+            beyond.push_back(static_cast<int>(k)), beyond.push_back(other.body);
+    if (bodies == bodies_ && pattern == pattern_ && beyond == beyond_) return false;
 
     std::vector<int> sizes(bodies, 6);
     std::vector<std::uint8_t> is_constraint(bodies, 0);
@@ -64,12 +68,18 @@ bool PivotSolver::analyse(const MixedSystem& system) {
         if (pattern[k].second >= 0)
             second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
     }
+    beyond_edge_.clear();
+    for (std::size_t k = 0; k < beyond.size(); k += 2) {
+        beyond_edge_.push_back(static_cast<int>(edges.size()));
+        edges.push_back({beyond[k + 1], bodies + beyond[k]});
+    }
     bodies_ = -1;  // until the analysis is whole
     matrix_.analyse(sizes, edges, is_constraint);
     ++analyses_;
     last_ = {};
     bodies_ = bodies;
     pattern_ = std::move(pattern);
+    beyond_ = std::move(beyond);
     factored_ = false;
     solution_.assign(matrix_.unknowns(), 0.0);
     residual_.assign(matrix_.unknowns(), 0.0);
@@ -106,6 +116,11 @@ void PivotSolver::measure(const MixedSystem& system) {
                 solve_six(mass_factor[block.second], x);
                 own += dot(block.second_jacobian[i], x);
             }
+            for (const Beyond& other : block.beyond) {
+                Vec6 x = other.jacobian;
+                solve_six(mass_factor[other.body], x);
+                own += dot(other.jacobian, x);
+            }
             bounded_.push_back({static_cast<int>(k), i, own});
         }
     }
@@ -113,6 +128,7 @@ void PivotSolver::measure(const MixedSystem& system) {
 
 bool PivotSolver::factor(const MixedSystem& system) {
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
+    std::size_t beyond = 0;
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         const int n = block.size;
@@ -126,6 +142,10 @@ bool PivotSolver::factor(const MixedSystem& system) {
             double* coupling = matrix_.coupling(edge);
             for (int a = 0; a < 6; ++a)
                 for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? jacobian[i][a] : 0.0;
+        }
+        for (const Beyond& other : block.beyond) {
+            double* coupling = matrix_.coupling(beyond_edge_[beyond++]);
+            for (int a = 0; a < 6; ++a) coupling[a] = is_free(block, 0) ? other.jacobian[a] : 0.0;
         }
     }
     factored_free_.resize(bounded_.size());
@@ -187,6 +207,7 @@ void PivotSolver::solve_free(MixedSystem& system, bool refined) {
         for (int a = 0; a < 6; ++a) {
             if (block.first >= 0) right_[6 * block.first + a] += block.first_jacobian[i][a] * z;
             if (block.second >= 0) right_[6 * block.second + a] += block.second_jacobian[i][a] * z;
+            for (const Beyond& other : block.beyond) right_[6 * other.body + a] += other.jacobian[a] * z;
         }
     }
     state_ = right_;

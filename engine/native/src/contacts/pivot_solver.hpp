@@ -76,6 +76,7 @@ private:
     int bodies_ = -1;
     std::vector<Pattern> pattern_;
     std::vector<int> first_edge_, second_edge_;  // per row block, −1 if there is none
+    std::vector<int> beyond_, beyond_edge_;  // rows over more bodies: block and body of each, and its edge
     std::vector<Bounded> bounded_;
     bool factored_ = false;
     std::vector<std::uint8_t> factored_free_, offends_;  // per bounded row

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace spook {
@@ -21,7 +22,13 @@ inline constexpr double unbounded = std::numeric_limits<double>::infinity();
 /// Where a row stands in the complementarity problem; kept from step to step as a warm start.
 enum class RowState : signed char { at_lower = -1, free = 0, at_upper = 1 };
 
-/// Up to six rows between two moving bodies (or one: `second` or `first` is −1).
+/// A body beyond the first two of a row that ties several.
+struct Beyond {
+    int body = 0;  // index into MixedSystem::mass
+    Vec6 jacobian{};
+};
+
+/// Up to six rows between two moving bodies (or one: `second` or `first` is −1), or one row over any number.
 struct RowBlock {
     int first = -1, second = -1;  // indices into MixedSystem::mass; −1 does not move
     int size = 1;
@@ -32,6 +39,7 @@ struct RowBlock {
     Vec6 upper{unbounded, unbounded, unbounded, unbounded, unbounded, unbounded};
     Vec6 multiplier{};  // z: the start of an iteration, then the result
     std::array<RowState, 6> state{};
+    std::span<const Beyond> beyond;  // whoever fills the rows keeps what it shows
 };
 
 /// Indices of bodies are those of moving bodies only; bodies that do not move appear in the rows' right sides.
@@ -51,6 +59,7 @@ inline double row_velocity(const RowBlock& block, int i, const std::vector<Vec6>
     double sum = 0.0;
     if (block.first >= 0) sum += dot(block.first_jacobian[i], velocity[block.first]);
     if (block.second >= 0) sum += dot(block.second_jacobian[i], velocity[block.second]);
+    for (const Beyond& other : block.beyond) sum += dot(other.jacobian, velocity[other.body]);
     return sum;
 }
 

@@ -21,14 +21,21 @@ struct SweepRow {
     double softness = 0.0, right = 0.0, lower = 0.0, upper = 0.0, multiplier = 0.0;
 };
 
+/// A body beyond the first two of a row.
+struct SweepBeyond {
+    int body = 0;
+    Vec6 row, push;  // G, M⁻¹ Gᵀ
+};
+
 /// One block of rows, and what is solved together in it.
 struct SweepBlock {
     enum class Kind : unsigned char { bilateral, bounded, contact } kind = Kind::bounded;
-    int first = 0, second = 0;   // bodies
-    int row = 0, size = 0;       // rows_[row] … rows_[row + size)
-    int point = -1, end = -1;    // its friction points, one behind the other
-    int factor = -1;             // of a bilateral block, in factors_
-    double step[3] = {0, 0, 0};  // of these: 1/lambda_max of their own part
+    int first = 0, second = 0;       // bodies
+    int row = 0, size = 0;           // rows_[row] … rows_[row + size)
+    int point = -1, end = -1;        // its friction points, one behind the other
+    int factor = -1;                 // of a bilateral block, in factors_
+    double step[3] = {0, 0, 0};      // of these: 1/lambda_max of their own part
+    int beyond = 0, beyond_end = 0;  // of its one row, in beyond_
 };
 
 /// Lays a system out for sweeping: rows one behind the other, velocities in one array. Memory is kept from use to
@@ -48,6 +55,7 @@ public:
         velocity_[bodies] = Vec6{};
         rows_.clear();
         factors_.clear();
+        beyond_.clear();
         blocks_.assign(system.rows.size(), {});
         for (std::size_t k = 0; k < points.size(); ++k) {
             SweepBlock& block = blocks_[points[k].block];
@@ -117,6 +125,14 @@ private:
             row.upper = given.upper[i];
             row.multiplier = given.multiplier[i];
             row.own = schur(row, row) + row.softness;
+            block.beyond = static_cast<int>(beyond_.size());
+            for (const Beyond& other : given.beyond) {
+                SweepBeyond& far =
+                    beyond_.emplace_back(SweepBeyond{other.body, other.jacobian, other.jacobian});
+                solve_six(mass_factor_[other.body], far.push);
+                row.own += dot(far.row, far.push);
+            }
+            block.beyond_end = static_cast<int>(beyond_.size());
             bilateral = bilateral && row.lower == -unbounded && row.upper == unbounded;
         }
         if (block.point >= 0) {
@@ -147,14 +163,19 @@ private:
     }
 
     double residual(const SweepBlock& block, const SweepRow& row) const noexcept {
-        return dot(row.first, velocity_[block.first]) + dot(row.second, velocity_[block.second]) +
-               row.softness * row.multiplier - row.right;
+        double left = dot(row.first, velocity_[block.first]) + dot(row.second, velocity_[block.second]) +
+                      row.softness * row.multiplier - row.right;
+        for (int k = block.beyond; k < block.beyond_end; ++k)
+            left += dot(beyond_[k].row, velocity_[beyond_[k].body]);
+        return left;
     }
 
     void push(const SweepBlock& block, const SweepRow& row, double impulse) noexcept {
         Vec6 &v = velocity_[block.first], &w = velocity_[block.second];
         for (int a = 0; a < 6; ++a) v[a] += row.first_push[a] * impulse;
         for (int a = 0; a < 6; ++a) w[a] += row.second_push[a] * impulse;
+        for (int k = block.beyond; k < block.beyond_end; ++k)
+            for (int a = 0; a < 6; ++a) velocity_[beyond_[k].body][a] += beyond_[k].push[a] * impulse;
     }
 
     double update_row(const SweepBlock& block, SweepRow& row) noexcept {
@@ -221,6 +242,7 @@ private:
     std::vector<Mat6> mass_factor_, factors_;
     std::vector<Vec6> velocity_;
     std::vector<SweepRow> rows_;
+    std::vector<SweepBeyond> beyond_;
     std::vector<SweepBlock> blocks_;
 };
 

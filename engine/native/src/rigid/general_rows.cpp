@@ -35,6 +35,10 @@ JointSet::General JointSet::general_of(const RigidScene& scene, const JointSpec&
         const Vec3 centre = end.body < 0 ? end.point : scene.bodies[end.body].position;
         general.points.push_back({end.body, end.point, end.point - centre});
     }
+    // A row over several begins with bodies that move by themselves: one of them stands for it in its island.
+    if (general.bodies.size() > 2)
+        std::stable_partition(general.bodies.begin(), general.bodies.end(),
+                              [&](int body) { return scene.bodies[body].motion == Motion::dynamic; });
     return general;
 }
 

@@ -86,6 +86,8 @@ double RigidSystem::taken(const std::vector<int>& members, const std::vector<int
             double speed = row_velocity(block, i, mixed_.velocity);
             if (block.first >= 0) speed += dot(block.first_jacobian[i], velocities_[tied_[block.first]]);
             if (block.second >= 0) speed += dot(block.second_jacobian[i], velocities_[tied_[block.second]]);
+            for (const Beyond& other : block.beyond)
+                speed += dot(other.jacobian, velocities_[tied_[other.body]]);
             work += 0.5 * block.multiplier[i] * speed;
         }
         sum += std::max(0.0, work);
@@ -149,6 +151,9 @@ void RigidSystem::lead_back() {
     const auto blocks = joints_.blocks();
     for (std::size_t k = 0; k < blocks.size(); ++k)
         ties.push_back({mixed_.rows[k].first, mixed_.rows[k].second});
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+        for (int body : joints_.others(static_cast<int>(k)))
+            if (slot_[body] >= 0) ties.push_back({mixed_.rows[k].first, slot_[body]});
     leading_.islands = spook::find_islands(static_cast<int>(tied_.size()), ties);
     const std::size_t islands = static_cast<std::size_t>(leading_.islands.count);
     leading_.velocity.assign(tied_.size(), Vec6{});
@@ -229,6 +234,7 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
         system.mass.push_back(mixed_.mass[members[i]]);
     }
     system.rows.resize(own_blocks.size());
+    holding_beyond_.resize(blocks.size());
     const LargeArray<JointSet::State> states = joints_.states;
     double last = 0.0;
     for (int round = 0; round < most_rounds; ++round) {
@@ -245,6 +251,10 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
             BlockRight unused;
             joints_.assemble(k, live_.bodies, block.first_jacobian[0].data(), block.second_jacobian[0].data(),
                              unused);
+            if (!joints_.others(k).empty()) {
+                fill_beyond(k, block, unused, holding_beyond_[k]);
+                for (Beyond& other : holding_beyond_[k]) other.body = place[other.body];
+            }
             double now[6];
             joints_.overstep(k, live_.bodies, now);
             for (int row = 0; row < block.size; ++row) {

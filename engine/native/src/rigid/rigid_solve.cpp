@@ -248,13 +248,35 @@ int RigidSystem::busiest_block() const noexcept {
     return worst;
 }
 
+/// The bodies of a row beyond its first two: into it those that move by themselves, of others their speed.
+void RigidSystem::fill_beyond(int block, RowBlock& rows, BlockRight& numbers,
+                              std::vector<Beyond>& beyond) const {
+    beyond.clear();
+    const double* gradient = joints_.other_rows();
+    for (int body : joints_.others(block)) {
+        Beyond other{slot_[body], {}};
+        std::copy_n(gradient, 6, other.jacobian.data());
+        gradient += 6;
+        const BodyState& s = live_.bodies[body];
+        if (other.body >= 0) beyond.push_back(other);
+        else
+            numbers.right[0] -=
+                dot(other.jacobian, {s.velocity.x, s.velocity.y, s.velocity.z, s.angular_velocity.x,
+                                     s.angular_velocity.y, s.angular_velocity.z});
+    }
+    rows.beyond = beyond;
+}
+
 void RigidSystem::fill_rows() {
     const auto blocks = joints_.blocks();
+    beyond_.resize(blocks.size());
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         RowBlock& rows = mixed_.rows[k];
         BlockRight numbers;
         joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
                          rows.second_jacobian[0].data(), numbers);
+        if (!joints_.others(static_cast<int>(k)).empty())
+            fill_beyond(static_cast<int>(k), rows, numbers, beyond_[k]);
         for (int body : {blocks[k].first, blocks[k].second}) {
             if (body < 0 || constants_[body].motion != Motion::kinematic) continue;
             const BodyState& s = live_.bodies[body];

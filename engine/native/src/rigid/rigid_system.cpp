@@ -49,12 +49,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         spare += static_cast<std::size_t>(12 * block.size);
         for (int body : {block.first, block.second})
             if (body >= 0 && constants_[body].moves()) slot_[body] = 0;
-        for (int body : joints_.others(static_cast<int>(spare_at_.size()) - 1)) {
-            if (solver_ != RigidSolver::block || touching)
-                throw std::invalid_argument(
-                    "a row over more than two bodies needs the stage solve_block alone");
+        for (int body : joints_.others(static_cast<int>(spare_at_.size()) - 1))
             if (constants_[body].moves()) slot_[body] = 0;
-        }
     }
     spare_.assign(spare, 0.0);
     for (int body = 0; body < bodies(); ++body)
@@ -75,6 +71,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             joint_pairs.push_back({block.first, block.second});
             yielding.push_back(joints_.has_spring(block) || gives_way(joints_.kind(block.joint)));
         }
+        for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+            for (int body : joints_.others(k)) joint_pairs.push_back({joints_.blocks()[k].first, body});
         for (const RigidBodySpec& spec : scene.bodies) {
             dynamic.push_back(spec.motion == Motion::dynamic);
             materials.push_back(spec.material);

@@ -220,6 +220,7 @@ private:
     void fill_masses();
     void fill_momenta(bool forces);
     void fill_rows();
+    void fill_beyond(int block, RowBlock& rows, BlockRight& numbers, std::vector<Beyond>& beyond) const;
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual);
@@ -322,6 +323,7 @@ private:
     std::vector<std::size_t> spare_at_;
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_;
+    std::vector<std::vector<Beyond>> beyond_, holding_beyond_;  // per block of joints: what its rows show
     PivotSolver pivot_;
     FollowingBounds following_;
     std::optional<ContactStage> contacts_, fresh_contacts_;
