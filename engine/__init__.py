@@ -97,7 +97,7 @@ from spook_tracker.engine.observe import (
     Violation,
 )
 from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.result import Result, SimulationFailed
+from spook_tracker.engine.result import Broken, Result, SimulationFailed
 from spook_tracker.engine.run import Run, Snapshot, start
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import (
@@ -125,6 +125,7 @@ __all__ = [
     "Ball",
     "Body",
     "Box",
+    "Broken",
     "BuildInfo",
     "Capsule",
     "CentralGravity",

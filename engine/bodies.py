@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
-from spook_tracker.engine import check
+from spook_tracker.engine import check, polytope
 from spook_tracker.engine.check import Rotation, Vector
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.shapes import Plane, Shape
-from spook_tracker.engine.time_functions import TimeFunction
+from spook_tracker.engine.time_functions import TimeFunction, at_start, number_or_function
 
 WIDEST_FRICTION = 1000.0  # times, between friction along a direction and across it: thirty for a pair
 WORLD = "world"  # the name that stands for the fixed world at one end of a constraint
@@ -106,9 +108,12 @@ class Material:
 class RigidBody:
     """A body with orientation. Mass and inertia of a dynamic body must be positive.
 
-    `inertia` holds the principal moments [kg m²] about the body axes; None takes those of the shape, of
-    uniform density. A static body never moves; a kinematic one moves with its given velocities whatever
-    pushes it, times its `pace` if that is given; neither needs a mass. `shape` None means the body has no surface and touches nothing.
+    `inertia` holds the moments [kg m²] about the body axes, or is a symmetric 3×3 tensor along them, whose principal
+    moments and axes are then found (Jacobi's rotations, to rounding): `inertia` and `inertia_axes` keep them. None takes
+    that of the shape, of uniform density. A static body never moves; a kinematic one moves with its given velocities whatever
+    pushes it, times its `pace` if that is given (a `spin_pace` is that of the angular velocity alone); or along its
+    `path`, the three coordinates of its place, and by its `angle` about the fixed `angle_axis`: its velocity is that
+    which leads to where they say that the step ends. Neither needs a mass. `shape` None means the body has no surface and touches nothing.
     A surface may move along itself as a conveyor's belt does: `surface_velocity` of whatever lies on it.
     """
 
@@ -116,13 +121,18 @@ class RigidBody:
     position: Vector  # centre of mass, m
     mass: float | None = None  # kg
     shape: Shape | None = None
-    inertia: Vector | None = None  # kg m²
+    inertia: Any = None  # kg m²: a Vector or a Tensor given, a Vector kept
+    inertia_axes: Rotation = (1.0, 0.0, 0.0, 0.0)  # the axes of `inertia` in the body's, a unit quaternion
     orientation: Rotation = (1.0, 0.0, 0.0, 0.0)  # unit quaternion (w, x, y, z), body to world
     velocity: Vector = (0.0, 0.0, 0.0)  # m/s
     angular_velocity: Vector = (0.0, 0.0, 0.0)  # world frame, rad/s
     motion: Literal["dynamic", "static", "kinematic"] = "dynamic"
     material: Material = field(default_factory=Material)
     pace: TimeFunction | None = None  # of a kinematic body: what both velocities are times
+    spin_pace: TimeFunction | None = None  # what its angular velocity is times instead
+    path: tuple[float | TimeFunction, ...] | None = None  # x, y, z, m
+    angle: TimeFunction | None = None  # rad, zero at the start
+    angle_axis: Vector = (0.0, 0.0, 1.0)  # world direction
     surface_velocity: Vector = (0.0, 0.0, 0.0)  # body axes, m/s; only its part along the surface counts
 
     def __post_init__(self) -> None:
@@ -142,11 +152,9 @@ class RigidBody:
             raise SceneError(
                 f"{owner}: only a surface with friction takes things along; give it a shape and friction"
             )
-        object.__setattr__(self, "orientation", check.rotation(owner, "orientation", self.orientation))
-        if self.pace is not None and not isinstance(self.pace, TimeFunction):
-            raise SceneError(f"{owner}: pace must be a Sinusoid, Ramp or Table, not {self.pace!r}")
-        if self.pace is not None and self.motion != "kinematic":
-            raise SceneError(f"{owner}: only a kinematic body has a pace; forces move a dynamic one")
+        for name in ("orientation", "inertia_axes"):
+            object.__setattr__(self, name, check.rotation(owner, name, getattr(self, name)))
+        self._check_motion(owner)
         if self.motion == "static" and (any(self.velocity) or any(self.angular_velocity)):
             raise SceneError(f"{owner}: a static body cannot have a velocity; make it kinematic")
         if self.motion != "static" and self.shape is not None and self.shape.fixed_only:
@@ -163,15 +171,83 @@ class RigidBody:
             if self.shape is None:
                 raise SceneError(f"{owner}: a body without a shape needs an inertia; or use a Particle")
             inertia = self.shape.inertia(self.mass)
-        x, y, z = (
-            check.positive(owner, "inertia", moment) for moment in check.vector(owner, "inertia", inertia)
-        )
+        moments, found = _principal(owner, inertia)
+        x, y, z = (check.positive(owner, "inertia", moment) for moment in moments)
         largest = max(x, y, z)
         if largest > (x + y + z - largest) * (1.0 + 1e-12):
             raise SceneError(
                 f"{owner}: inertia {(x, y, z)} breaks the triangle rule; no mass distribution has it"
             )
         object.__setattr__(self, "inertia", (x, y, z))
+        if found is None:
+            return
+        if self.inertia_axes != (1.0, 0.0, 0.0, 0.0):
+            raise SceneError(f"{owner}: a tensor has its own axes; leave inertia_axes out")
+        object.__setattr__(self, "inertia_axes", found)
+
+    @property
+    def follows_time(self) -> bool:
+        """Whether it is a kinematic body with a motion given as a function of time."""
+        return any(given is not None for given in (self.pace, self.spin_pace, self.path, self.angle))
+
+    def _check_motion(self, owner: str) -> None:
+        for name in ("pace", "spin_pace", "angle"):
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, TimeFunction):
+                raise SceneError(f"{owner}: {name} must be a Sinusoid, Ramp or Table, not {given!r}")
+        for name in ("pace", "spin_pace", "path", "angle"):
+            if getattr(self, name) is not None and self.motion != "kinematic":
+                raise SceneError(f"{owner}: only a kinematic body has a {name}; forces move a dynamic one")
+        object.__setattr__(self, "angle_axis", check.direction(owner, "angle_axis", self.angle_axis))
+        if self.angle is not None:
+            if any(self.angular_velocity) or self.spin_pace is not None:
+                raise SceneError(
+                    f"{owner}: its angle says how it turns; leave its angular velocity and its pace out"
+                )
+            if abs(at_start(self.angle)) > 1e-12:
+                raise SceneError(
+                    f"{owner}: its angle begins at {at_start(self.angle):g} rad instead of 0; turn its orientation"
+                )
+        if self.path is None:
+            return
+        given = tuple(self.path) if isinstance(self.path, Sequence) and not isinstance(self.path, str) else ()
+        if len(given) != 3:
+            raise SceneError(f"{owner}: path must be three numbers or functions of time, not {self.path!r}")
+        path = tuple(number_or_function(owner, "path", place) for place in given)
+        object.__setattr__(self, "path", path)
+        if any(self.velocity) or (self.pace is not None and not any(self.angular_velocity)):
+            raise SceneError(f"{owner}: its path says how it moves; leave its velocity and its pace out")
+        for axis, here, place in zip("xyz", self.position, path, strict=True):
+            if abs(at_start(place) - here) > 1e-9 * max(1.0, abs(here)):
+                raise SceneError(
+                    f"{owner}: its path begins at {axis} = {at_start(place):g} m, but it stands at {here:g} m"
+                )
+
+
+def _principal(owner: str, inertia: Any) -> tuple[Vector, Rotation | None]:
+    """Principal moments, and their axes if they are given as a tensor that is not diagonal."""
+    rows = list(inertia) if isinstance(inertia, Iterable) and not isinstance(inertia, str) else []
+    if len(rows) != 3 or not all(isinstance(row, Iterable) and not isinstance(row, str) for row in rows):
+        return check.vector(owner, "inertia", inertia), None
+    tensor = tuple(check.vector(owner, "inertia", row) for row in rows)
+    size = max(abs(entry) for row in tensor for entry in row)
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        if abs(tensor[i][j] - tensor[j][i]) > 1e-12 * size:
+            raise SceneError(
+                f"{owner}: inertia is not symmetric: {tensor[i][j]:g} in row {i}, column {j}, but {tensor[j][i]:g} in "
+                f"row {j}, column {i}"
+            )
+    if not any(tensor[i][j] for i, j in ((0, 1), (0, 2), (1, 2))):
+        return (tensor[0][0], tensor[1][1], tensor[2][2]), None
+    axes = polytope.principal_axes(tensor)  # type: ignore[arg-type]
+    columns = tuple(zip(*axes, strict=True))
+    moments = tuple(
+        math.fsum(column[i] * tensor[i][j] * column[j] for i in range(3) for j in range(3))
+        for column in columns
+    )
+    if min(moments) <= 1e-14 * size:
+        raise SceneError(f"{owner}: inertia is not positive: its principal moments are {moments}")
+    return moments, check.rotation(owner, "inertia", polytope.quaternion(axes))  # type: ignore[return-value]
 
 
 Body = Particle | RigidBody

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.joints import AxialJoint
+from spook_tracker.engine.joints import AxialJoint, frictions
 from spook_tracker.engine.program import table
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.time_functions import at_start
@@ -15,14 +15,25 @@ from spook_tracker.engine.tyres import Tyre
 
 
 def drives(scene: Scene, step: float) -> dict[str, Any]:
-    """Motors, limits and springs of the free coordinates, each with the index of its joint."""
-    motors, limits, springs = [], [], []
+    """Motors, limits, springs and friction of the free coordinates, each with the index of its joint."""
+    motors, limits, springs, rubbing = [], [], [], []
     for index, joint in enumerate(scene.constraints):
+        constant, load = frictions(joint)
+        if any(constant) or any(load):
+            rubbing.append({"joint": index, "constant": constant, "load": load})
         if not isinstance(joint, AxialJoint):
             continue
         if (motor := joint.motor) is not None:
-            force = or_default(motor.max_force, math.inf)
-            motors.append({"joint": index, "speed": at_start(motor.speed), "max_force": force})
+            pushes = motor.force is not None
+            force = motor.force if motor.force is not None else motor.max_force
+            motors.append(
+                {
+                    "joint": index,
+                    "speed": 0.0 if motor.speed is None else at_start(motor.speed),
+                    "max_force": math.inf if force is None else at_start(force),
+                    "pushes": pushes,
+                }
+            )
         if (limit := joint.limit) is not None:
             limits.append(
                 {
@@ -44,7 +55,12 @@ def drives(scene: Scene, step: float) -> dict[str, Any]:
                     "max_force": or_default(spring.max_force, math.inf),
                 }
             )
-    return {"motors": table(motors), "limits": table(limits), "joint_springs": table(springs)}
+    return {
+        "motors": table(motors),
+        "limits": table(limits),
+        "joint_springs": table(springs),
+        "joint_frictions": table(rubbing),
+    }
 
 
 def couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:

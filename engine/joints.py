@@ -21,7 +21,7 @@ from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import COMPLIANCE, Relation, Wire
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.forces import ORIGIN, End, check_anchors, check_ends
-from spook_tracker.engine.time_functions import TimeFunction, number_or_function
+from spook_tracker.engine.time_functions import TimeFunction, least, number_or_function
 from spook_tracker.engine.tyres import Tyre
 
 PerDegree = float | tuple[float, ...]
@@ -44,6 +44,7 @@ class Distance:
     """
 
     rows: ClassVar[int] = 1
+    kind: ClassVar[str] = "distance"
     name: str
     between: tuple[End, End]
     rest_length: float | None = None  # m
@@ -67,16 +68,30 @@ class Distance:
 class Motor:
     """Drives a joint's free coordinate at a speed, with at most `max_force` [N or N m]; None is unbounded.
 
-    A speed of 0 with a bound is dry friction in the joint.
+    Or it pushes with a `force` [N or N m] whatever the speed: a drive with a torque for its target. It acts on the second
+    body, and back on the first. Exactly one of speed and force is given. Raises SceneError.
     """
 
-    speed: float | TimeFunction  # m/s or rad/s
-    max_force: float | None = None
+    speed: float | TimeFunction | None = None  # m/s or rad/s
+    max_force: float | TimeFunction | None = None
+    force: float | TimeFunction | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "speed", number_or_function("motor", "speed", self.speed))
-        if self.max_force is not None:
-            object.__setattr__(self, "max_force", check.not_negative("motor", "max_force", self.max_force))
+        if (self.speed is None) == (self.force is None):
+            raise SceneError("motor: needs either a speed or a force")
+        if self.force is not None and self.max_force is not None:
+            raise SceneError("motor: max_force bounds what a speed asks for; with a force leave it out")
+        for name in ("speed", "force"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, number_or_function("motor", name, getattr(self, name)))
+        if isinstance(self.max_force, TimeFunction):
+            if least(self.max_force) < 0.0:
+                raise SceneError(
+                    f"motor: max_force must not be negative, and it falls to {least(self.max_force):g}"
+                )
+        elif self.max_force is not None:
+            bound = number_or_function("motor", "max_force", self.max_force)
+            object.__setattr__(self, "max_force", check.not_negative("motor", "max_force", bound))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +151,11 @@ class Joint:
     """
 
     rows: ClassVar[int] = 0
-    kind: ClassVar[str] = "joint"
+    kind: ClassVar[str] = "joint"  # with underscores the native side's name
+    # What it holds, as the native table says it: translations along its axes from the one to before the other, and of
+    # turns none, all ("held"), those of the axis ("swing"), or one of an axis towards another ("cross").
+    holds: ClassVar[tuple[int, int]] = (0, 3)
+    turning: ClassVar[str] = "free"
     name: str
     between: tuple[str, str]
     at: Vector | None = None  # m
@@ -168,6 +187,7 @@ class Lock(Joint):
 
     rows: ClassVar[int] = 6
     kind: ClassVar[str] = "lock"
+    turning: ClassVar[str] = "held"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,12 +200,19 @@ class Ball(Joint):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxialJoint(Joint):
-    """A joint with a free coordinate about or along `axis` (world direction at the start)."""
+    """A joint with a free coordinate about or along `axis` (world direction at the start).
+
+    `friction` [N or N m] holds the coordinate at rest as far as it reaches, and brakes it where it moves, beside whatever
+    drives it. `load_friction` adds its product with the force [N] that the joint's own rows hold: µ of a slide, µ times
+    the radius of an axle. Where surfaces touch, or the solver is iterative, that part follows the load of the step before.
+    """
 
     axis: Vector = (0.0, 0.0, 1.0)
     motor: Motor | None = None
     limit: Limit | None = None
     spring: JointSpring | None = None
+    friction: float = 0.0  # N or N m
+    load_friction: float = 0.0  # 1 or m
 
     def __post_init__(self) -> None:
         Joint.__post_init__(self)
@@ -195,6 +222,8 @@ class AxialJoint(Joint):
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
                 raise SceneError(f"{owner}: {name} must be a {kind.__name__}, not {value!r}")
+        for name in ("friction", "load_friction"):
+            object.__setattr__(self, name, check.not_negative(owner, name, getattr(self, name)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,6 +235,7 @@ class Hinge(AxialJoint):
 
     rows: ClassVar[int] = 5
     kind: ClassVar[str] = "hinge"
+    turning: ClassVar[str] = "swing"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,6 +247,8 @@ class Prismatic(AxialJoint):
 
     rows: ClassVar[int] = 5
     kind: ClassVar[str] = "prismatic"
+    holds: ClassVar[tuple[int, int]] = (1, 3)
+    turning: ClassVar[str] = "held"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,6 +260,7 @@ class Universal(Joint):
 
     rows: ClassVar[int] = 4
     kind: ClassVar[str] = "universal"
+    turning: ClassVar[str] = "cross"
     axis: Vector = (1.0, 0.0, 0.0)
     cross_axis: Vector = (0.0, 1.0, 0.0)
 
@@ -259,17 +292,34 @@ class PointOnLine(GuidedJoint):
 
     rows: ClassVar[int] = 2
     kind: ClassVar[str] = "point on line"
+    holds: ClassVar[tuple[int, int]] = (1, 3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cylindrical(GuidedJoint):
     """Leaves rotation about `axis` and translation along it free.
 
-    Rows: translations along two normals, then rotations about the normals.
+    Rows: translations along two normals, then rotations about the normals. `friction` and `load_friction` as of a slide
+    and of a hinge, for the way along the axis and the turn about it.
     """
 
     rows: ClassVar[int] = 4
     kind: ClassVar[str] = "cylindrical"
+    holds: ClassVar[tuple[int, int]] = (1, 3)
+    turning: ClassVar[str] = "swing"
+    friction: tuple[float, float] = (0.0, 0.0)  # N, N m
+    load_friction: tuple[float, float] = (0.0, 0.0)  # 1, m
+
+    def __post_init__(self) -> None:
+        GuidedJoint.__post_init__(self)
+        for name in ("friction", "load_friction"):
+            given = getattr(self, name)
+            if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
+                raise SceneError(
+                    f"cylindrical {self.name!r}: {name} needs two numbers, along the axis and about it, not {given!r}"
+                )
+            clean = tuple(check.not_negative(f"cylindrical {self.name!r}", name, entry) for entry in given)
+            object.__setattr__(self, name, clean)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -281,6 +331,19 @@ class Planar(GuidedJoint):
 
     rows: ClassVar[int] = 3
     kind: ClassVar[str] = "planar"
+    holds: ClassVar[tuple[int, int]] = (0, 1)
+    turning: ClassVar[str] = "swing"
+
+
+def frictions(joint: object) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Of a joint's slide along its axis and its turn about it: what is constant [N, N m], and the share of the load."""
+    if isinstance(joint, Cylindrical):
+        return joint.friction, joint.load_friction
+    if not isinstance(joint, AxialJoint):
+        return (0.0, 0.0), (0.0, 0.0)
+    if isinstance(joint, Prismatic):
+        return (joint.friction, 0.0), (joint.load_friction, 0.0)
+    return (0.0, joint.friction), (0.0, joint.load_friction)
 
 
 Constraint = Distance | Lock | Ball | Hinge | Prismatic | Universal | GuidedJoint | Relation | Wire | Tyre

@@ -12,7 +12,7 @@ import numpy as np
 from spook_tracker.engine import _core, check
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
-from spook_tracker.engine.result import Array, Result
+from spook_tracker.engine.result import Array, Broken, Result
 
 _REDUCTIONS: dict[type[Observable], str] = {
     Trace: "trace",
@@ -103,6 +103,7 @@ class Program:
         *,
         time_step: float,
         bodies: Sequence[str],
+        joints: Sequence[str] = (),
         observe: Mapping[str, Observable],
         shapes: Sequence[tuple[int, ...]],
     ) -> None:
@@ -111,6 +112,7 @@ class Program:
         self._running = threading.Lock()  # one native state: a second thread waits
         self._choices = tuple(StageChoice(*choice) for choice in native.choices)
         self._bodies = tuple(bodies)
+        self._joints = tuple(joints)
         self._observe = dict(observe)
         self._shapes = tuple(shapes)
         self.time_step = time_step  # s
@@ -175,6 +177,10 @@ class Program:
             stage_seconds=report["stage_seconds"],
             cpu_seconds=report["cpu_seconds"],
             residual=report["residual"],
+            broken=tuple(
+                Broken(joint=self._joints[joint], step=step, time=time, force=force, torque=torque)
+                for joint, step, time, force, torque in report["broken"]
+            ),
         )
 
 

@@ -22,7 +22,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.compiler import NOTHING
 from spook_tracker.engine.errors import EngineError, MethodError
 from spook_tracker.engine.forces import Force, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, frictions
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import (
     ConstraintForce,
@@ -184,6 +184,8 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "friction that differs with the direction"
     if any(body.surface_velocity):
         yield "a surface that moves along itself"
+    if body.inertia_axes != (1.0, 0.0, 0.0, 0.0):
+        yield "principal axes of inertia beside those of the body"
 
 
 def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
@@ -200,6 +202,10 @@ def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
                 yield f"a {name} in a joint"
         if constraint.spring is not None and constraint.spring.max_force is not None:
             yield "a spring of bounded force in a joint"
+        if constraint.motor is not None and constraint.motor.force is not None:
+            yield "a motor of given force in a joint"
+    if any(any(part) for part in frictions(constraint)):
+        yield "friction in a joint"
 
 
 def _has_loop(scene: Scene) -> bool:

@@ -13,14 +13,10 @@ from spook_tracker.engine.joints import (
     AxialJoint,
     Ball,
     Constraint,
-    Cylindrical,
     Distance,
     GuidedJoint,
-    Hinge,
     Joint,
     Lock,
-    Planar,
-    PointOnLine,
     Prismatic,
     Universal,
 )
@@ -116,18 +112,15 @@ def violation(scene: Scene, constraint: Constraint, positions: Array, orientatio
     gap = second.point(at) - first.point(at)
     axes = _axes(constraint)
     rows = [(first.direction(axis) * gap).sum(axis=1) for axis in axes]
-    if isinstance(constraint, Prismatic | PointOnLine | Cylindrical):
-        rows = rows[1:]
-    elif isinstance(constraint, Planar):
-        rows = rows[:1]
+    rows = rows[slice(*constraint.holds)]
     relative = _relative(first, second)
     part = relative[:, 1:]
-    if isinstance(constraint, Lock | Prismatic):
+    if constraint.turning == "held":
         rows += [2.0 * part @ axis for axis in axes]
-    elif isinstance(constraint, Hinge | Cylindrical | Planar):
+    elif constraint.turning == "swing":
         moved = turned(relative, np.broadcast_to(axes[0], part.shape)) - axes[0]
         rows += [-moved @ axes[2], moved @ axes[1]]
-    elif isinstance(constraint, Universal):
+    elif constraint.turning == "cross":
         moved = turned(relative, np.broadcast_to(axes[1], part.shape)) - axes[1]
         rows.append(moved @ axes[0])
     return np.stack(rows, axis=1)

@@ -18,6 +18,21 @@ Status = Literal["completed", "unsettled", "diverged", "not_finite", "timed_out"
 Array = npt.NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Broken:
+    """A joint or wire that broke: in a step, at its end, under the load its rows held there."""
+
+    joint: str
+    step: int  # counted from 1
+    time: float  # s
+    force: float  # N
+    torque: float  # N m
+
+    def __str__(self) -> str:
+        load = f"{self.force:.4g} N" + (f" and {self.torque:.4g} N m" if self.torque else "")
+        return f"{self.joint!r} broke in step {self.step} ({self.time:.4g} s) under {load}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Result:
     """One run of a scene.
@@ -31,6 +46,7 @@ class Result:
     on a wrong one.
     `counters` are exact integers, equal on every machine: steps, rows_assembled, block_operations, ...
     `state_hash` is a hash of the bits of the final state.
+    `broken` lists the joints and wires that broke, in that order.
     """
 
     status: Status
@@ -49,6 +65,7 @@ class Result:
     stage_seconds: Mapping[str, float] = field(default_factory=dict)
     cpu_seconds: float = 0.0  # processor time of the native loop; 0 where it cannot be told
     residual: float = 0.0  # largest row residual [m/s] a solve stopped at
+    broken: tuple[Broken, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         if self.status not in ("completed", "unsettled"):
@@ -71,11 +88,13 @@ class Result:
     def __repr__(self) -> str:
         seen = ", ".join(f"{name} {value.shape}" for name, value in self.observables.items())
         rows = [self.failure or self.status, f"{self.steps} steps of {self.time_step:.4g} s"]
+        rows += [str(joint) for joint in self.broken]
         return f"<Result: {'; '.join([*rows, seen or 'nothing observed'])}>"
 
     def _repr_html_(self) -> str:
         """The same for notebooks, with the last value of every observable that is one number."""
         rows = [("status", self.failure or self.status), ("steps", f"{self.steps} of {self.time_step:.4g} s")]
+        rows += [("broken", str(joint)) for joint in self.broken]
         for name, value in self.observables.items():
             rows.append((name, f"{value:.6g}" if value.shape == () else f"array of shape {value.shape}"))
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
@@ -86,7 +105,8 @@ class Result:
 
         A scalar's column has the observable's name; those of more numbers are "name.x", "name.y", "name.z" (three),
         "name.w" … (four), else "name.0", … in the order of the flattened sample. Traces taken at different times
-        leave gaps (NaN). Reductions are no rows: read them as result["name"].
+        leave gaps (NaN). Reductions are no rows: read them as result["name"]. Of each joint that broke a column
+        "name broken" says from when on.
         """
         if not self.sample_times:
             raise EngineError("to_dataframe: nothing was traced; observe a Trace")
@@ -99,7 +119,10 @@ class Result:
             )
             for name, times in self.sample_times.items()
         ]
-        return pandas.concat(frames, axis=1).sort_index()
+        together = pandas.concat(frames, axis=1).sort_index()
+        for joint in self.broken:
+            together[f"{joint.joint} broken"] = together.index >= joint.time - 1e-9 * self.time_step
+        return together
 
 
 def _columns(name: str, shape: tuple[int, ...]) -> list[str]:

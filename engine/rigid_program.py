@@ -25,17 +25,10 @@ from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
 from spook_tracker.engine.joint_tables import couplings, drives, or_default
 from spook_tracker.engine.joints import (
     AxialJoint,
-    Ball,
     Constraint,
-    Cylindrical,
     Distance,
     GuidedJoint,
-    Hinge,
     Joint,
-    Lock,
-    Planar,
-    PointOnLine,
-    Prismatic,
     Universal,
 )
 from spook_tracker.engine.method import Method
@@ -46,26 +39,13 @@ from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
 from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
 from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
-from spook_tracker.engine.time_functions import Ramp, Sinusoid
+from spook_tracker.engine.time_functions import Ramp, Sinusoid, TimeFunction
 from spook_tracker.engine.tyres import Tyre
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
-_JOINTS: dict[type[Any], str] = {
-    Distance: "distance",
-    Lock: "lock",
-    Ball: "ball",
-    Hinge: "hinge",
-    Prismatic: "prismatic",
-    Universal: "universal",
-    PointOnLine: "point_on_line",
-    Cylindrical: "cylindrical",
-    Planar: "planar",
-    Relation: "relation",
-    Wire: "wire",
-    Tyre: "tyre",
-}
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+_UNIT: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _WORLD_AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -81,7 +61,14 @@ def compile_rigid(
         observations=observations(observe),
     )
     names = [body.name for body in scene.bodies]
-    program = Program(native, time_step=time_step, bodies=names, observe=observe, shapes=shapes)
+    program = Program(
+        native,
+        time_step=time_step,
+        bodies=names,
+        joints=[constraint.name for constraint in scene.constraints],
+        observe=observe,
+        shapes=shapes,
+    )
     check_rigid(
         scene, method, touching="impact" in {stage.stage for stage in program.explain() if stage.kept}
     )
@@ -175,6 +162,7 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "particle": True,
         "mass": body.mass,
         "inertia": _ORIGIN,
+        "inertia_axes": _UPRIGHT,
         "position": body.position,
         "orientation": _UPRIGHT,
         "velocity": body.velocity,
@@ -201,6 +189,7 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
         "particle": False,
         "mass": body.mass if dynamic and body.mass is not None else 0.0,
         "inertia": body.inertia if dynamic and body.inertia is not None else _ORIGIN,
+        "inertia_axes": body.inertia_axes if dynamic else _UPRIGHT,
         "orientation": body.orientation,
         "angular_velocity": body.angular_velocity,
         "friction": material.friction,
@@ -218,7 +207,7 @@ def _body(body: Particle | RigidBody, push: Any, step: float) -> dict[str, Any]:
 
 def _joint(scene: Scene, constraint: Constraint, bodies: Mapping[str, int], step: float) -> dict[str, Any]:
     columns: dict[str, Any] = {
-        "kind": _JOINTS[type(constraint)],
+        "kind": constraint.kind.replace(" ", "_"),
         **{
             side: bodies.get(end, -1) if isinstance(end, str) else -1
             for side, end in zip(("first", "second"), constraint.between, strict=True)
@@ -316,13 +305,26 @@ def _in_time(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
             add("load", bodies[force.body], force.factor, force.force, force.torque)
     for index, joint in enumerate(scene.constraints):
         if isinstance(joint, AxialJoint):
-            if joint.motor is not None and not isinstance(joint.motor.speed, float):
-                add("motor", index, joint.motor.speed)
+            if joint.motor is not None:
+                push = joint.motor.max_force if joint.motor.force is None else joint.motor.force
+                if isinstance(joint.motor.speed, TimeFunction):
+                    add("motor", index, joint.motor.speed)
+                if isinstance(push, TimeFunction):
+                    add("push", index, push)
             if joint.spring is not None and not isinstance(joint.spring.rest, float):
                 add("rest", index, joint.spring.rest)
     for body in scene.bodies:
-        if isinstance(body, RigidBody) and body.pace is not None:
+        if not isinstance(body, RigidBody):
+            continue
+        if body.pace is not None:
             add("pace", bodies[body.name], body.pace, body.velocity, body.angular_velocity)
+        if body.spin_pace is not None:
+            add("spin", bodies[body.name], body.spin_pace, angular=body.angular_velocity)
+        for axis, place in zip(_UNIT, body.path or (), strict=False):
+            if isinstance(place, TimeFunction):
+                add("path", bodies[body.name], place, axis)
+        if body.angle is not None:
+            add("angle", bodies[body.name], body.angle, angular=body.angle_axis)
     return {"drives": table(drives), "knots": table(knots)}
 
 

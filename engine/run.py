@@ -33,12 +33,13 @@ from spook_tracker.engine.check import Vector
 from spook_tracker.engine.compiler import compile
 from spook_tracker.engine.errors import MethodError, SceneError
 from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import AxialJoint
+from spook_tracker.engine.joints import AxialJoint, Motor
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import Final, Quantity
 from spook_tracker.engine.program import Program
 from spook_tracker.engine.result import Array, Result, SimulationFailed
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.time_functions import at_start
 
 NOTHING_READ: Mapping[str, Quantity] = MappingProxyType({})
 
@@ -183,17 +184,36 @@ class Run:
             raise SceneError(f"{owner}: {load.body!r} is a particle and cannot take a torque")
         self._set("load", name, new)
 
-    def set_motor(self, joint: str, *, speed: float | None = None, max_force: float | None = None) -> None:
-        """The speed [m/s or rad/s] and the bound [N or N m] of a joint's motor from now on."""
+    def set_motor(
+        self,
+        joint: str,
+        *,
+        speed: float | None = None,
+        max_force: float | None = None,
+        force: float | None = None,
+    ) -> None:
+        """The speed [m/s or rad/s] and the bound [N or N m] of a joint's motor from now on, or its force [N or N m]."""
         motor = getattr(self._joint(joint), "motor", None)
         if motor is None:
             raise SceneError(f"set_motor: {joint!r} has no motor")
         owner = f"set_motor {joint!r}"
+        if motor.force is not None:
+            if speed is not None or max_force is not None:
+                raise SceneError(f"{owner}: in the scene it is a motor of given force; set its force")
+            _not_in_time(owner, motor.force)
+            if force is not None:
+                self._set("motor", joint, (0.0, check.number(owner, "force", force)))
+            return
+        if force is not None:
+            raise SceneError(
+                f"{owner}: in the scene it is a motor of given speed; set its speed or its max_force"
+            )
         if max_force is not None and motor.max_force is None:
             raise SceneError(f"{owner}: its force is unbounded in the scene; give it a max_force there")
         _not_in_time(owner, motor.speed)
-        bound = math.inf if motor.max_force is None else motor.max_force
-        before = self._settings.get(("motor", joint), (motor.speed, bound))
+        if max_force is not None:
+            _not_in_time(owner, motor.max_force)
+        before = self._settings.get(("motor", joint), _motor_at_start(motor))
         new = (
             before[0] if speed is None else check.number(owner, "speed", speed),
             before[1] if max_force is None else check.not_negative(owner, "max_force", max_force),
@@ -216,7 +236,8 @@ class Run:
         if not isinstance(known, RigidBody) or known.motion != "kinematic":
             raise SceneError(f"set_velocity: {body!r} is not kinematic, so forces move it; use a Load")
         owner = f"set_velocity {body!r}"
-        _not_in_time(owner, known.pace)
+        for given in (known.pace, known.spin_pace, known.path, known.angle):
+            _not_in_time(owner, given)
         before = self._settings.get(("velocity", body), (known.velocity, known.angular_velocity))
         new = (
             before[0] if velocity is None else check.vector(owner, "velocity", velocity),
@@ -290,8 +311,7 @@ class Run:
         assert joint is not None
         if kind == "motor":
             assert joint.motor is not None
-            force = joint.motor.max_force
-            return (joint.motor.speed, math.inf if force is None else force)
+            return _motor_at_start(joint.motor)
         assert joint.spring is not None
         return (joint.spring.rest,)
 
@@ -321,6 +341,15 @@ class Run:
             raise MethodError("this run is closed; start another")
         with self._lock:
             yield
+
+
+def _motor_at_start(motor: Motor) -> tuple[float, float]:
+    """What the native side calls its speed and its force."""
+    force = motor.max_force if motor.force is None else motor.force
+    return (
+        0.0 if motor.speed is None else at_start(motor.speed),
+        math.inf if force is None else at_start(force),
+    )
 
 
 def _not_in_time(owner: str, value: object) -> None:

@@ -14,6 +14,7 @@ from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.forces import CentralGravity, Fluid, Force, Load, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Hinge, Joint
+from spook_tracker.engine.time_functions import TimeFunction
 from spook_tracker.engine.tyres import Tyre
 
 
@@ -215,8 +216,13 @@ class Scene:
         drives = [joint for joint in self.constraints if isinstance(joint, AxialJoint)]
         return (
             any(isinstance(force, Load) and force.factor is not None for force in self.forces)
-            or any(isinstance(body, RigidBody) and body.pace is not None for body in self.bodies)
-            or any(joint.motor is not None and not isinstance(joint.motor.speed, float) for joint in drives)
+            or any(isinstance(body, RigidBody) and body.follows_time for body in self.bodies)
+            or any(
+                isinstance(given, TimeFunction)
+                for joint in drives
+                if joint.motor is not None
+                for given in (joint.motor.speed, joint.motor.max_force, joint.motor.force)
+            )
             or any(joint.spring is not None and not isinstance(joint.spring.rest, float) for joint in drives)
         )
 

@@ -17,7 +17,7 @@ from spook_tracker.engine.errors import SceneError
 
 
 class Shape(ABC):
-    """Base of every shape; `inertia(mass)` gives the principal moments [kg m²] at uniform density."""
+    """Base of every shape; `inertia(mass)` gives the moments [kg m²] about the body axes at uniform density."""
 
     __slots__ = ()
     kind: ClassVar[str] = ""  # the native side's name
@@ -33,7 +33,12 @@ class Shape(ABC):
         return ()
 
     @abstractmethod
-    def inertia(self, mass: float) -> Vector: ...
+    def inertia(self, mass: float) -> Vector | polytope.Tensor: ...
+
+    @property
+    def volume(self) -> float:
+        """m³; infinite without bounds."""
+        return math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +62,10 @@ class Sphere(Shape):
         moment = 0.4 * mass * self.radius**2
         return (moment, moment, moment)
 
+    @property
+    def volume(self) -> float:
+        return 4.0 / 3.0 * math.pi * self.radius**3
+
 
 @dataclass(frozen=True, slots=True)
 class Box(Shape):
@@ -79,6 +88,11 @@ class Box(Shape):
     def inertia(self, mass: float) -> Vector:
         x, y, z = self.size
         return (mass * (y * y + z * z) / 12.0, mass * (x * x + z * z) / 12.0, mass * (x * x + y * y) / 12.0)
+
+    @property
+    def volume(self) -> float:
+        x, y, z = self.size
+        return x * y * z
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +125,10 @@ class Capsule(Shape):
         )
         return (across, across, along)
 
+    @property
+    def volume(self) -> float:
+        return math.pi * self.radius**2 * (self.length + 4.0 * self.radius / 3.0)
+
 
 @dataclass(frozen=True, slots=True)
 class Cylinder(Shape):
@@ -131,6 +149,10 @@ class Cylinder(Shape):
     def inertia(self, mass: float) -> Vector:
         across = mass * (self.radius**2 / 4.0 + self.length**2 / 12.0)
         return (across, across, mass * self.radius**2 / 2.0)
+
+    @property
+    def volume(self) -> float:
+        return math.pi * self.radius**2 * self.length
 
     def measures(self) -> tuple[float, ...]:
         half, rim = 0.5 * self.length, _circle(self.radius)
@@ -159,6 +181,10 @@ class Cone(Shape):
     def inertia(self, mass: float) -> Vector:
         across = 0.15 * mass * (self.radius**2 + self.height**2 / 4.0)
         return (across, across, 0.3 * mass * self.radius**2)
+
+    @property
+    def volume(self) -> float:
+        return math.pi * self.radius**2 * self.height / 3.0
 
     def measures(self) -> tuple[float, ...]:
         low, rim = -0.25 * self.height, _circle(self.radius)
@@ -284,7 +310,8 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Compound(Shape):
-    """Several shapes in one body. Give the body its inertia: parts may overlap, so it cannot be derived."""
+    """Several shapes in one body. Its inertia is the sum of its parts', of one density, about the body's origin: where
+    parts overlap they count twice, so give the body its inertia there."""
 
     parts: tuple[Part, ...]
 
@@ -294,5 +321,45 @@ class Compound(Shape):
             raise SceneError("compound: needs at least one Part")
         object.__setattr__(self, "parts", parts)
 
-    def inertia(self, mass: float) -> Vector:
-        raise SceneError("compound: the inertia of a compound must be given with the body")
+    @property
+    def volume(self) -> float:
+        return math.fsum(part.shape.volume for part in self.parts)
+
+    def inertia(self, mass: float) -> Vector | polytope.Tensor:
+        """By Steiner's theorem; a tensor, unless it is diagonal. Raises SceneError off the centre of mass."""
+        whole = self.volume
+        centre = [math.fsum(p.shape.volume * p.position[k] for p in self.parts) / whole for k in range(3)]
+        size = max(math.hypot(*part.position) + part.shape.volume ** (1.0 / 3.0) for part in self.parts)
+        if math.hypot(*centre) > 1e-9 * size:
+            raise SceneError(
+                f"compound: its parts have their centre of mass at ({centre[0]:g}, {centre[1]:g}, {centre[2]:g}) m instead "
+                "of the origin; move them there, or give the body its inertia"
+            )
+        tensor = [[0.0] * 3 for _ in range(3)]
+        for part in self.parts:
+            share = mass * (part.shape.volume / whole)
+            own = part.shape.inertia(share)
+            turn, at = rotation_matrix(part.orientation), part.position
+            for i in range(3):
+                for j in range(3):
+                    square = math.fsum(x * x for x in at) if i == j else 0.0
+                    turned = math.fsum(turn[i][k] * own[k] * turn[j][k] for k in range(3))  # type: ignore[operator]
+                    tensor[i][j] += turned + share * (square - at[i] * at[j])
+        largest = max(tensor[i][i] for i in range(3))
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            tensor[i][j] = tensor[j][i] = 0.5 * (tensor[i][j] + tensor[j][i])
+            if abs(tensor[i][j]) <= 1e-15 * largest:
+                tensor[i][j] = tensor[j][i] = 0.0
+        if not any(tensor[i][j] for i, j in ((0, 1), (0, 2), (1, 2))):
+            return (tensor[0][0], tensor[1][1], tensor[2][2])
+        return tuple(tuple(row) for row in tensor)  # type: ignore[return-value]
+
+
+def rotation_matrix(turn: Rotation) -> polytope.Tensor:
+    """Of a unit quaternion (w, x, y, z): body to world."""
+    w, x, y, z = turn
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )

@@ -9,7 +9,7 @@ from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import Fluid, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, frictions
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.tyres import Tyre
@@ -33,9 +33,10 @@ def check_smooth(scene: Scene, method: Method) -> None:
                 "half_step_velocities"
             )
     for body in scene.bodies:
-        if isinstance(body, RigidBody) and body.pace is not None:
+        if isinstance(body, RigidBody) and body.follows_time:
+            given = next(n for n in ("pace", "spin_pace", "path", "angle") if getattr(body, n) is not None)
             raise MethodError(
-                f"method: a composition goes back and forth in time, which the pace of {body.name!r} does not follow"
+                f"method: a composition goes back and forth in time, which the {given} of {body.name!r} does not follow"
             )
     known = {body.name: body for body in scene.bodies}
     for row in scene.constraints:
@@ -138,11 +139,16 @@ def _bounded(joint: Constraint) -> str | None:
         return "a tyre"
     if (getattr(joint, "strength", None) or getattr(joint, "torque_strength", None)) is not None:
         return "a strength at which it breaks"
+    if any(any(part) for part in frictions(joint)):
+        return "friction"
     if not isinstance(joint, AxialJoint):
         return None
     if joint.limit is not None and joint.limit.lower < joint.limit.upper:
         return "a limit"
-    if joint.motor is not None and joint.motor.max_force is not None and math.isfinite(joint.motor.max_force):
+    if joint.motor is not None and joint.motor.force is not None:
+        return "a motor of given force"
+    bound = None if joint.motor is None else joint.motor.max_force
+    if bound is not None and (not isinstance(bound, float) or math.isfinite(bound)):
         return "a motor of bounded force"
     if joint.spring is not None and joint.spring.max_force is not None:
         return "a spring of bounded force"

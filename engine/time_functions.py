@@ -1,8 +1,8 @@
 """Numbers that change with time, evaluated in the native loop: sinusoids, ramps and tables.
 
-What follows the time is evaluated once a step: a load at its beginning, where forces that depend on places are, too;
-the speed of a motor and the rest of a spring where the step's velocities live (its end; mid-step with
-half_step_velocities); the pace of a kinematic body at mid-step.
+What follows the time is evaluated once a step: a load and the force of a motor at its beginning, where forces that
+depend on places are, too; the speed of a motor and the rest of a spring where the step's velocities live (its end;
+mid-step with half_step_velocities); the pace of a kinematic body at mid-step; its path and its angle at both ends.
 """
 
 from __future__ import annotations
@@ -105,6 +105,13 @@ def number_or_function(owner: str, field: str, value: Any) -> float | TimeFuncti
             f"{owner}: {field} must be a number, Sinusoid, Ramp or Table, which the native loop knows, not {value!r}"
         )
     return check.number(owner, field, value)
+
+
+def least(function: TimeFunction) -> float:
+    """The smallest value it has at any time, or less (of a sinusoid)."""
+    if isinstance(function, Sinusoid):
+        return function.offset - abs(function.amplitude)
+    return min((function.table() if isinstance(function, Ramp) else function).values)
 
 
 def at_start(value: float | TimeFunction) -> float:

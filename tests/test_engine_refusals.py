@@ -104,7 +104,7 @@ SCENES: list[tuple[Callable[[], object], tuple[str, ...]]] = [
     (lambda: Plane(ORIGIN), ("plane", "normal")),
     (lambda: Compound(()), ("compound",)),
     (lambda: Part(shape=Plane()), ("compound", "part")),
-    (lambda: rigid(shape=Compound((Part(shape=Sphere(1.0)),))), ("compound", "inertia")),
+    (lambda: rigid(shape=Compound((Part(shape=Sphere(1.0), position=(1.0, 0.0, 0.0)),))), ("compound", "inertia")),
     (lambda: Material(friction=-0.1), ("material", "friction")),
     (lambda: Material(restitution=1.1), ("material", "restitution")),
     (lambda: Material(damping=math.nan), ("material", "damping")),

@@ -24,7 +24,7 @@ inline Vec3 to_vec(const Point& t) { return {std::get<0>(t), std::get<1>(t), std
 nb::object to_array(const std::vector<double>& values, std::size_t rows, std::size_t columns);
 
 /// {status, steps, failed_step, failed_body, seconds, residual, counters, stage_seconds, recordings: list of
-/// (samples, width) arrays, final_state: (bodies, 13), state_hash}
+/// (samples, width) arrays, final_state: (bodies, 13), state_hash, broken: [(joint, step, time, force, torque)]}
 nb::dict to_dict(const RunReport& report);
 
 /// [(stage, kept, reason)] for every stage there is, in the order of the step.

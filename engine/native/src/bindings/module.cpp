@@ -38,6 +38,10 @@ nb::dict to_dict(const RunReport& report) {
     for (const Recording& recording : report.recordings)
         recordings.append(to_array(recording.values, static_cast<std::size_t>(recording.samples),
                                    static_cast<std::size_t>(recording.width)));
+    nb::list broken;
+    for (const Broken& joint : report.broken)
+        broken.append(nb::make_tuple(joint.joint, joint.step, joint.time, joint.force, joint.torque));
+    out["broken"] = broken;
     out["status"] = to_text(report.status);
     out["steps"] = report.steps;
     out["failed_step"] = report.failed_step;

@@ -10,8 +10,9 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
     Columns table(bodies, "bodies");
     const std::vector<Motion> motion = table.kinds<Motion>("motion", "motion");
     const Numbers particle = table.numbers("particle"), mass = table.numbers("mass"),
-                  inertia = table.numbers("inertia", 3), position = table.numbers("position", 3),
-                  orientation = table.numbers("orientation", 4), velocity = table.numbers("velocity", 3),
+                  inertia = table.numbers("inertia", 3), inertia_axes = table.numbers("inertia_axes", 4),
+                  position = table.numbers("position", 3), orientation = table.numbers("orientation", 4),
+                  velocity = table.numbers("velocity", 3),
                   angular_velocity = table.numbers("angular_velocity", 3), force = table.numbers("force", 3),
                   torque = table.numbers("torque", 3), friction = table.numbers("friction"),
                   restitution = table.numbers("restitution"), compliance = table.numbers("compliance"),
@@ -27,6 +28,7 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
         body.particle = particle.flag(i);
         body.mass = mass[i];
         body.inertia = inertia.vec(i);
+        body.inertia_axes = inertia_axes.quat(i);
         body.position = position.vec(i);
         body.orientation = orientation.quat(i);
         body.velocity = velocity.vec(i);
@@ -74,12 +76,25 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
 void read_motors(const nb::dict& motors, RigidScene& scene) {
     Columns table(motors, "motors");
     const Numbers joint = table.numbers("joint"), speed = table.numbers("speed"),
-                  force = table.numbers("max_force");
+                  force = table.numbers("max_force"), pushes = table.numbers("pushes");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& spec = scene.joints.at(joint.index(i));
         spec.has_motor = true;
         spec.motor_speed = speed[i];
         spec.motor_force = force[i];
+        spec.motor_pushes = pushes.flag(i);
+    }
+    table.expect_all_read();
+}
+
+void read_frictions(const nb::dict& frictions, RigidScene& scene) {
+    Columns table(frictions, "joint_frictions");
+    const Numbers joint = table.numbers("joint"), constant = table.numbers("constant", 2),
+                  load = table.numbers("load", 2);
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+        JointSpec& spec = scene.joints.at(joint.index(i));
+        std::copy_n(constant.at(i), 2, spec.dry_friction.begin());
+        std::copy_n(load.at(i), 2, spec.load_friction.begin());
     }
     table.expect_all_read();
 }
@@ -322,13 +337,13 @@ RigidMethod to_method(const nb::dict& method) {
 }
 
 void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, const nb::dict& motors,
-          const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& springs,
-          const nb::dict& terms, const nb::dict& wire_points, const nb::dict& eyes, const nb::dict& tyres,
-          const nb::dict& fields, const nb::dict& fluids, const nb::dict& floaters, const nb::dict& drives,
-          const nb::dict& knots, const nb::dict& colliders, const nb::dict& hull_corners,
-          const nb::dict& hull_faces, const nb::dict& no_contact, bool contacts, const Point& gravity,
-          const nb::dict& method, bool loads_change, const std::vector<QuantityRequest>& quantities,
-          const std::vector<Observation>& observations) {
+          const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& joint_frictions,
+          const nb::dict& springs, const nb::dict& terms, const nb::dict& wire_points, const nb::dict& eyes,
+          const nb::dict& tyres, const nb::dict& fields, const nb::dict& fluids, const nb::dict& floaters,
+          const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
+          const nb::dict& hull_corners, const nb::dict& hull_faces, const nb::dict& no_contact, bool contacts,
+          const Point& gravity, const nb::dict& method, bool loads_change,
+          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
     scene.loads_change = loads_change;
@@ -339,6 +354,7 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_motors(motors, scene);
     read_limits(limits, scene);
     read_joint_springs(joint_springs, scene);
+    read_frictions(joint_frictions, scene);
     scene.springs = read_springs(springs);
     scene.fields = read_fields(fields);
     read_terms(terms, scene);
@@ -359,16 +375,16 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
 void bind_rigid(nb::module_& m) {
     bind_program<RigidSystem>(
         m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"),
-        nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"), nb::arg("springs"),
-        nb::arg("terms"), nb::arg("wire_points"), nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"),
-        nb::arg("fluids"), nb::arg("floaters"), nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"),
-        nb::arg("hull_corners"), nb::arg("hull_faces"), nb::arg("no_contact"), nb::arg("contacts"),
-        nb::arg("gravity"), nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"),
-        nb::arg("observations"),
+        nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"),
+        nb::arg("joint_frictions"), nb::arg("springs"), nb::arg("terms"), nb::arg("wire_points"),
+        nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"), nb::arg("fluids"), nb::arg("floaters"),
+        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("hull_corners"),
+        nb::arg("hull_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
+        nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
         "hulls are numbered in the order they come;\n"
-        "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits and\n"
-        "joint_springs name the joint they drive.");
+        "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits,\n"
+        "joint_springs and joint_frictions name the joint they drive.");
 }
 
 }  // namespace spook

@@ -92,6 +92,12 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
                 return leave_out(rows ? "distances are bilateral: no row can let go" : no_rows);
             case Stage::rub_wires: return leave_out("a wire brings rigid stages with it");
             case Stage::roll_tyres: return leave_out("particles have no wheels");
+            case Stage::meet_meshes: return leave_out("particles touch nothing");
+            case Stage::couple_joints: return leave_out("particles have no joint coordinates");
+            case Stage::hold_wires: return leave_out("a wire brings rigid stages with it");
+            case Stage::wind_wires: return leave_out("particles wind on no drum");
+            case Stage::rub_joints: return leave_out("particles have no joint coordinates");
+            case Stage::break_joints: return leave_out("distances have no strength");
             case Stage::correct_curvature:
                 return choose_if((method.corrections > 0 || composed) && rows,
                                  composed ? "Newton's method keeps the curvature of the rows to rounding"

@@ -8,9 +8,10 @@
 
 namespace spook {
 
-void FollowingBounds::take(const JointSet& joints, bool eyes, bool tyres) {
+void FollowingBounds::take(const JointSet& joints, bool eyes, bool tyres, bool bearings) {
     for (int k = 0; eyes && k < static_cast<int>(joints.eyes().size()); ++k) eyes_.push_back(k);
     for (int k = 0; tyres && k < static_cast<int>(joints.tyres().size()); ++k) tyres_.push_back(k);
+    for (int k = 0; bearings && k < static_cast<int>(joints.bearings().size()); ++k) bearings_.push_back(k);
     last_.resize(eyes_.size());
 }
 
@@ -18,6 +19,7 @@ double FollowingBounds::follow(MixedSystem& solved, JointSet& joints) {
     off_ = 0.0;
     for (int k = 0; k < static_cast<int>(eyes_.size()); ++k) follow_eye(k, solved, joints);
     for (int k : tyres_) follow_tyre(k, solved, joints);
+    for (int k : bearings_) follow_bearing(k, solved, joints);
     ++round_;
     return off_;
 }
@@ -66,6 +68,27 @@ void FollowingBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& joint
         rows.lower[1 + k] = -next;
         rows.upper[1 + k] = next;
     }
+}
+
+void FollowingBounds::follow_bearing(int bearing, MixedSystem& solved, JointSet& joints) {
+    const BearingRow& of = joints.bearings()[bearing];
+    RowBlock& rows = solved.rows[of.block];
+    const RowBlock& holding = solved.rows[of.holding];
+    const int joint = joints.blocks()[of.block].joint, linear = joints.constants(joint).holds.linear();
+    double square = 0.0;
+    for (int i = 0; i < linear; ++i) square += holding.multiplier[i] * holding.multiplier[i];
+    JointSet::State& state = joints.states[joint];
+    const double answer = state.broken ? 0.0 : of.share * std::sqrt(square);
+    const double friction = std::abs(rows.multiplier[of.row]), bound = rows.upper[of.row];
+    const double next = state.broken ? 0.0 : of.constant + answer;
+    if (friction < bound || next < bound) {
+        if (friction > next) see((friction - next) / friction, of.block);
+    } else if (next > bound) {
+        see((next - bound) / next, of.block);
+    }
+    state.bound[of.way] = answer;
+    rows.lower[of.row] = -next;
+    rows.upper[of.row] = next;
 }
 
 /// Rows with bounds and without contacts: solved again while bounds that follow other rows move.

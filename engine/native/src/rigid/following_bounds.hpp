@@ -3,6 +3,7 @@
 //   eye    the pulls T₁, T₂ of a wire before and behind a point it rubs on differ by the eye's own row, at most by what
 //          Euler and Eytelwein allow, T₂ <= e^{µφ} T₁ either way:  |T₂ − T₁| <= tanh(½µφ) (T₁ + T₂)
 //   tyre   (F_x/µ_x)² + (F_y/µ_y)² <= N², see tyre_rows.hpp
+//   bearing   |F| <= F₀ + c |N|, N the force that the joint's own rows hold
 //
 // Solve, bound anew, solve again, until both agree. An eye's bound b = y(b) is a contraction: more friction takes from
 // T₁ what it gives to T₂ or less, so |y'| <= tanh(½µφ) < 1; two rounds tell y', and the third is a secant's. Only rows
@@ -22,8 +23,8 @@ public:
     static constexpr double AGREED = 1e-11;  // of the pull or the load
 
     /// Which rows there are; the first step begins with bounds of zero.
-    void take(const JointSet& joints, bool eyes, bool tyres);
-    bool empty() const noexcept { return eyes_.empty() && tyres_.empty(); }
+    void take(const JointSet& joints, bool eyes, bool tyres, bool bearings);
+    bool empty() const noexcept { return eyes_.empty() && tyres_.empty() && bearings_.empty(); }
 
     /// A new step.
     void begin() noexcept { round_ = 0; }
@@ -42,9 +43,10 @@ private:
     }
     void follow_eye(int eye, MixedSystem& solved, JointSet& joints);
     void follow_tyre(int tyre, MixedSystem& solved, JointSet& joints);
+    void follow_bearing(int bearing, MixedSystem& solved, JointSet& joints);
 
-    std::vector<int> eyes_, tyres_;  // indices into those of the joints
-    std::vector<Guess> last_;        // per eye, of the round before
+    std::vector<int> eyes_, tyres_, bearings_;  // indices into those of the joints
+    std::vector<Guess> last_;                   // per eye, of the round before
     int round_ = 0, worst_ = 0;
     double off_ = 0.0;
 };

@@ -209,10 +209,15 @@ double axial_bias(const JointConstants& joint, const BodyState& first, const Bod
 }
 
 AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept {
+    return axial_row(joint, first, second, joint.kind == JointKind::prismatic);
+}
+
+AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                   bool slides) noexcept {
     AxialRow row;
     const Ends ends(joint, first, second);
     const Vec3 axis = carried(first, joint.axes[0]), reach = ends.first_arm + ends.gap;
-    if (joint.kind == JointKind::prismatic) {
+    if (slides) {
         put(row.first, -axis);
         put(row.first + 3, -cross(reach, axis));
         put(row.second, axis);

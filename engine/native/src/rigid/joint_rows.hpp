@@ -58,5 +58,8 @@ struct AxialRow {
     double first[6] = {}, second[6] = {};
 };
 AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept;
+/// The slide along the axis, or the turn about it, of a joint that may have both.
+AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                   bool slides) noexcept;
 
 }  // namespace spook

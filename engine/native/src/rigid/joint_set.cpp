@@ -51,7 +51,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         blocks_.push_back(block);
 
         joint.tracked = spec.has_limit || spec.has_spring;
-        if (spec.has_motor || spec.has_limit || spec.has_spring) {
+        if (spec.has_motor || spec.has_limit || spec.has_spring || rubs(spec)) {
             Axial axial;
             axial.has_motor = spec.has_motor;
             axial.has_limit = spec.has_limit;
@@ -61,6 +61,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             block.softness = {};
             if (spec.has_motor) {
                 axial.speed = spec.motor_speed;
+                axial.pushes = spec.motor_pushes;
                 axial.impulse = time_step * spec.motor_force;
                 block.softness[block.size++] = 0.0;
             }
@@ -77,6 +78,15 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
                 axial.spring_impulse = time_step * spec.spring_force;
                 axial.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
                 block.softness[block.size++] = axial.spring.softness;
+            }
+            for (int way = 0; way < 2; ++way) {
+                if (!rubs(spec, way)) continue;
+                axial.rubs[way] = true;
+                axial.friction[way] = time_step * spec.dry_friction[way];
+                if (spec.load_friction[way] > 0.0)
+                    bearings_.push_back({static_cast<int>(blocks_.size()), block.size, way, joint.block,
+                                         axial.friction[way], spec.load_friction[way]});
+                block.softness[block.size++] = 0.0;
             }
             blocks_.push_back(block);
             joint.axial = static_cast<int>(axials_.size());
@@ -123,7 +133,7 @@ double JointSet::unwrapped(const Joint& joint, double angle, double near) const 
 
 void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies,
                               double* first, double* second, BlockRight& right) noexcept {
-    const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
+    AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
     if (joint.tracked) state.angle = unwrapped(joint, row.coordinate, state.angle);
     const Axial& axial = axials_[joint.axial];
     int k = 0;
@@ -135,7 +145,7 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
     };
     if (axial.has_motor) {
         const int motor = next(axial.speed);
-        right.lower[motor] = -axial.impulse;
+        right.lower[motor] = axial.pushes ? axial.impulse : -axial.impulse;
         right.upper[motor] = axial.impulse;
     }
     if (axial.has_limit) {
@@ -153,14 +163,22 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
             (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
-    if (!axial.has_spring) return;
-    const double rest = axial.spring.violation_gain * (state.angle - axial.spring_rest);
-    // A rest r(t) in the averaged law: G v₊ − r'₊ in place of G v₊, G v − r'₋ in place of G v.
-    const int spring = next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) - rest +
-                                                   axial.rest_ahead
-                                             : axial.spring.upsilon * row.rate - rest);
-    right.lower[spring] = -axial.spring_impulse;
-    right.upper[spring] = axial.spring_impulse;
+    if (axial.has_spring) {
+        const double rest = axial.spring.violation_gain * (state.angle - axial.spring_rest);
+        // A rest r(t) in the averaged law: G v₊ − r'₊ in place of G v₊, G v − r'₋ in place of G v.
+        const int spring = next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) -
+                                                       rest + axial.rest_ahead
+                                                 : axial.spring.upsilon * row.rate - rest);
+        right.lower[spring] = -axial.spring_impulse;
+        right.upper[spring] = axial.spring_impulse;
+    }
+    for (int way = 0; way < 2; ++way) {  // friction: at rest as far as it reaches
+        if (!axial.rubs[way]) continue;
+        row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies), way == 0);
+        const int rub = next(0.0);
+        right.upper[rub] = axial.friction[way] + state.bound[way];
+        right.lower[rub] = -right.upper[rub];
+    }
 }
 
 /// The right side of a row that only pushes `inwards`. What the scene began with beyond the limit is no violation: it
@@ -286,17 +304,18 @@ void JointSet::set_moving_rest(int joint, double rest, double before, double ahe
     axial.rest_ahead = ahead;
 }
 
-void JointSet::break_overloaded(int index) noexcept {
+void JointSet::break_overloaded(int index, std::int64_t step) {
     const Joint& joint = joints_[index];
-    if (!joint.breakable) return;
     State& state = states[index];
+    if (!joint.breakable || state.broken) return;
     const JointHolds holds = joint.constants.holds;
     const int linear = holds.rows() > 0 ? holds.linear() : 1;  // distance, wire and relation: their row
     double force = 0.0, torque = 0.0;
     for (int i = 0; i < joint.constants.rows; ++i)
         (i < linear ? force : torque) += state.multiplier[i] * state.multiplier[i];
-    state.broken =
-        state.broken || std::sqrt(force) > joint.strength || std::sqrt(torque) > joint.torque_strength;
+    force = std::sqrt(force), torque = std::sqrt(torque);
+    state.broken = force > joint.strength || torque > joint.torque_strength;
+    if (state.broken) breaks.push_back({index, step, force / time_step_, torque / time_step_});
 }
 
 double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
@@ -41,21 +42,34 @@ struct TyreRows {
     int block = 0;
     std::array<double, 2> friction{};
 };
+/// A row of friction in a joint whose bound grows with what the joint holds, by block.
+struct BearingRow {
+    int block = 0, row = 0, way = 0;     // way: 0 along the axis, 1 about it
+    int holding = 0;                     // the block of what it holds
+    double constant = 0.0, share = 0.0;  // N s or N m s; 1 or m
+};
+/// A joint that broke: in which step of h, and under what.
+struct Break {
+    int joint = 0;
+    std::int64_t step = 0;             // counted from 1
+    double force = 0.0, torque = 0.0;  // N, N m
+};
 
 class JointSet {
 public:
     /// What a joint carries from step to step.
     struct State {
         std::array<double, 6> multiplier{};
-        std::array<double, 3> axial_multiplier{};
+        std::array<double, 5> axial_multiplier{};
         Vec3 first_reach,
             second_reach;  // from the centres to the point where forces are read, at the last step
         bool broken = false;
         bool at_limit = false;  // the free coordinate's limit was closed in the last step
         double given =
             -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
-        double angle = 0.0;             // unwrapped coordinate of a hinge that needs it
-        std::array<double, 2> bound{};  // N s: of an eye's row; of a tyre's rows along and across
+        double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
+        // N s: of an eye's row; of a tyre's rows along and across; of a joint's friction, as far as it follows the load
+        std::array<double, 2> bound{};
     };
 
     JointSet(const RigidScene& scene, double time_step);
@@ -128,13 +142,18 @@ public:
         for (const int joint : followed_) states[joint].angle = coordinate(joint, bodies);
     }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
-    void break_overloaded(int joint) noexcept;
+    void break_overloaded(int joint, std::int64_t step);
     /// Energy of the springs of free coordinates [J].
     double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
     void set_speed(int joint, double speed) noexcept { axials_[joints_[joint].axial].speed = speed; }
     /// A new target of a motor whose force stays bounded or unbounded, as it was.
     void set_motor(int joint, double speed, double max_force);
+    /// What a motor pushes with, or the most it may [N or N m].
+    void set_push(int joint, double force) noexcept {
+        Axial& axial = axials_[joints_[joint].axial];
+        axial.impulse = time_step_ * (axial.pushes ? force : std::max(0.0, force));
+    }
     /// A new rest of a spring of a free coordinate; the second: one that moves with the time, with its speeds over
     /// the step before and the coming one.
     void set_rest(int joint, double rest);
@@ -143,8 +162,10 @@ public:
     /// Rows whose bounds follow from what other rows carry; the grip of an eye is that of the last assemble().
     std::span<const EyeRow> eyes() const noexcept { return eyes_; }
     std::span<const TyreRows> tyres() const noexcept { return tyres_; }
+    std::span<const BearingRow> bearings() const noexcept { return bearings_; }
 
     LargeArray<State> states;
+    std::vector<Break> breaks;  // of the run so far
 
 private:
     struct Joint {
@@ -160,7 +181,9 @@ private:
         } gain[6];
     };
     struct Axial {
-        bool has_motor = false, has_limit = false, has_spring = false;
+        bool has_motor = false, has_limit = false, has_spring = false, pushes = false;
+        std::array<bool, 2> rubs{};
+        std::array<double, 2> friction{};  // N s, N m s
         double speed = 0.0, impulse = 0.0;
         double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0, spring_stiffness = 0.0;
         double spring_impulse = 0.0;
@@ -220,6 +243,7 @@ private:
     std::vector<EyeRow> eyes_;
     std::vector<TyreRows> tyres_;
     std::vector<TyreForm> tyre_forms_;
+    std::vector<BearingRow> bearings_;
     std::vector<double> gradient_;  // of one general row: six per body
     std::vector<int> followed_;
     LargeArray<JointBlock> blocks_;

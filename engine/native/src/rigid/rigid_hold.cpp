@@ -172,7 +172,8 @@ bool RigidSystem::iterate(double tau, bool dense) {
 /// Λ for which the rows, assembled at the start of the stage, hold at its end. False if there is none near.
 bool RigidSystem::hold_rows(double tau) {
     for (std::size_t k = 0; k < tied_.size(); ++k)
-        if (!constants_[tied_[k]].particle) axes_[k] = axes(constants_[tied_[k]], live_.bodies[tied_[k]]);
+        if (!constants_[tied_[k]].particle)
+            axes_[k] = inertia_axes(constants_[tied_[k]], live_.bodies[tied_[k]]);
     for (int i : driven_) {
         trial_[i] = live_.bodies[i];
         move(constants_[i], tau, trial_[i]);

@@ -1,9 +1,10 @@
 // Loads that change from step to step: functions of time, springs that hold bodies beside their centres, and the
 // fluids bodies float in.
 //
-// A load is taken at the beginning of a step, where forces that depend on places are; the speed of a motor and the
-// rest of a spring where the step's velocities live: at its end, at mid-step with half_step_velocities; a kinematic
-// body's pace at mid-step, so that its place is second order.
+// A load is taken at the beginning of a step, where forces that depend on places are, and so is the force of a motor;
+// the speed of a motor and the rest of a spring where the step's velocities live: at its end, at mid-step with
+// half_step_velocities; a kinematic body's pace at mid-step, so that its place is second order; a path or an angle gives
+// the velocity that leads to where the step ends.
 #include "collision/submerged.hpp"
 #include "rigid/rigid_system.hpp"
 
@@ -38,6 +39,7 @@ void RigidSystem::follow_time() {
         switch (drive.kind) {
             case DriveKind::load: break;
             case DriveKind::motor: joints_.set_speed(drive.index, f.at(live)); break;
+            case DriveKind::push: joints_.set_push(drive.index, f.at(now)); break;
             case DriveKind::rest: {
                 const double rest = f.at(now);
                 joints_.set_moving_rest(drive.index, rest, (rest - f.at(now - h_)) / h_,
@@ -50,6 +52,23 @@ void RigidSystem::follow_time() {
                 live_.bodies[drive.index].angular_velocity = pace * drive.angular;
                 break;
             }
+            case DriveKind::spin:
+                live_.bodies[drive.index].angular_velocity = f.at(middle) * drive.angular;
+                break;
+            case DriveKind::path: {
+                const Vec3 ahead = f.at(now + h_) * drive.linear;
+                const Vec3 here{drive.linear.x * position_of(drive.index).x,
+                                drive.linear.y * position_of(drive.index).y,
+                                drive.linear.z * position_of(drive.index).z};
+                const Vec3 other{1.0 - drive.linear.x, 1.0 - drive.linear.y, 1.0 - drive.linear.z};
+                Vec3& v = live_.bodies[drive.index].velocity;
+                v = Vec3{other.x * v.x, other.y * v.y, other.z * v.z} + (1.0 / h_) * (ahead - here);
+                break;
+            }
+            case DriveKind::angle:
+                live_.bodies[drive.index].angular_velocity =
+                    ((f.at(now + h_) - f.at(now)) / h_) * drive.angular;
+                break;
         }
     }
     if (clock_ && !drives_.empty()) clock_->mark(Stage::follow_time);

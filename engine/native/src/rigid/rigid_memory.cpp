@@ -13,6 +13,7 @@ void RigidSystem::keep(Memory& memory) const {
     }
     memory.redundancy = redundant_.memory();
     memory.live = live_, memory.joints = joints_.states, memory.mixed = mixed_;
+    memory.breaks = joints_.breaks;
     if (contacts_) memory.contacts = contacts_->memory();
     if (!stiff_) return;
     memory.jacobians.clear();
@@ -26,6 +27,7 @@ void RigidSystem::keep(Memory& memory) const {
 void RigidSystem::go_back(const Memory& memory) {
     redundant_.restore(matrix_, memory.redundancy);
     live_ = memory.live, joints_.states = memory.joints, mixed_ = memory.mixed;
+    joints_.breaks = memory.breaks;
     if (contacts_) contacts_->remember(memory.contacts);
     if (!stiff_) return;
     const auto blocks = joints_.blocks();

@@ -58,7 +58,8 @@ struct RigidBodySpec {
     Motion motion = Motion::dynamic;
     bool particle = false;  // three unknowns, no rotation
     double mass = 0.0;
-    Vec3 inertia;  // principal moments, body axes
+    Vec3 inertia;       // principal moments
+    Quat inertia_axes;  // principal axes in those of the body
     Vec3 position;
     Quat orientation;
     Vec3 velocity, angular_velocity;  // world axes
@@ -99,10 +100,13 @@ struct JointSpec {
 
     bool has_motor = false, has_limit = false, has_spring = false;
     double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
+    bool motor_pushes = false;                    // with motor_force whatever the speed
     double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
     double limit_restitution = 0.0;
     double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
     double spring_force = std::numeric_limits<double>::infinity();  // N, N m: the most it pulls
+    std::array<double, 2> dry_friction{};   // of the slide along the axis, N, and of the turn about it, N m
+    std::array<double, 2> load_friction{};  // the same per N the joint holds: 1, m
 };
 
 /// Distances, relations, wires and their eyes have one row; a tyre's are its load, and the forces along and across.
@@ -120,10 +124,16 @@ inline bool can_break(const JointSpec& joint) noexcept {
     return std::isfinite(joint.strength) || std::isfinite(joint.torque_strength);
 }
 
+/// Whether the slide along the joint's axis (0) or the turn about it (1) meets friction.
+inline bool rubs(const JointSpec& joint, int way) noexcept {
+    return joint.dry_friction[way] > 0.0 || joint.load_friction[way] > 0.0;
+}
+inline bool rubs(const JointSpec& joint) noexcept { return rubs(joint, 0) || rubs(joint, 1); }
+
 /// Whether some row of the joint has a finite bound.
 inline bool can_let_go(const JointSpec& joint) noexcept {
-    return joint.one_sided || gives_way(joint.kind) || can_break(joint) ||
-           (joint.has_motor && std::isfinite(joint.motor_force)) ||
+    return joint.one_sided || gives_way(joint.kind) || can_break(joint) || rubs(joint) ||
+           (joint.has_motor && (joint.motor_pushes || std::isfinite(joint.motor_force))) ||
            (joint.has_spring && std::isfinite(joint.spring_force)) ||
            (joint.has_limit && joint.limit_lower < joint.limit_upper);
 }

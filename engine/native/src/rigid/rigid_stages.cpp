@@ -60,10 +60,17 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                    : is.with_surface < 2
                                        ? "fewer than two bodies have a surface"
                                        : "every pair of surfaces is tied, excluded or cannot move";
-    const auto has = [&scene](JointKind kind) {
-        return std::any_of(scene.joints.begin(), scene.joints.end(),
-                           [kind](const JointSpec& joint) { return joint.kind == kind; });
+    const auto any_joint = [&scene](auto is_one) {
+        return std::any_of(scene.joints.begin(), scene.joints.end(), is_one);
     };
+    const auto has = [&any_joint](JointKind kind) {
+        return any_joint([kind](const JointSpec& joint) { return joint.kind == kind; });
+    };
+    const bool wound = any_joint(
+        [](const JointSpec& joint) { return joint.kind == JointKind::wire && !joint.terms.empty(); });
+    const bool meshes =
+        std::any_of(scene.colliders.begin(), scene.colliders.end(),
+                    [](const Collider& collider) { return collider.shape.kind == ShapeKind::triangle; });
     const std::string smooth = is.contacts ? "no two surfaces have friction" : no_contact;
     return choose_each([&](Stage stage) -> StageChoice {
         switch (stage) {
@@ -98,6 +105,32 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                                  : is.joints  ? "joints and contacts give rows"
                                               : "contacts give rows",
                                  no_rows);
+            case Stage::meet_meshes:
+                return choose_if(is.contacts && meshes,
+                                 "surfaces meet triangles: of their edges only what sticks out",
+                                 is.contacts ? "no surface is a mesh or a height field" : no_contact);
+            case Stage::couple_joints:
+                return choose_if(has(JointKind::relation),
+                                 "relations tie the coordinates of joints: a row each",
+                                 "there are no relations between joints");
+            case Stage::hold_wires:
+                return choose_if(has(JointKind::wire), "wires keep their length: a row each",
+                                 "there are no wires");
+            case Stage::wind_wires:
+                return choose_if(wound, "drums wind wires in and out: their hinges are in the wires' rows",
+                                 has(JointKind::wire) ? "no wire is wound on a drum" : "there are no wires");
+            case Stage::rub_joints:
+                return choose_if(any_joint([](const JointSpec& joint) { return rubs(joint); }),
+                                 any_joint([](const JointSpec& joint) {
+                                     return joint.load_friction[0] > 0.0 || joint.load_friction[1] > 0.0;
+                                 })
+                                     ? "joints rub: bounds follow their load until both agree"
+                                     : "joints rub: a row with bounds for each",
+                                 is.joints ? "no joint has friction" : "there are no joints");
+            case Stage::break_joints:
+                return choose_if(any_joint([](const JointSpec& joint) { return can_break(joint); }),
+                                 "what joints carry is compared with their strength after each solve",
+                                 is.joints ? "no joint has a strength" : "there are no joints");
             case Stage::tangents:
                 return choose_if(is.rubbing, "friction needs two directions per contact", smooth);
             case Stage::solve_path: return leave_out("rigid bodies couple in blocks");
@@ -112,13 +145,14 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                 return choose_if(is.iterative, "the method asks for projected Gauss–Seidel",
                                  rows ? "the method asks for a direct solver" : no_rows);
             case Stage::pivot:
-                return choose_if(pivots,
-                                 is.contacts
-                                     ? "contacts can let go"
-                                     : "a limit, a bounded motor, a wire or a joint that breaks can let go",
-                                 is.iterative ? asks_iterative
-                                 : is.joints  ? "all rows are bilateral: no row can let go"
-                                              : no_rows);
+                return choose_if(
+                    pivots,
+                    is.contacts ? "contacts can let go"
+                                : "a limit, a bounded motor, a wire, friction or a joint that breaks can "
+                                  "let go",
+                    is.iterative ? asks_iterative
+                    : is.joints  ? "all rows are bilateral: no row can let go"
+                                 : no_rows);
             case Stage::friction:
                 return choose_if(is.rubbing, "surfaces rub: " + to_text(method.friction) + " model", smooth);
             case Stage::orient_friction:

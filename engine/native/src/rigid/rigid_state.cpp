@@ -17,15 +17,38 @@ bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia
 
 }  // namespace
 
-Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept {
-    Mat3 r = state.turn_less_one * body.start_rotation;
-    for (int i = 0; i < 9; ++i) r.m[i] += body.start_rotation.m[i];
+namespace {
+
+Mat3 turned(const Mat3& start, const BodyState& state) noexcept {
+    Mat3 r = state.turn_less_one * start;
+    for (int i = 0; i < 9; ++i) r.m[i] += start.m[i];
     return r;
 }
 
+}  // namespace
+
+Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept {
+    return turned(body.start_rotation, state);
+}
+
+Mat3 inertia_axes(const BodyConstants& body, const BodyState& state) noexcept {
+    return turned(body.start_principal, state);
+}
+
 BodyConstants constants_of(const RigidBodySpec& spec) noexcept {
-    return {spec.motion,   spec.particle,    spec.mass,  spec.inertia, rotation(spec.orientation),
-            spec.position, spec.orientation, spec.force, spec.torque};
+    const Mat3 start = rotation(spec.orientation);
+    const bool tilted = !is_zero(Vec3{spec.inertia_axes.x, spec.inertia_axes.y, spec.inertia_axes.z});
+    return {spec.motion,
+            spec.particle,
+            spec.mass,
+            spec.inertia,
+            start,
+            spec.position,
+            spec.orientation,
+            spec.force,
+            spec.torque,
+            tilted ? start * rotation(spec.inertia_axes) : start,
+            tilted};
 }
 
 BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept {
@@ -48,7 +71,7 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept {
         state.angular_velocity = (1.0 / body.inertia.x) * state.angular_momentum;
         return;
     }
-    const Mat3 r = axes(body, state);
+    const Mat3 r = inertia_axes(body, state);
     const Vec3 p = transposed_times(r, state.angular_momentum);
     state.angular_velocity = r * Vec3{p.x / body.inertia.x, p.y / body.inertia.y, p.z / body.inertia.z};
     for (int i = 0; i < 3; ++i)
@@ -70,7 +93,7 @@ bool advance_pose(const BodyConstants& body, double h, BodyState& state) noexcep
         if (isotropic(body.inertia)) {
             if (!rotation_rate(body.inertia, h, state.angular_momentum, w)) return false;
         } else {
-            const Mat3 r = axes(body, state);
+            const Mat3 r = inertia_axes(body, state);
             if (!rotation_rate(body.inertia, h, transposed_times(r, state.angular_momentum), w)) return false;
             w = r * w;
         }
@@ -117,7 +140,7 @@ void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_v
 }
 
 Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept {
-    const Mat3 r = axes(body, state);
+    const Mat3 r = inertia_axes(body, state);
     const Vec3 p = transposed_times(r, angular_momentum);
     return r * Vec3{p.x / body.inertia.x, p.y / body.inertia.y, p.z / body.inertia.z};
 }

@@ -16,9 +16,11 @@ struct BodyConstants {
     double mass = 0.0;
     Vec3 inertia;  // principal
     Mat3 start_rotation;
-    Vec3 start;          // position at the start
-    Quat start_turn;     // orientation at the start
-    Vec3 force, torque;  // constant loads
+    Vec3 start;            // position at the start
+    Quat start_turn;       // orientation at the start
+    Vec3 force, torque;    // constant loads
+    Mat3 start_principal;  // principal axes of inertia at the start
+    bool tilted = false;   // whether they are others than those of the body
 
     bool moves() const noexcept { return motion == Motion::dynamic; }
 };
@@ -41,6 +43,8 @@ inline Quat orientation(const BodyConstants& body, const BodyState& state) noexc
 }
 /// Body axes to world axes.
 Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept;
+/// Principal axes of inertia to world axes.
+Mat3 inertia_axes(const BodyConstants& body, const BodyState& state) noexcept;
 
 BodyConstants constants_of(const RigidBodySpec& spec) noexcept;
 BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcept;
@@ -51,7 +55,7 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept;
 /// Where integrate() takes a body, without the rest of what is derived from it: displacement, turn, turn_less_one.
 bool move(const BodyConstants& body, double h, BodyState& state) noexcept;
 
-/// The same for a dynamic body whose axes() are at hand. `rate`, in body axes: in, where to look for the turn (zero: no
+/// The same for a dynamic body whose inertia_axes() are at hand. `rate`, along them: in, where to look for the turn (zero: no
 /// idea); out, the turn found.
 bool lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from, Vec3& rate,
           BodyState& to) noexcept;

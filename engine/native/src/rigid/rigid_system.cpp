@@ -96,7 +96,11 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0)
         locked_.analyse(constants_, joints_, tied_);
     if (solver_ == RigidSolver::block && locked_.empty()) analyse_block();
-    if (composed_ && solver_ == RigidSolver::block) tree_.analyse(constants_, joints_, tied_, start_);
+    const bool tilted =  // joint coordinates see inertias along the bodies' own axes
+        std::any_of(constants_.begin(), constants_.end(),
+                    [](const BodyConstants& body) { return body.tilted; });
+    if (composed_ && solver_ == RigidSolver::block && !tilted)
+        tree_.analyse(constants_, joints_, tied_, start_);
     reset(nullptr);
 }
 
@@ -112,7 +116,19 @@ void RigidSystem::take_stages(const RigidScene& scene) {
         stages_.take(Stage::roll);
     }
     const bool wires = stages_.take(Stage::rub_wires), tyres = stages_.take(Stage::roll_tyres);
-    following_.take(joints_, wires, tyres);
+    const bool rub = stages_.take(Stage::rub_joints);
+    following_.take(joints_, wires, tyres, rub);
+    breaks_ = stages_.take(Stage::break_joints);
+    const bool coupled = stages_.take(Stage::couple_joints), held = stages_.take(Stage::hold_wires);
+    const bool wound = stages_.take(Stage::wind_wires), meshes = stages_.take(Stage::meet_meshes);
+    for (const JointSpec& joint : scene.joints)
+        if ((joint.kind == JointKind::relation && !coupled) || (joint.kind == JointKind::wire && !held) ||
+            (joint.kind == JointKind::wire && !joint.terms.empty() && !wound) || (rubs(joint) && !rub))
+            throw std::invalid_argument(
+                "a relation, a wire or a joint that rubs needs the stage named for it");
+    for (const Collider& collider : scene.colliders)
+        if (collider.shape.kind == ShapeKind::triangle && stages_.runs(Stage::collision) && !meshes)
+            throw std::invalid_argument("meshes need the stage meet_meshes");
     if (stages_.take(Stage::assemble_rows)) {
         const bool block = stages_.take(Stage::solve_block), iterative = stages_.take(Stage::solve_iterative);
         const bool pivot = stages_.take(Stage::pivot);
@@ -150,6 +166,7 @@ void RigidSystem::reset(StageClock* clock) {
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
     redundant_.reset(matrix_);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
+    joints_.breaks.clear();
     clock_ = clock;
     rounds_ = sweeps_ = 0;
     residual_ = 0.0;
@@ -296,6 +313,9 @@ std::vector<double> RigidSystem::final_state() {
 
 void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     const std::int64_t substeps = steps * method_.substeps;
+    for (const Break& at : joints_.breaks)
+        report.broken.push_back({at.joint, (at.step + method_.substeps - 1) / method_.substeps,
+                                 static_cast<double>(at.step) * h_, at.force, at.torque});
     report.counters["steps"] = steps;
     report.counters["substeps"] = substeps;
     report.counters["rows_assembled"] = static_cast<std::int64_t>(rows_) * substeps;

@@ -147,6 +147,7 @@ public:
         friend class RigidSystem;
         Live live;
         LargeArray<JointSet::State> joints;
+        std::vector<Break> breaks;
         RedundantRows::Memory redundancy;
         MixedSystem mixed;
         ContactStage::Memory contacts;
@@ -326,6 +327,7 @@ private:
     std::vector<std::vector<Beyond>> beyond_, holding_beyond_;  // per block of joints: what its rows show
     PivotSolver pivot_;
     FollowingBounds following_;
+    bool breaks_ = false;  // whether some joint may
     std::optional<ContactStage> contacts_, fresh_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
@@ -357,8 +359,8 @@ private:
     bool in_tree_ = false;
     std::size_t unknowns_ = 0;  // of a stage: rows, or joint coordinates
     std::vector<double> change_, last_plain_, last_step_, mixing_, extent_;
-    std::vector<Vec3> rate_;  // per tied body: turn over the stage, body axes
-    std::vector<Mat3> axes_;  // per tied body, where the stage starts
+    std::vector<Vec3> rate_;  // per tied body: turn over the stage, along them
+    std::vector<Mat3> axes_;  // per tied body, those of its inertia where the stage starts
     bool dense_ = false;
     DenseRows dense_rows_;
     struct Meeting {                    // of two blocks on one moving body

@@ -23,6 +23,14 @@ struct Recording {
     std::vector<double> values;
 };
 
+/// A joint that broke.
+struct Broken {
+    int joint = 0;
+    std::int64_t step = 0;             // counted from 1
+    double time = 0.0;                 // at the end of the step h, or part of one, it broke in, s
+    double force = 0.0, torque = 0.0;  // what its rows held in it, N and N m
+};
+
 struct RunReport {
     Status status = Status::completed;
     std::int64_t steps = 0;         // steps done; of a failed run, those before the failing step
@@ -34,6 +42,7 @@ struct RunReport {
     double residual = 0.0;          // largest row residual an iterative solve stopped at, m/s
     std::map<std::string, std::int64_t> counters;
     std::map<std::string, double> stage_seconds;
+    std::vector<Broken> broken;         // in the order they broke
     std::vector<Recording> recordings;  // in the order the observables were given
     std::vector<double> final_state;    // bodies × 13: position, orientation, velocity, angular velocity
     std::string state_hash;

@@ -14,11 +14,12 @@
 namespace spook {
 
 /// In the order of the step.
-SPOOK_NAMED_ENUM(Stage, collision, apply_gravity, apply_central_gravity, apply_springs, apply_loads,
-                 follow_time, apply_fluids, impact, string_stiffness, assemble_rows, tangents, solve_path,
-                 solve_block, solve_iterative, pivot, friction, orient_friction, move_surfaces, roll,
-                 rub_wires, roll_tyres, correct_curvature, half_step, integrate_positions,
-                 integrate_rotations, observe)
+SPOOK_NAMED_ENUM(Stage, collision, meet_meshes, apply_gravity, apply_central_gravity, apply_springs,
+                 apply_loads, follow_time, apply_fluids, impact, string_stiffness, assemble_rows,
+                 couple_joints, hold_wires, wind_wires, tangents, solve_path, solve_block, solve_iterative,
+                 pivot, friction, orient_friction, move_surfaces, roll, rub_wires, roll_tyres, rub_joints,
+                 break_joints, correct_curvature, half_step, integrate_positions, integrate_rotations,
+                 observe)
 
 inline constexpr std::size_t STAGES = static_cast<std::size_t>(Stage::observe) + 1;
 

@@ -29,13 +29,14 @@ struct TimeFunction {
     }
 };
 
-/// What follows: a load, the speed of a motor, the rest of a joint's spring, or the velocities of a kinematic body.
-SPOOK_NAMED_ENUM(DriveKind, load, motor, rest, pace)
+/// What follows: a load; the speed of a motor, what it pushes with or may at most; the rest of a joint's spring; of a
+/// kinematic body both velocities, its spin alone, its place along one of the world's axes, its angle about an axis.
+SPOOK_NAMED_ENUM(DriveKind, load, motor, push, rest, pace, spin, path, angle)
 
 struct TimeDrive {
     DriveKind kind = DriveKind::load;
     int index = 0;         // of the body or joint
-    Vec3 linear, angular;  // what the number multiplies, of a load or a pace
+    Vec3 linear, angular;  // what the number multiplies; of a path or an angle its axis
     TimeFunction function;
 };
 
