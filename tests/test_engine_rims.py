@@ -81,7 +81,7 @@ def run(*bodies: RigidBody, steps: int, gravity: Any = DOWN, time_step: float = 
 # --- depths ---------------------------------------------------------------------------------------------
 
 
-def farthest(shape: Shape, n: Any) -> Any:
+def farthest(shape: Shape | Any, n: Any) -> Any:
     """Largest n · p over a shape in its own axes: its support function, written down anew."""
     match shape:
         case Sphere():
@@ -92,6 +92,8 @@ def farthest(shape: Shape, n: Any) -> Any:
             return np.abs(n) @ np.array(shape.size) / 2.0
         case ConvexHull():
             return np.max(n @ np.array(shape.corners).T, axis=-1)
+        case np.ndarray():  # corners alone
+            return np.max(n @ shape.T, axis=-1)
         case Cylinder():
             return shape.radius * np.hypot(n[..., 0], n[..., 1]) + 0.5 * shape.length * np.abs(n[..., 2])
         case Cone():
@@ -112,7 +114,7 @@ DIRECTIONS = sphere_of_directions(2000)
 CORNERS = np.array(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))  # of a simplex
 
 
-def gap(first: Shape, turn: Any, place: Any, second: Shape, other: Any) -> tuple[float, Any]:
+def gap(first: Shape, turn: Any, place: Any, second: Shape | Any, other: Any) -> tuple[float, Any]:
     """Distance of two shapes, or minus their least overlap, and its direction: the largest gap of all, by search."""
 
     def along(n: Any) -> Any:
