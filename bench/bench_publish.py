@@ -9,7 +9,6 @@ publications is the claim about time; bytes are the same on every machine.
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 import tempfile
 import time
@@ -20,9 +19,8 @@ import msgspec
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from spook_tracker.tracker.website.publish import publish
+from tests.page_weights import before_charts, too_heavy
 from tests.synthetic_history import DocumentHistory, decade
-
-BUDGETS = {"index.html": 100_000, "tests/": 400_000, "compare.html": 400_000, "regressions.html": 400_000}
 
 
 def history(nights: int, series: int) -> DocumentHistory:
@@ -34,12 +32,6 @@ def history(nights: int, series: int) -> DocumentHistory:
         samples = tuple(sample for sample in document.samples if sample.series in keys)
         cut.append(msgspec.structs.replace(document, series=kept, samples=samples))
     return DocumentHistory(cut)
-
-
-def before_charts(page: Path) -> int:
-    """Bytes of a page without its charts."""
-    text = page.read_text(encoding="utf-8")
-    return len(re.sub(r'<figure class="chart.*?</figure>', "", text, flags=re.DOTALL).encode())
 
 
 def main() -> None:
@@ -59,12 +51,10 @@ def main() -> None:
             print(f"{nights} nights, {asked.series} series: {seconds[-1]:.1f} s of processor time, {told}")
         print(f"one more night / all nights: {seconds[1] / seconds[0]:.2f}")
         print(f"{'page':<32}{'bytes':>10}{'before charts':>15}")
-        over = []
         for page in sorted(out.rglob("*.html")):
             name = str(page.relative_to(out))
             bare = before_charts(page)
             print(f"{name:<32}{page.stat().st_size:>10}{bare:>15}")
-            over += [name for start, most in BUDGETS.items() if name.startswith(start) and bare > most]
         blocks = sorted((out / "compare").glob("nights-*.js"), key=lambda path: path.stat().st_size)
         if blocks:
             print(
@@ -72,7 +62,7 @@ def main() -> None:
             )
         total = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
         print(f"the whole site: {total / 1e6:.1f} MB")
-        if over:
+        if over := too_heavy(out):
             sys.exit(f"over budget: {', '.join(over)}")
 
 

@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import spook_tracker.engine as engine
 import spook_tracker.tracker as tracker
 from spook_tracker.engine.joints import Distance
+from spook_tracker.tracker.document.json_form import decode, encode
 from spook_tracker.tracker.document.run_document import EngineVersion, RunDocument
 from tests.broken_engines import off_by
 
@@ -130,11 +131,11 @@ def measured(keep: Path | None, names: Sequence[str], **asked: Any) -> dict[str,
     def answers(fault: str, tests: Sequence[str], source: str) -> RunDocument:
         kept = None if keep is None else keep / f"{fault}.json"
         if kept is not None and kept.exists():
-            return msgspec.json.decode(kept.read_bytes(), type=RunDocument)
+            return decode(kept.read_bytes(), RunDocument)
         found = tracker.run(tests, engine=source, **asked)
         if kept is not None:
             kept.parent.mkdir(parents=True, exist_ok=True)
-            kept.write_bytes(msgspec.json.encode(found))
+            kept.write_bytes(encode(found))
         return found
 
     told = {"SOUND": answers("SOUND", names, "spook")}

@@ -17,6 +17,7 @@ from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.options import OneLineErrors
 from spook_tracker.tracker.document.schema import document_schema
 from spook_tracker.tracker.judge.comparison_document import compare_schema
+from tests.page_weights import too_heavy
 
 ROOT = Path(__file__).resolve().parents[1]
 GOOD, BAD = "a" * 40, "b" * 40
@@ -326,6 +327,7 @@ def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypa
 
     assert first.exit_code == 0
     assert Path("public/index.html").is_file()
+    assert too_heavy(Path("public")) == []
     assert second.exit_code == 1
     (red,) = [line for line in second.stdout.splitlines() if line.startswith("✗ stand/")]
     assert "✓ green" in second.stdout  # every limit holds: only the history knows

@@ -6,7 +6,10 @@ import csv
 import hashlib
 import io
 import json
+import os
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 from pathlib import Path
@@ -208,6 +211,27 @@ def test_the_same_history_gives_the_same_bytes(site: Path, tmp_path: Path) -> No
     publish(history(30, broken=26, hostile=True), tmp_path / "again")
 
     assert files(site) == files(tmp_path / "again")
+
+
+PUBLISHED = """
+import sys
+from pathlib import Path
+from spook_tracker.tracker.website.publish import publish
+from tests.test_site_replays import nights
+publish(nights(1.0, 2.0, 9.0, tests=("friction", "pendulum"), broken=2), Path(sys.argv[1]))
+"""
+
+
+def test_the_bytes_do_not_depend_on_the_order_of_sets(tmp_path: Path) -> None:
+    """Another seed of hashes for each of two processes; with recorded motion and a fault."""
+    for seed in ("1", "2"):
+        environment = os.environ | {"PYTHONHASHSEED": seed}
+        command = [sys.executable, "-c", PUBLISHED, str(tmp_path / seed)]
+        subprocess.run(command, cwd=Path(__file__).parent.parent, env=environment, check=True)
+    one, two = (files(tmp_path / seed) for seed in ("1", "2"))
+
+    assert any(name.startswith("replay/") for name in map(str, one))
+    assert one == two
 
 
 def test_unchanged_pages_are_kept_and_a_new_night_changes_them(tmp_path: Path) -> None:

@@ -180,14 +180,20 @@ def sparkline(
         share = 0.5 if flat else (value - low) / span
         return 4.0 + i * step, height - 4.0 - share * (height - 8.0)
 
-    path, pen = [], "M"
-    for i, value in enumerate(values):
-        if math.isfinite(value):
-            x, y = point(i, value)
-            path.append(f"{pen}{_n(x)} {_n(y)}")
-            pen = "L"
-        else:
+    path: list[str] = []
+    pen, level = "M", ""
+    for i, value in enumerate(values):  # hundreds stand on a page: what stays level is one stroke
+        if not math.isfinite(value):
             pen = "M"
+            continue
+        across, down = (_n(v) for v in point(i, value))
+        if pen == "L" and down == level:
+            if path[-1].startswith("H"):
+                path.pop()
+            path.append(f"H{across}")
+        else:
+            path.append(f"{pen}{across} {down}")
+        pen, level = "L", down
     failed = []
     for i, (value, state) in enumerate(zip(values, states, strict=True)):
         if state == "fail":
