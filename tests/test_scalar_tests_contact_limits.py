@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,15 +17,14 @@ from spook_tracker.scalar_tests import (
     grain,
     hanging_cable,
     masonry_arch,
-    rocking_block,
     rolling_coin,
-    shaken_block,
     sorting,
     stone_bridge,
     turntable,
     vehicle,
 )
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from tests.limits import measurement
 
 
 def test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn() -> None:
@@ -164,6 +162,10 @@ def test_the_loads_of_a_braking_vehicle_balance_its_moments() -> None:
     grip = v.FRICTION * (v.MASS * v.GRAVITY * math.cos(tilt) - v.climbing_load())
     assert grip > 2.0 * v.TORQUE / v.RADIUS  # the driven wheels do not slip
     assert v.stopping(1e-6) == pytest.approx(v.STOPPED**2 / (2.0 * v.BRAKING), rel=1e-5)
+    limits = {m.name: m.limit for m in measurement("vehicle", "braking").metrics}
+    sinks = v.COMPLIANCE * front / 4.0  # each of two wheels on two points, within a step
+    assert limits["stands"] == pytest.approx(sinks / v.TIME_STEP)
+    assert limits["stopping_error"] == pytest.approx(sinks / v.TIME_STEP * v.DURATION)
     short = v.stopping(v.TIME_STEP) - v.STOPPED**2 / (2.0 * v.BRAKING)
     assert short == pytest.approx(-0.5 * v.STOPPED * v.TIME_STEP, rel=0.01)
 
@@ -284,103 +286,6 @@ def test_a_bridge_carries_what_limit_analysis_allows() -> None:
         for part in np.linspace(0.0, 1.0, 21)[:-1]
     ]
     assert min(crossing) == pytest.approx(b.LEAST, abs=5e-5) and min(b.LIMIT.values()) == b.LEAST
-
-
-def test_the_rocking_block_by_angular_momentum_and_a_tight_integration() -> None:
-    """Angular momentum about the new corner, from positions and velocities; times by events of an integration."""
-    r = rocking_block
-    inertia = r.MASS * ((2 * r.HALF_WIDTH) ** 2 + (2 * r.HALF_HEIGHT) ** 2) / 12.0
-    # Turning at 1 rad/s about the left corner; the centre stands (b, h) from it, and (−b, h) from the right one.
-    moving = np.array((r.HALF_HEIGHT, -r.HALF_WIDTH))
-    kept = inertia + r.MASS * (r.HALF_HEIGHT * moving[0] - (-r.HALF_WIDTH) * moving[1])
-    assert kept / (inertia + r.MASS * r.RADIUS**2) == pytest.approx(r.KEPT, rel=1e-12)
-
-    def fall(_: float, y: np.ndarray) -> tuple[float, float]:
-        return y[1], -(r.RATE**2) * math.sin(r.SLENDER - y[0])
-
-    def upright(_: float, y: np.ndarray) -> float:
-        return float(y[0])
-
-    def turning(_: float, y: np.ndarray) -> float:
-        return float(y[1])
-
-    upright.terminal, turning.terminal, turning.direction = True, True, -1  # type: ignore[attr-defined]
-    tight = {"rtol": 1e-11, "atol": 1e-13}
-    down = solve_ivp(fall, (0.0, 5.0), (r.START, 0.0), events=upright, **tight)
-    assert down.t[-1] == pytest.approx(r.quarter(r.START), rel=1e-8)
-    assert -down.y[1, -1] == pytest.approx(r.speed(r.START), rel=1e-8)
-    up = solve_ivp(fall, (0.0, 5.0), (0.0, -r.KEPT * down.y[1, -1]), events=turning, **tight)
-    assert up.y[0, -1] == pytest.approx(r.next_lean(), rel=1e-7)
-    assert up.t[-1] == pytest.approx(r.quarter(r.next_lean()), rel=1e-7)
-
-
-def shaken_fall(side: float, strength: float, frequency: float, half: bool, **tight: Any) -> Any:
-    """solve_ivp of Housner's equation about the edge of that side, with its own events: upright, and a turn."""
-    r, sb = rocking_block, shaken_block
-
-    def fall(t: float, y: np.ndarray) -> tuple[float, float]:
-        quiet = half and t > 0.5 / frequency
-        floor = 0.0 if quiet else strength * sb.UPLIFT * math.sin(2.0 * math.pi * frequency * t)
-        # Moments about the edge, of the weight and of −m a at the centre, over I = 4/3 m R².
-        out, up = r.RADIUS * math.sin(r.SLENDER - side * y[0]), r.RADIUS * math.cos(r.SLENDER - side * y[0])
-        return y[1], (-side * r.GRAVITY * out - floor * up) / (4.0 / 3.0 * r.RADIUS**2)
-
-    def upright(_: float, y: np.ndarray) -> float:
-        return float(side * y[0])
-
-    def turning(_: float, y: np.ndarray) -> float:
-        return float(side * y[1])
-
-    upright.terminal, upright.direction, turning.direction = True, -1, -1  # type: ignore[attr-defined]
-    return lambda span, start: solve_ivp(fall, span, start, events=(upright, turning), max_step=0.01, **tight)
-
-
-def test_the_shaken_block_by_a_tight_integration_with_events() -> None:
-    s, tight = shaken_block, {"rtol": 1e-11, "atol": 1e-14}
-    uplift = math.asin(1.0 / s.SHAKE) / (2.0 * math.pi * s.FREQUENCY)
-    swing = shaken_fall(-1.0, s.SHAKE, s.FREQUENCY, False, **tight)((uplift, 2.0), (-1e-13, -1e-14))
-    back = shaken_fall(1.0, s.SHAKE, s.FREQUENCY, False, **tight)(
-        (swing.t[-1], 2.0), (1e-13, s.KEPT * swing.y[1, -1])
-    )
-    right = s.rocking()
-    assert (right.before, right.turned) == pytest.approx(
-        (swing.y_events[1][-1][0], swing.t_events[1][-1]), abs=1e-7
-    )
-    assert (right.blow, right.speed) == pytest.approx((swing.t[-1], swing.y[1, -1]), rel=1e-6)
-    assert (right.after, right.returned) == pytest.approx(
-        (back.y_events[1][0][0], back.t_events[1][0]), rel=1e-6
-    )
-
-
-def test_the_least_half_sine_that_throws_a_block_over() -> None:
-    s = shaken_block
-
-    def falls(strength: float) -> bool:
-        start = math.asin(1.0 / strength) / (2.0 * math.pi * s.PULSE)
-        fly = shaken_fall(-1.0, strength, s.PULSE, True, rtol=1e-9, atol=1e-13)
-        found = fly((start, s.FALLS), (-1e-13, -1e-14))
-        return not len(found.t_events[0]) and bool(found.y[0, -1] < -s.SLENDER)
-
-    def thrown(strength: float) -> bool:
-        """The same stepped by 1/60 s, the floor's speed of mid-step: v₊ = v + h f, θ₊ = θ + h v₊."""
-        lean = speed = floor = 0.0
-        for k in range(round(s.FALLS / s.COARSE)):
-            turned = 2.0 * math.pi * s.PULSE * min((k + 0.5) * s.COARSE, 0.5 / s.PULSE)
-            now = strength * s.UPLIFT / (2.0 * math.pi * s.PULSE) * (1.0 - math.cos(turned))
-            apart = s.SLENDER + lean
-            kick = s.COARSE * math.sin(apart) - (now - floor) / s.GRAVITY * math.cos(apart)
-            floor, speed = now, speed + s.RATE**2 * kick
-            if lean >= 0.0 and speed > 0.0:
-                lean = speed = 0.0  # both edges stand
-            lean += s.COARSE * speed
-        return lean < -s.SLENDER
-
-    for outcome, within in ((falls, 1e-5), (thrown, 1e-3)):
-        low, high = 1.5, 2.5
-        for _ in range(20):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if outcome(middle) else (middle, high)
-        assert low == pytest.approx(s.LEAST, rel=within)
 
 
 @pytest.mark.parametrize(("count", "time_step"), hanging_cable.ASKED)
