@@ -16,10 +16,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from sqlalchemy import text
+from sqlalchemy.orm import Session
 
 from spook_tracker.engine import joints, theory
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store.database import open_database
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.views import ABOUT
 from tests.run_documents import run
@@ -73,10 +75,6 @@ def test_the_queries_run_on_both_databases(session: Any) -> None:
 
 
 def test_the_python_beside_the_queries_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sqlalchemy.orm import Session
-
-    from spook_tracker.tracker.store.database import open_database
-
     engine = open_database(f"sqlite:///{tmp_path}/tracker.db")
     with Session(engine) as session:
         record(session, run())
@@ -140,6 +138,34 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert {"index.html", "tutorial/first-night.html", "reference/schema.html"} <= pages
     for page in (tmp_path / "site").rglob("*.html"):
         assert not re.search(r'(src|href)="https?://[^"]*\.(js|css)', page.read_text(encoding="utf-8")), page
+
+
+def test_a_website_takes_the_documentation_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linked from every page where it is, from none where it is not."""
+    monkeypatch.chdir(tmp_path)
+    engine = open_database(f"sqlite:///{tmp_path}/tracker.db")
+    with Session(engine) as session:
+        record(session, run())
+    engine.dispose()
+    pages = tmp_path / "built"
+    (pages / "how-to").mkdir(parents=True)
+    (pages / "index.html").write_text("<h1>ours</h1>")
+    (pages / "how-to" / "ci.html").write_text("ci")
+
+    def published(*words: str) -> set[str]:
+        done = CliRunner().invoke(main, ["publish", "--out", "public", *words], prog_name="tracker")
+        assert done.exit_code == 0, done.output
+        shown = {path: path.read_text(encoding="utf-8") for path in (tmp_path / "public").glob("*.html")}
+        return {path.name for path, html in shown.items() if 'href="docs/index.html"' in html}
+
+    assert published() == set()
+    refused = CliRunner().invoke(main, ["publish", "--out", "public", "--documents", "built/how-to"])
+    assert refused.exit_code == 2
+    assert "has no index.html" in refused.output
+    assert {"index.html", "stability.html"} <= published("--documents", "built")
+    assert (tmp_path / "public" / "docs" / "how-to" / "ci.html").read_text() == "ci"
+    assert published() == set()
+    assert not (tmp_path / "public" / "docs").exists()
 
 
 def test_the_page_of_tables_is_complete() -> None:

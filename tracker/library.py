@@ -200,11 +200,13 @@ def publish(
     home_page: str = "",
     mutants: Path | None = None,
     colour: str = "",
+    documents: Path | None = None,
 ) -> Any:
     """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
 
     `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
     `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links. `mutants` is the record that `make mutants` writes.
+    `documents` is a folder of HTML files that is published with it, as docs/.
     """
     from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.page_mutants import read_mutants
@@ -212,7 +214,7 @@ def publish(
 
     offered = database_file(database) if database else None
     wrong = read_mutants(mutants) if mutants else ()
-    return build(history, out, accepted, offered, title, home_page, wrong, colour)
+    return build(history, out, accepted, offered, title, home_page, wrong, colour, documents)
 
 
 def judged_again(
@@ -259,6 +261,7 @@ def nightly(
     home_page: str = "",
     mutants: Path | None = None,
     colour: str = "",
+    documents: Path | None = None,
     **asked: Any,
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
@@ -293,5 +296,5 @@ def nightly(
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database) as history:
         offered = database if with_database else ""
-        published = publish(history, out, accepted, offered, title, home_page, mutants, colour)
+        published = publish(history, out, accepted, offered, title, home_page, mutants, colour, documents)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

@@ -17,6 +17,7 @@ from spook_tracker.tracker.cli.options import (
     RED,
     accepted_option,
     database_option,
+    documents_option,
     example,
     executor_option,
     limit_option,
@@ -53,6 +54,7 @@ def ci() -> None:
 @limit_option
 @website_options
 @mutants_option
+@documents_option
 @accepted_option
 @source_options
 @database_option

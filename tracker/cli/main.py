@@ -17,6 +17,7 @@ from spook_tracker.tracker.cli.options import (
     OneLineErrors,
     accepted_option,
     database_option,
+    documents_option,
     example,
     executor_option,
     limit_option,
@@ -151,6 +152,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @with_database_option
 @website_options
 @mutants_option
+@documents_option
 @accepted_option
 @source_options
 @database_option
@@ -162,6 +164,7 @@ def nightly(
     home_page: str,
     colour: str,
     mutants: Path | None,
+    documents: Path | None,
     executor: str,
     workers: int,
     time_limit: float,
@@ -215,6 +218,7 @@ def nightly(
             home_page=home_page,
             colour=colour,
             mutants=mutants,
+            documents=documents,
             catalogue=catalogue,
             engine=first,
             limits=present().limits_of(first),
@@ -253,6 +257,7 @@ def engines() -> None:
 @with_database_option
 @website_options
 @mutants_option
+@documents_option
 @accepted_option
 @database_option
 def publish(
@@ -262,6 +267,7 @@ def publish(
     home_page: str,
     colour: str,
     mutants: Path | None,
+    documents: Path | None,
     accepted: Path | None,
     database: str,
 ) -> None:
@@ -272,7 +278,8 @@ def publish(
 
     with History.open(database) as history:
         offered = database if with_database else ""
-        report = build(history, out, accepted_levels(accepted), offered, title, home_page, mutants, colour)
+        levels = accepted_levels(accepted)
+        report = build(history, out, levels, offered, title, home_page, mutants, colour, documents)
     _say_published(report, out)
 
 

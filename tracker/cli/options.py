@@ -107,6 +107,24 @@ def mutants_option(command: Command) -> Command:
     )(command)
 
 
+def _with_first_page(context: click.Context, option: click.Parameter, folder: Path | None) -> Path | None:
+    """Before anything is measured."""
+    if folder is not None and not (folder / "index.html").is_file():
+        raise click.BadParameter(f"{folder} has no index.html; build the documentation first")
+    return folder
+
+
+def documents_option(command: Command) -> Command:
+    """--documents DIR: a built documentation that is published with the website."""
+    return click.option(
+        "--documents",
+        metavar="DIR",
+        callback=_with_first_page,
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        help="A documentation as HTML files, to be published as docs/ and linked on every page.",
+    )(command)
+
+
 def limit_option(command: Command) -> Command:
     """--limit SECONDS, so that a slow engine does not hold up a night."""
     return click.option(

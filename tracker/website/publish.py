@@ -98,13 +98,14 @@ def publish(
     home_page: str = "",
     mutants: Sequence[Mutant] = (),
     colour: str = "",
+    documents: Path | None = None,
 ) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
     the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links and buttons: ColourError if it cannot be read. `mutants` are
     engines that were wrong on purpose, and who noticed. What cannot be made says so in its place,
-    and everything else is published.
+    and everything else is published. `documents` is a folder of HTML files that goes along, as docs/.
     """
     site = resource("site")
     static, templates = site / "static", site / "templates"
@@ -118,6 +119,7 @@ def publish(
         "site_title": clean(title) or TITLE,
         "home_page": web_address(home_page),
         "accent": accent(colour),
+        "documents": documents is not None and (documents / "index.html").is_file(),
     }
     with replacing(out) as folder:
         for name, content in contents.items():
@@ -129,6 +131,10 @@ def publish(
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
+        if documents and whose["documents"]:
+            for page in sorted(path for path in documents.rglob("*") if path.is_file()):
+                content = page.read_bytes()
+                folder.add(f"docs/{page.relative_to(documents)}", digest(content), partial(bytes, content))
         events = all_events(told) if told.nights else []
         causes = causes_of(told)
         levels = digest(making.encode(), repr(accepted).encode())
