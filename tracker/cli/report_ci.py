@@ -8,7 +8,8 @@ import click
 
 from spook_tracker.tracker.cli.report_comment import command_of
 from spook_tracker.tracker.cli.report_compare import escape, summary, value
-from spook_tracker.tracker.document.wording import clock, page_of, version
+from spook_tracker.tracker.document.addresses import page_of
+from spook_tracker.tracker.document.wording import clock, version
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.tonight import Finding
 

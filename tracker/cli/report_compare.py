@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 import click
 
 from spook_tracker.tracker.cli.console import Column, clean, table, width
+from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import Number, readable
-from spook_tracker.tracker.document.wording import page_of
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side

@@ -164,11 +164,6 @@ def slug(name: str) -> str:
     return f"{letters or 'x'}-{hashlib.sha256(name.encode('utf-8', 'replace')).hexdigest()[:8]}"
 
 
-def page_of(test: str) -> str:
-    """The page of the website about a test, from the website's root."""
-    return f"tests/{slug(test)}.html"
-
-
 def version(engine: EngineVersion) -> str:
     """The version of an engine without the commit that follows the plus sign."""
     return clean(engine.version.partition("+")[0]) + (" (changed tree)" if engine.dirty else "")

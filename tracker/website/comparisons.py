@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
     named,
     number,
-    page_of,
     quantity,
     short_hash,
 )

@@ -13,9 +13,10 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import Any
 
+from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import boxed
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
-from spook_tracker.tracker.document.wording import clean, conditions, named, page_of, slug
+from spook_tracker.tracker.document.wording import clean, conditions, named, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.document.wording import (
     clean,
@@ -20,7 +21,6 @@ from spook_tracker.tracker.document.wording import (
     limit,
     named,
     number,
-    page_of,
     quantity,
     seconds,
     slug,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.wording import (
     band,
     clean,
@@ -16,7 +17,6 @@ from spook_tracker.tracker.document.wording import (
     margin,
     named,
     number,
-    page_of,
     quantity,
     seconds,
     slug,
