@@ -29,7 +29,7 @@ help:
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
 	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
-	@echo "make release VERSION=1.2.3   all of the above but bench, then the changelog dated and the commit tagged"
+	@echo "make release VERSION=1.2.3   check, test and package, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
 	@echo "make site      publish the website again from what is recorded"
 	@echo "make docs      the documentation as a site in build/docs, and the man pages in build/man"

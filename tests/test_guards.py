@@ -143,3 +143,17 @@ def test_files_of_long_tests_are_there() -> None:
     from tests.conftest import FIRST
 
     assert [path for path in FIRST if not path.exists()] == []
+
+
+def test_no_file_is_longer_than_contributing_says() -> None:
+    (most,) = map(int, re.findall(r"none has more than (\d+)", (ROOT / "CONTRIBUTING.md").read_text()))
+    rooms = ("engine", "scalar_tests", "tracker", "tests", "bench", "migrations", "docs", "examples")
+    files = [
+        path
+        for room in rooms
+        for path in (ROOT / room).rglob("*")
+        if path.suffix in (".py", ".cpp", ".hpp", ".inl")
+    ]
+
+    assert len(files) > 500
+    assert {path.name: n for path in files if (n := len(path.read_text().splitlines())) > most} == {}

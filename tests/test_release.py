@@ -174,3 +174,13 @@ def test_drift_against_a_release_end_to_end(clone: Clone) -> None:
     assert clone.run(
         "git", "commit", "-qm", "x"
     ).returncode  # nothing is left to commit: the tree stayed clean
+
+
+def test_make_release_runs_what_its_line_of_help_says(clone: Clone) -> None:
+    """In a clone, without doing it: first whether it is possible, then the checks that are named, then the release."""
+    (said,) = re.findall(r"make release VERSION=1\.2\.3 +(.+), then", (ROOT / "Makefile").read_text())
+    planned = clone.run("make", "--dry-run", "--always-make", "MAKE=make", "release", "VERSION=1.2.3").stdout
+    steps = [line for line in planned.splitlines() if ".ci/release" in line or line.startswith("make ")]
+
+    assert steps == ['sh .ci/release --check "1.2.3"', "make check test package", 'sh .ci/release "1.2.3"']
+    assert said == "check, test and package"
