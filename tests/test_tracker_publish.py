@@ -196,8 +196,14 @@ def test_plotly_accepts_every_figure(site: Path) -> None:
             layout = {k: v for k, v in told["layout"].items() if k not in ("shapes", "annotations")}
             go.Figure(data=told["data"], layout=layout)
             drawn += 1
+            last = told
 
     assert drawn > 50
+    assert drawn == sum(page.read_text().count('"layout":') for page in html_pages(site)), (
+        "none is passed over"
+    )
+    with pytest.raises(ValueError, match="Did you mean"):  # they would see a misspelt property
+        go.Figure(data=[{**last["data"][0], "nmae": "x"}])
 
 
 def test_the_bundle_is_the_version_plotly_for_python_expects() -> None:
