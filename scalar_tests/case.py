@@ -210,6 +210,9 @@ class Ladder:
     run: Callable[[Simulate, float, Method], Result]
     target_error: float | None = None  # for "time to reach a given error", in `unit`
     target_seconds: float | None = None  # for "error reached in a given time", s
+    time_tolerance: float = (
+        0.0  # relative: a change of run time below is not told; 0 leaves it to the noise, 1 % at least
+    )
 
     def steps_of(self, configuration: Configuration) -> tuple[float, ...]:
         """Time steps [s] of one configuration, coarse to fine."""
@@ -292,6 +295,9 @@ class ScalarTest:
     misprints: tuple[str, ...] = ()  # where a reader comparing with the thesis would stumble
     seven: bool = False  # one of the thesis' seven continuous tests
     formerly: tuple[str, ...] = ()  # its earlier names: its history goes on
+    iteration_tolerance: float = (
+        0.1  # relative: how many more sweeps, pivots, corrections are not yet more work
+    )
 
     def questions(self) -> tuple[Asked, ...]:
         """What is asked apart from how: each quantity once for every time step and parameters.

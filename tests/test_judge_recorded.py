@@ -55,6 +55,22 @@ def test_there_are_no_more_alarms_than_asv_and_otava_see_steps_and_the_page_says
     assert sum(row[2] for row in rows.values()) <= sum(row[3] + row[4] for row in rows.values())
 
 
+def test_every_alarm_is_near_anothers_step_or_explained() -> None:
+    listed = json.loads((ROOT / "tests" / "data" / "recorded_alarms.json").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "detectors.md").read_text(encoding="utf-8")
+    found = set()
+    for file in FILES:
+        for name, values in recorded(file)["values"].items():
+            red = [night.state == "detected" for night in judge_noisy(values)]
+            nights = (n for n in range(LEARNING, len(red)) if red[n] and not red[n - 1])
+            found |= {(file.stem, name, night) for night in nights}
+
+    assert {(alarm["file"], alarm["series"], alarm["night"]) for alarm in listed} == found
+    assert all(alarm["why"] and re.fullmatch(r"[0-9a-f]{12}", alarm["commit"]) for alarm in listed)
+    assert all(f"| {alarm['commit']} | {alarm['night']} |" in page for alarm in listed)
+    assert sum(not alarm["near"] for alarm in listed) <= 6
+
+
 def test_a_drift_that_is_red_stays_red_until_half_of_it_is_gone() -> None:
     """A list's items took 60 % more time from one commit on, in noise of 15 %: one story, not seventeen."""
     file = next(file for file in FILES if file.stem == "pyo3")

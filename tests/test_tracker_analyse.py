@@ -248,6 +248,31 @@ def test_a_ladder_that_takes_longer_is_found_by_its_run_time():
     assert found.first_bad == f"{10:040d}"[:12]
 
 
+def test_the_run_time_of_a_ladder_is_held_to_what_its_definition_tolerates():
+    source = random.Random(3)
+
+    def red(definition, key="t/c/ladder:e:run-time") -> bool:
+        levels = [1e-3 * (1.3 if i >= 12 else 1.0) * (1.0 + source.gauss(0.0, 0.01)) for i in range(15)]
+        timings = [Timing(seconds=(level, 1.1 * level), runs_per_repeat=1) for level in levels]
+        nights = tuple(Point(run(i), sample(1e-3, timing=t), "1") for i, t in enumerate(timings))
+        told = judge_all(run_times({"a": SeriesHistory(definition, nights)}))
+        return any(judged.red for judged in told[key].nights)
+
+    ladder = series(kind="ladder", metric="ladder:e", limit=None, role="reported", tolerance=9.0)
+    assert red(ladder)
+    assert not red(msgspec.structs.replace(ladder, time_tolerance=0.5))
+
+
+def test_a_series_of_times_is_held_to_its_own_tolerance():
+    source = random.Random(4)
+    values = [(1.3 if i >= 12 else 1.0) * (1.0 + source.gauss(0.0, 0.01)) for i in range(15)]
+    time = {"kind": "time", "better": "smaller", "limit": None, "role": "reported"}
+
+    for told, tolerances in ((True, {}), (False, {"relative_tolerance": 0.5}), (False, {"tolerance": 0.5})):
+        judged = judge_history("t/c/m", series(**time, **tolerances), history(*values))
+        assert any(night.red for night in judged) is told
+
+
 def test_nights_between_equal_nights_are_judged_without_a_look_and_alike(monkeypatch):
     values = [*([0.01] * 50), 0.02, *([0.01] * 50)]
     nights = history(*values, releases=(0, 20))

@@ -206,3 +206,60 @@ def test_one_slow_rung_is_not_a_slower_engine():
     after[3] = timing(7, 20.0)
 
     assert not compare_times(ladder(1), after).slower
+
+
+def by_the_processor(
+    seed: int, factor: float = 1.0, machine: float = 1.0, noise: float = 0.001, repeats: int = 5
+):
+    """A ladder whose clock says nothing (a busy machine), with processor time and kernel of little noise."""
+    source = random.Random(seed)
+    found = []
+    for rung in range(6):
+        cpu = tuple(
+            machine * factor * 1e-3 * 2**rung * (1.0 + abs(source.gauss(0.0, noise))) for _ in range(repeats)
+        )
+        kernel = tuple(machine * 1e-3 * (1.0 + abs(source.gauss(0.0, noise))) for _ in range(repeats))
+        clock = tuple(seconds * source.uniform(1.0, 3.0) for seconds in cpu)
+        found.append(Timing(seconds=clock, runs_per_repeat=1, cpu_seconds=cpu, calibration=kernel))
+    return found
+
+
+def test_two_sessions_are_compared_by_processor_time_over_the_kernels() -> None:
+    for seed in range(50):
+        same = compare_times(by_the_processor(seed), by_the_processor(100 + seed, machine=1.4))
+        assert not same.slower and not same.faster
+        assert compare_times(by_the_processor(seed), by_the_processor(100 + seed, 1.04, machine=0.7)).slower
+    assert same.floor < 0.04
+
+
+def test_the_floor_of_two_sessions_follows_what_repeats_and_rungs_show() -> None:
+    quiet = compare_times(by_the_processor(1, noise=1e-5), by_the_processor(2, 1.02, noise=1e-5))
+    noisy = compare_times(by_the_processor(1, noise=0.03), by_the_processor(2, 1.08, noise=0.03))
+
+    assert (quiet.floor, quiet.slower) == (0.01, True)
+    assert noisy.floor > 0.08
+    assert not noisy.slower
+    assert compare_times(ladder(1), ladder(2, 1.08)).floor >= 0.1  # by the clock alone
+    assert compare_times(by_the_processor(1)[:2], by_the_processor(2)[:2]).floor >= 0.1  # of few rungs
+
+
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_a_time_taken_once_or_twice_a_side_is_measured_again_before_it_is_told(repeats) -> None:
+    before, after = ([Timing(seconds=(level,) * repeats, runs_per_repeat=1)] for level in (1.0, 1.5))
+    found = compare_times(before, after)
+
+    assert not found.slower
+    assert not found.repeated
+    assert compare_times(
+        [Timing(seconds=(1.0,) * 3, runs_per_repeat=1)], [Timing(seconds=(1.5,) * 3, runs_per_repeat=1)]
+    ).slower
+
+
+def test_a_series_tells_no_change_of_time_below_its_own_tolerance():
+    values = [*noisy(60, 1), *noisy(20, 2, level=1.1e-3)]
+
+    assert "detected" in states(values)
+    assert "detected" not in states(values, tolerance=0.15)
+    assert "detected" in states([*values, *noisy(3, 3, level=1.4e-3)], tolerance=0.15)
+    assert compare_times(ladder(1), ladder(2, 1.4)).slower
+    assert not compare_times(ladder(1), ladder(2, 1.4), tolerance=0.5).slower

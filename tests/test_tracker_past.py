@@ -196,3 +196,62 @@ def test_todays_questions_are_put_to_the_engine_of_then(tmp_path: Path) -> None:
     assert (package / "engine").resolve() == (tmp_path / "engine").resolve()
     assert (package / "scalar_tests" / "catalogue.py").exists()
     assert not (package / "scalar_tests").resolve().is_relative_to(tmp_path)
+
+
+def test_what_a_changed_definition_hides_is_told_by_the_old_one(tmp_path: Path) -> None:
+    """The questions of an old commit, where the fall lasts half as long, are put to the engine of today."""
+    import shutil
+
+    import spook_tracker.scalar_tests as questions
+    from spook_tracker.tracker import library
+    from spook_tracker.tracker.cli.report_compare import old_answer_lines
+    from spook_tracker.tracker.document.json_form import Number
+    from spook_tracker.tracker.judge.tonight import tonight
+    from tests.synthetic_history import DocumentHistory
+
+    folder = tmp_path / "repository"
+    folder.mkdir()
+    old = Repository(folder)
+    shutil.copytree(
+        Path(questions.__file__).parent, folder / "scalar_tests", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    asked = folder / "scalar_tests" / "falling_object.py"
+    text = asked.read_text(encoding="utf-8")
+    assert "DURATION = " in text
+    asked.write_text(text.replace("DURATION = ", "DURATION = 0.5 * "), encoding="utf-8")
+    old.git("add", "-A")
+    commit = old.commit(1.0)
+    place = commits.checked_out(folder, commit, tmp_path / "kept")
+    then = commits.ask_today(place, ["falling_object"])
+    now = library.run(["falling_object"], workers=0)
+    assert {d.test_version for d in then.series} != {d.test_version for d in now.series}
+
+    def history(factor: float) -> DocumentHistory:
+        """The old commit's answers so many times as large, and tonight's."""
+        samples = tuple(replace(s, value=Number(factor * s.value), state_hash="") for s in then.samples)
+        engine = replace(
+            then.engine, git_hash=commit, dirty=False, parents=(), commit_time="2020-01-01T00:00:00+00:00"
+        )
+        before = replace(then, samples=samples, engine=engine, started="2020-01-01T00:00:00+00:00")
+        return DocumentHistory([before, now])
+
+    def told(factor: float, ask: Any = lambda commit, tests: then) -> past.OldAnswers:
+        records = history(factor)
+        (found,) = past.by_old_questions(records, now, tonight(records, now), ask)
+        return found
+
+    same, worse = told(1.0), told(1e-3)
+    assert (same.red, same.tests) == (False, ("falling_object",))
+    assert len(same.changes) == len(then.samples)
+    assert worse.red
+    assert "series worse" in old_answer_lines(worse)[0]
+
+    def refuse(commit: str, tests: Any) -> RunDocument:
+        raise commits.CommitError("it does not answer")
+
+    assert old_answer_lines(told(1e-3, refuse))[0].endswith("cannot be told; it does not answer")
+    elsewhere = replace(then, engine=replace(then.engine, git_hash="f" * 40))
+    assert "not that of the run" in told(1.0, lambda commit, tests: elsewhere).why_not
+    shutil.rmtree(place / "scalar_tests")
+    with pytest.raises(commits.CommitError, match="does not answer the questions"):
+        commits.ask_today(place, ["falling_object"])

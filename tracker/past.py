@@ -9,16 +9,19 @@ from __future__ import annotations
 import re
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.choice import Choice
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.lane import line_of
+from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.verdict import NEW_DEFINITION
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.measure.commits import CommitError, full_hash
 
@@ -57,6 +60,58 @@ def compare_documents(before: RunDocument, after: RunDocument) -> CompareDocumen
 def _samples(run: RunDocument) -> dict[str, tuple[SeriesDefinition, Sample]]:
     definitions = {definition.key: definition for definition in run.series}
     return {sample.series: (definitions[sample.series], sample) for sample in run.samples}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OldAnswers:
+    """What became of tests whose definition changed, by their old definition: or why that cannot be told."""
+
+    commit: str  # whose questions
+    tests: tuple[str, ...]
+    changes: tuple[Change, ...] = ()
+    why_not: str = ""
+
+    @property
+    def red(self) -> bool:
+        return any(change.red for change in self.changes)
+
+
+def by_old_questions(
+    history: Any, run: Any, findings: Sequence[Finding], ask: Callable[[str, tuple[str, ...]], RunDocument]
+) -> list[OldAnswers]:
+    """The tests of a run whose definition changed, judged by what they asked before.
+
+    `ask(commit, tests)` gives today's engine's answers to the questions of that commit; it raises CommitError.
+    """
+    changed = {
+        f.test
+        for f in findings
+        if f.verdict.word == "not_comparable" and f.verdict.sentence == NEW_DEFINITION
+    }
+    told = []
+    for old in reversed(line_of(history.runs(), run)[:-1]):
+        stored = {key: pair for key, pair in history.samples(old.id).items() if pair[0].test in changed}
+        tests = tuple(sorted({definition.test for definition, _ in stored.values()}))
+        if not tests:
+            continue
+        changed -= set(tests)
+        commit = old.engine.git_hash
+        try:
+            if not commit or old.engine.dirty:
+                raise CommitError(f"run {old.id[:8]} is of no commit: nobody knows any more what it asked")
+            document = ask(commit, tests)
+            if document.engine.git_hash != run.engine.git_hash:
+                raise CommitError(
+                    f"the engine here is {document.engine.version}, not that of the run; check out and build its commit"
+                )
+            before = ComparedRun(side=side_of(old), samples=stored)
+            after = ComparedRun(side=side_of(document), samples=_samples(document))
+            changes = compare(before, after).changes
+            judged = tuple(change for change in changes if change.word not in ("not_measured", "new"))
+            told.append(OldAnswers(commit=commit, tests=tests, changes=judged))
+        except CommitError as error:
+            told.append(OldAnswers(commit=commit, tests=tests, why_not=str(error)))
+    return told
 
 
 def bisect(

@@ -142,6 +142,11 @@ def _exit_as(document: Any, fail_on: str) -> None:
 @click.option(
     "--junit", "junit_file", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML."
 )
+@click.option(
+    "--old-questions",
+    is_flag=True,
+    help="Where a definition changed, also put the old question to this engine and compare its answers.",
+)
 @engine_option
 @test_option
 @kind_options
@@ -151,6 +156,7 @@ def judge_command(
     run: str,
     as_json: bool,
     junit_file: Path | None,
+    old_questions: bool,
     engine: str | None,
     tests: tuple[str, ...],
     kinds: tuple[str, ...],
@@ -163,7 +169,7 @@ def judge_command(
     RUN is named as for compare. What is red ends with exit code 1, a run that measured nothing with 3.
     """
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
+    from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json, old_answer_lines
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import idle_entries, judge
 
@@ -171,6 +177,7 @@ def judge_command(
     with history_of(database) as history:
         findings = judge(history, run, levels)
         notes = idle_entries(history, run, findings, levels)
+        asked_before = _by_old_questions(history, history.resolve(run), findings) if old_questions else []
     findings = Choice(tests=tests, kinds=kinds, roles=roles).of_findings(findings)
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
@@ -180,10 +187,25 @@ def judge_command(
         click.echo(findings_json(findings))
     else:
         say("\n".join([*finding_lines(findings), *(f"note: {note}" for note in notes)]))
-    if any(finding.red for finding in findings):
+        for old in asked_before:
+            say("\n".join(old_answer_lines(old)))
+    if any(finding.red for finding in findings) or any(old.red for old in asked_before):
         click.get_current_context().exit(RED)
     if not findings:
         click.get_current_context().exit(NOT_COMPARABLE)
+
+
+def _by_old_questions(history: Any, run: Any, findings: Any) -> Any:
+    """Answers of this engine to the questions of earlier commits, in the repository where one stands."""
+    import spook_tracker.tracker.past as past
+    from spook_tracker.tracker.cli.past import KEPT
+    from spook_tracker.tracker.measure.commits import ask_today, checked_out, repository_at
+
+    repository = repository_at(Path.cwd())
+    kept = Path(KEPT).resolve()
+    return past.by_old_questions(
+        history, run, findings, lambda commit, tests: ask_today(checked_out(repository, commit, kept), tests)
+    )
 
 
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import click
 
@@ -238,6 +239,21 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
         *shared,
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
         *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
+    ]
+
+
+def old_answer_lines(old: Any) -> list[str]:
+    """What became of tests by their old definition (tracker.past.OldAnswers)."""
+    tests = ", ".join(map(clean, old.tests))
+    asked = f"{tests} as asked at {old.commit[:12] or 'no commit'}"
+    if old.why_not:
+        return [f"? {asked}: cannot be told; {clean(old.why_not)}"]
+    red = [change for change in old.changes if change.red]
+    if not red:
+        return [f"✓ {asked}: {len(old.changes)} series, none worse"]
+    return [
+        click.style(f"✗ {asked}: {len(red)} of {len(old.changes)} series worse", fg="red"),
+        *red_lines(red),
     ]
 
 

@@ -84,6 +84,8 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     relative_tolerance: float
     test_version: Name  # hash of the definition: when it changes, values are not comparable
     aliases: tuple[str, ...] = ()  # earlier keys of the same series
+    time_tolerance: float = 0.0  # of a ladder: relative change of its run time below which none is told
+    iteration_tolerance: float = 0.1  # relative growth of its iteration counts that is not yet more work
 
 
 class Again(Struct, frozen=True, kw_only=True):

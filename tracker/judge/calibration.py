@@ -81,9 +81,19 @@ def engines_own(nights: Sequence[Point]) -> list[float]:
 def unquiet(night: Point) -> str:
     """Why a night's times are not judged; empty if they are."""
     timing = night.sample.timing
-    if timing is None or len(kernel := that_counts(timing).calibration) < 2:
+    return "" if timing is None else _unsteady(that_counts(timing).calibration[:2])
+
+
+def unquiet_kernel(timings: Sequence[Timing]) -> str:
+    """The same of the rungs of one ladder; empty where one has no kernel."""
+    return _unsteady(ladder_timing(timings).calibration) if timings else ""
+
+
+def _unsteady(kernel: Sequence[float]) -> str:
+    """Why times beside this kernel, at least and in the middle, are not judged."""
+    if len(kernel) < 2:
         return ""
-    least, middle = kernel[:2]
+    least, middle = kernel
     if middle <= (1.0 + UNQUIET) * least:
         return ""
     percent = 100.0 * (middle / least - 1.0)

@@ -12,7 +12,7 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.order import least_cost
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
-from spook_tracker.tracker.judge.calibration import geometric_mean, that_counts
+from spook_tracker.tracker.judge.calibration import geometric_mean, that_counts, unquiet_kernel
 from spook_tracker.tracker.judge.comparison_document import Change, Frontier
 from spook_tracker.tracker.judge.timing_statistics import compare_times
 from spook_tracker.tracker.judge.vocabulary import Word
@@ -30,13 +30,21 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
         timed = [(old.timing, new.timing) for _, old, new in rungs]
         both: list[tuple[Timing, Timing]] = [(old, new) for old, new in timed if old and new]
         both = [(_counted(old), _counted(new)) for old, new in both]
-        found = compare_times([old for old, _ in both], [new for _, new in both])
+        found = compare_times(
+            [old for old, _ in both],
+            [new for _, new in both],
+            definition.time_tolerance if definition.kind == "ladder" else definition.relative_tolerance,
+        )
         if found is None:
             continue
         word: Word = "regressed" if found.slower else "improved" if found.faster else "same"
         percent = 100.0 * (found.ratio - 1.0)
         sentence = f"{percent:+.0f} % run time over {found.rungs} rungs"
-        if word == "same":
+        if loud := _unquiet(both):
+            word, sentence = "same", f"{sentence}; {loud}"
+        elif not found.repeated:
+            sentence += ", timed less than three times on a side: to be measured again"
+        elif word == "same":
             sentence += f", inside the noise of these sessions (±{100.0 * found.floor:.0f} %)"
         changes.append(
             Change(
@@ -52,8 +60,8 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
                 stands="watch" if word == "regressed" else "followed",
                 name="slower at equal error" if word == "regressed" else "",
                 sentence=sentence,
-                before=Number(geometric_mean(min(old.seconds) for old, _ in both)),
-                after=Number(geometric_mean(min(new.seconds) for _, new in both)),
+                before=Number(first := geometric_mean(_least(old) for old, _ in both)),
+                after=Number(first * found.ratio),
                 before_outcome="value",
                 after_outcome="value",
                 limit=None,
@@ -65,7 +73,20 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
 
 def _counted(timing: Timing) -> Timing:
     """The timing with the repeats that count."""
-    return msgspec.structs.replace(timing, seconds=that_counts(timing).seconds)
+    taken = that_counts(timing)
+    return msgspec.structs.replace(
+        timing, seconds=taken.seconds, cpu_seconds=taken.cpu_seconds, calibration=taken.calibration
+    )
+
+
+def _least(timing: Timing) -> float:
+    """Seconds of the processor where they were taken, else of the clock."""
+    return min(timing.cpu_seconds if timing.cpu_seconds and timing.calibration else timing.seconds)
+
+
+def _unquiet(both: list[tuple[Timing, Timing]]) -> str:
+    """Why the times of a side are not judged; empty if they are."""
+    return unquiet_kernel([old for old, _ in both]) or unquiet_kernel([new for _, new in both])
 
 
 def _ladders(before: Samples, after: Samples) -> dict[tuple[str, str, str], list[Rung]]:

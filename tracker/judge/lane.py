@@ -309,7 +309,7 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
     definition = msgspec.structs.replace(
         first, key=key, metric=f"{first.metric}:run-time", description=f"run time of {first.description}",
         unit="s", kind="time", better="smaller", time_step=None, role="reported", limit=None, set_point=None,
-        reference=None,
+        reference=None, tolerance=0.0, relative_tolerance=first.time_tolerance,
     )  # fmt: skip
     told = []
     for found in by_run.values():

@@ -53,6 +53,10 @@ CREEP = 5  # nights in each median that is compared for drift
 BACK = 4  # nights whose mean must have come halfway back from a shift
 VISITS = 2  # to a level, before it is known as one of the machine's
 LONGER = 2  # times its longest visit, and it is no visit any more
+STRAYS = 2  # nights of a visit so far above its level that it is another
+REMEMBERED = 400  # nights in which visits are looked for
+NEAR = 0.15  # of its distance: so near to a level is at it
+QUARTER = 2.22  # standard deviations in the lower quartile of the differences from night to night
 
 
 class Noisy(NamedTuple):
@@ -73,9 +77,13 @@ def judge_noisy(
     larger_is_better: bool = False,
     releases: Sequence[bool] | None = None,
     accepted: Sequence[bool] | None = None,
+    tolerance: float = 0.0,
 ) -> list[Noisy]:
-    """A verdict for each value of one machine, oldest first. Values are positive; worse is larger."""
-    walk = _Walk(values, larger_is_better)
+    """A verdict for each value of one machine, oldest first. Values are positive; worse is larger.
+
+    `tolerance`: the relative change up to which the series' definition tells none, whatever its noise.
+    """
+    walk = _Walk(values, larger_is_better, tolerance)
     releases = releases or [False] * len(values)
     accepted = accepted or [False] * len(values)
     found = [walk.night(place, releases[place], accepted[place]) for place in range(len(values))]
@@ -98,6 +106,7 @@ class _Walk:
 
     values: Sequence[float]
     larger_is_better: bool
+    tolerance: float = 0.0
     usual: list[int] = field(default_factory=list)  # places of the last nights that hold
     level_since: list[int] = field(default_factory=list)  # the same, back to where the level began
     reached: list[float] = field(default_factory=list)  # deviations of nights that hold; worse is positive
@@ -109,6 +118,8 @@ class _Walk:
     shifted: tuple[int, float] | None = None  # the place and the size of a shift that is red
     visited: list[_Visited] = field(default_factory=list)
     staying: list[int] = field(default_factory=list)  # nights in a row at a level that was visited before
+    strayed: int = 0  # how many of them lie above it
+    start: int = 0  # the first night there is, or the last that was accepted
     levels: list[Usual] = field(default_factory=list)  # before each night
     _told: tuple[list[int], Usual] | None = None  # what was asked last, of which nights
     _known_spread: tuple[list[int], tuple[float, float]] | None = None
@@ -150,15 +161,14 @@ class _Walk:
 
     def _size(self, start: int, end: int) -> float:
         """How far the nights of a stretch lie off, in the middle."""
-        level, _ = self._spread()
-        return median(worse_by(level, self.values[i], self.larger_is_better) for i in range(start, end))
+        return self._size_of(range(start, end))
 
     def _begin(self, place: int) -> None:
         """A level that starts here."""
         self.usual, self.level_since, self.anchor = [place], [place], [place]
         self.suspects, self.gains, self.red_since, self.shifted = [], [], None, None
         self.crept = 0.0
-        self.visited, self.staying = [], []
+        self.visited, self.staying, self.strayed, self.start = [], [], 0, place
 
     def _slow(self, place: int, change: float, level: float, accepted: bool) -> Noisy:
         """A night that stands clear of what is usual."""
@@ -172,6 +182,11 @@ class _Walk:
             return Noisy(verdict=verdict, state="accepted", against=against)
         if not confirmed and self.crept:  # red already, and no better for this night
             return self._drifted(replace(verdict, word="regressed", name="drift"))
+        if confirmed and not known and (been := self._been_here(self.suspects)) is not None:
+            self.visited.append(been)
+            self.staying, self.suspects = self.suspects, []
+            words = f"{change_in_words(change)}, at a level that was left again before"
+            return Noisy(verdict=Verdict(word="same", sentence=words), state="green", against=against)
         if not confirmed and (together := self._shift(self.suspects)) is not None:
             self.suspects = []
             return together
@@ -226,8 +241,15 @@ class _Walk:
         """Whether the night is at a level that the machine went to and left again, and no longer than it does."""
         known = self._known(change)
         stays = known is not None and (bool(self.staying) or change > threshold)
+        if not stays and self._strays(change):
+            self.strayed += 1
+            if self.strayed < STRAYS:
+                self.staying.append(place)
+                return True
+            self.suspects, self.staying, self.strayed = self.staying, [], 0  # another level, since it came
+            return False
         if known is None or not stays or self.red_since is not None:
-            self.staying = []
+            self._left(change)
             return False
         self.staying.append(place)
         if len(self.staying) <= LONGER * known.longest:
@@ -236,19 +258,79 @@ class _Walk:
         self.visited.remove(known)
         return False
 
-    def _known(self, change: float) -> _Visited | None:
-        """The level so far off that is known as one of the machine's; halfway to it is enough to stay there."""
+    def _strays(self, change: float) -> bool:
+        """Whether a night of a visit lies above the level that is visited: one is noise, two are another level."""
+        return (
+            bool(self.staying)
+            and self.red_since is None
+            and math.isfinite(change)
+            and change > self._size_of(self.staying)
+        )
+
+    def _left(self, change: float) -> None:
+        """A visit that ended by itself tells more of its level."""
+        nights, self.staying, self.strayed = self.staying, [], 0
+        known = self._known(self._size_of(nights), len(nights)) if nights else None
+        if known is not None and self.red_since is None and change < 0.5 * known.change:
+            known.change += (self._size_of(nights) - known.change) / (known.times + 1)
+            known.times += 1
+            known.longest = max(known.longest, len(nights))
+
+    def _size_of(self, nights: Sequence[int]) -> float:
+        """How far some nights lie off, in the middle."""
+        level, _ = self._spread()
+        return median(worse_by(level, self.values[i], self.larger_is_better) for i in nights)
+
+    def _known(self, change: float, nights: int = 1) -> _Visited | None:
+        """The level that so many nights lie so far off at in the middle, if it is known as one of the machine's.
+
+        Halfway to it is enough to stay there.
+        """
         for known in self.visited:
-            if known.times >= VISITS:
-                near = abs(change - known.change) <= self._noise()
-                if near or (self.staying and 0.5 * known.change < change < 1.5 * known.change):
+            if known.times >= VISITS and change > 0.5 * known.change:
+                noise = self._noise()
+                near = abs(change - known.change) <= max(LEAST, noise / math.sqrt(nights))
+                if near or (self.staying and change < 1.5 * known.change + 0.5 * noise):
                     return known
         return None
 
+    def _been_here(self, nights: Sequence[int]) -> _Visited | None:
+        """The level of these nights as one that was reached and left again at least twice, if it was.
+
+        Looked for in the values themselves: visits inside the spread were never red.
+        """
+        import numpy as np
+
+        span = len(nights)
+        cost = np.array([self._cost(value) for value in self.values[self.start : nights[0]]][-REMEMBERED:])
+        cost = cost[np.isfinite(cost)]
+        if len(cost) < 2 * span:
+            return None
+        level = min(float(np.quantile(cost, 0.25)), self._cost(self._spread()[0]))
+        here = float(np.mean([self._cost(self.values[i]) for i in nights]))
+        inside = QUARTER * float(np.quantile(np.abs(np.diff(cost)), 0.25))
+        short = max(inside / math.sqrt(span), NEAR * (here - level))
+        means = np.convolve(cost, np.full(span, 1.0 / span), "valid")
+        times, longest, since = 0, 0, -1
+        for place, mean in enumerate(means):
+            if since < 0 and mean >= here - short:
+                since = place
+            elif since >= 0 and mean < 0.5 * (here + level):
+                times, longest, since = times + 1, max(longest, place - since + span // 2), -1
+        return _Visited(here / level - 1.0, times, longest) if times >= VISITS else None
+
     def _noise(self) -> float:
-        """The relative change that may be noise about a level, its clusters apart."""
-        _, deviation = self._spread()
-        return max(LEAST, SIGMAS * deviation)
+        """The relative change that may be noise about a level, whatever levels there are.
+
+        Most nights are at the level of the night before; a quarter of the differences are within half of those.
+        """
+        import numpy as np
+
+        level, _ = self._spread()
+        last = [self.values[i] for i in self.level_since[-BASE:] if math.isfinite(self.values[i])]
+        if len(last) < FEWEST or not 0.0 < level < math.inf:
+            return LEAST
+        return max(LEAST, SIGMAS * QUARTER * float(np.quantile(np.abs(np.diff(last)), 0.25)) / level)
 
     def _leave(self, place: int) -> None:
         """A red stretch that ends by itself is a visit to a level."""
@@ -334,12 +416,16 @@ class _Walk:
         if near < LEAST:
             return None  # most nights: nothing to count
         found = shift([self._cost(self.values[i]) for i in nights], clusters_only=near < deviation)
-        if found is None:
+        if found is None or found.change <= self.tolerance:
             return None
         self.level_since, nights = nights[: -found.span], nights[-found.span :]
         self.usual = [i for i in self.usual if i not in nights] or self.level_since[-WINDOW:]
         self.reached = self.reached[: len(suspects) - found.span]
-        if self._known(found.change) is not None:
+        known = None if found.apart else self._known(self._size_of(nights), len(nights))
+        if known is None and not found.apart and (been := self._been_here(nights)) is not None:
+            self.visited.append(been)
+            known = been
+        if known is not None:
             self.staying = nights
             return None
         self.red_since, self.shifted = nights[0], (nights[0], found.change)
@@ -361,6 +447,11 @@ class _Walk:
         return self._known_spread[1]
 
     def _clear(self, outermost: Sequence[float]) -> Usual:
+        """The level, and what stands clear of it: of its noise, and of what its definition tolerates."""
+        level, clear = self._clear_of_noise(outermost)
+        return level, max(clear, self.tolerance)
+
+    def _clear_of_noise(self, outermost: Sequence[float]) -> Usual:
         """The level, and what stands clear of it on the side where nights that hold have reached so far."""
         level, noise = self._spread()
         if not math.isfinite(level):

@@ -20,6 +20,7 @@ from functools import lru_cache
 import msgspec
 
 from spook_tracker.tracker.document.collection import no_collection
+from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
@@ -365,6 +366,13 @@ def _why_not(before: Point, after: Point) -> str:
     return "measured in another float environment"
 
 
+def _time_tolerance(definition: SeriesDefinition, values: Sequence[float]) -> float:
+    """The relative change of a time that its own definition does not tell."""
+    finite = [abs(value) for value in values if math.isfinite(value) and value != 0.0]
+    absolute = definition.tolerance / median(finite) if definition.tolerance and finite else 0.0
+    return max(definition.relative_tolerance, absolute)
+
+
 def _judge_times(
     key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> list[Judged]:
@@ -390,6 +398,7 @@ def _judge_times(
             larger_is_better=definition.better == "larger",
             releases=[is_release(night.run) for night in lane],
             accepted=[level is not None for level in taken],
+            tolerance=_time_tolerance(definition, values),
         )
         for i, noisy in enumerate(verdicts):
             if noisy.state in ("detected", "suspected") and is_read_off(definition):

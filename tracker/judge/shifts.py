@@ -26,6 +26,7 @@ SPANS = (4, 6)  # last nights looked at together
 BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
+RAREST = 1e-5  # of what no second test has to confirm
 RARER = 4.265  # standard deviations, by the t test: one in a hundred thousand
 LEAST = 0.01  # relative: no shift below is told
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
@@ -42,11 +43,16 @@ MEMORY = (1, 5)  # lags, nights, at which nights that remember each other are no
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """The last `span` nights lie `change` of the level above it, which chance does with `probability`."""
+    """The last `span` nights lie `change` of the level above it, which chance does with `probability`.
+
+    `apart`: above whichever of two clusters is the nearer, and nights are drawn from them at random: no visit to one
+    of them explains it.
+    """
 
     span: int
     change: float
     probability: float
+    apart: bool = False
 
 
 def shift(values: Sequence[float], clusters_only: bool = False) -> Shift | None:
@@ -84,7 +90,9 @@ def _apart_from_clusters(base: Values, last: Values) -> Shift | None:
     near = [nights / np.where(nights - low < high - nights, low, high) for nights in (base, last)]
     tried = _tried(near[0], near[1])
     change = float(np.mean(last) / np.mean(base)) - 1.0
-    return replace(tried, change=change) if tried is not None and change > LEAST else None
+    if tried is None or change <= LEAST:
+        return None
+    return replace(tried, change=change, apart=not remembered(base))
 
 
 def clusters(base: Values) -> tuple[float, float] | None:
@@ -114,10 +122,14 @@ def _tried(base: Values, last: Values) -> Shift | None:
         base, last = pooled[: len(base)], pooled[len(base) :]
     level = float(np.mean(base))
     rise = float(np.mean(last)) - level
-    if rise <= LEAST * level or rise <= standard_error(base, len(last)):
+    if rise <= LEAST * level:
+        return None
+    at_random = not remembered(base) and clusters(base) is not None  # in two clusters: exchangeable indeed
+    if not at_random and rise <= standard_error(base, len(last)):
         return None
     probability = permutation_probability(base, last)
-    return Shift(len(last), rise / level, probability) if probability < RARE else None
+    enough = RAREST if at_random else RARE
+    return Shift(len(last), rise / level, probability) if probability < enough else None
 
 
 def standard_error(base: Values, span: int) -> float:

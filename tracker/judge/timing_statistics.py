@@ -2,7 +2,9 @@
 
 Two sessions: the ratio of minima must pass a floor, and the repeats must differ by rank (Mann and
 Whitney's U, p < 0.01 with five repeats or more) on most rungs of a ladder. Only interference makes a run slower, so the
-minimum is the steadiest estimate; the floor rises with the spread the sessions show themselves.
+minimum is the steadiest estimate; the floor rises with the spread the sessions show themselves. Where both took
+processor time beside the calibration kernel, these are compared, as histories do: a slower machine cancels, and the
+floor may fall to a per cent where repeats and rungs agree so well. One or two repeats a side prove nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +17,11 @@ from functools import lru_cache
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Timing
 
-FLOOR = 0.10  # least relative change of run time worth a word, between two sessions
+FLOOR = 0.10  # least relative change of run time worth a word, between two sessions by the clock
+LEAST = 0.01  # the same of processor time over the kernel's, where spread and rungs support it
+CLEAR = 8.0  # spreads: as histories ask of few nights
+FEWEST_RUNGS = 4  # whose scatter shows what repeats of one session do not
+REPEATED = 3  # repeats on each side, or nothing is said
 SIGNIFICANT = 0.01
 FEWEST = 5  # repeats for a rank test: three against three never falls below 0.05
 SAME_WORK = 0.01  # relative change of retired instructions that says the same code ran
@@ -31,6 +37,7 @@ class TimeChange:
     floor: float  # relative change that had to be passed
     significant: float  # share of rungs whose repeats differ by rank in the direction of the ratio
     rungs: int
+    repeated: bool = True  # often enough to say anything
 
     @property
     def slower(self) -> bool:
@@ -41,19 +48,45 @@ class TimeChange:
         return self.ratio < 1.0 / (1.0 + self.floor) and self.significant >= 0.5
 
 
-def compare_times(before: Sequence[Timing], after: Sequence[Timing]) -> TimeChange | None:
-    """The change over rungs measured on both sides, pairwise; None if there are none."""
+def compare_times(
+    before: Sequence[Timing], after: Sequence[Timing], tolerance: float = 0.0
+) -> TimeChange | None:
+    """The change over rungs measured on both sides, pairwise; None if there are none.
+
+    `tolerance`: the relative change below which the series' own definition tells none.
+    """
     rungs = list(zip(before, after, strict=True))
     if not rungs:
         return None
-    ratio = math.exp(sum(math.log(min(b.seconds) / min(a.seconds)) for a, b in rungs) / len(rungs))
-    spread = median(max(_spread(a.seconds), _spread(b.seconds)) for a, b in rungs)
+    own = all(t.cpu_seconds and t.calibration for pair in rungs for t in pair)
+    values = [(_values(a, own), _values(b, own)) for a, b in rungs]
+    logs = [math.log(min(b) / min(a)) for a, b in values]
+    ratio = math.exp(sum(logs) / len(logs))
+    spread = median(max(_spread(a), _spread(b)) for a, b in values)
+    often = min(len(side) for pair in values for side in pair)
     floor = max(FLOOR, 2.0 * spread)
+    if own and often >= FEWEST and len(rungs) >= FEWEST_RUNGS:
+        scatter = median(abs(log - median(logs)) for log in logs)
+        floor = max(LEAST, CLEAR * max(spread, scatter))
     work = [b.instructions / a.instructions for a, b in rungs if a.instructions and b.instructions]
     if work and len(work) == len(rungs) and abs(median(work) - 1.0) < SAME_WORK:
         floor = max(floor, SAME_WORK_FLOOR)
-    differing = sum(_differs(a.seconds, b.seconds, slower=ratio > 1.0) for a, b in rungs)
-    return TimeChange(ratio=ratio, floor=floor, significant=differing / len(rungs), rungs=len(rungs))
+    differing = sum(_differs(a, b, slower=ratio > 1.0) for a, b in values)
+    return TimeChange(
+        ratio=ratio,
+        floor=max(floor, tolerance),
+        significant=differing / len(rungs),
+        rungs=len(rungs),
+        repeated=often >= REPEATED,
+    )
+
+
+def _values(timing: Timing, own: bool) -> Sequence[float]:
+    """Every repeat: in kernels where both sides have them, else in seconds."""
+    if not own:
+        return timing.seconds
+    kernel = min(timing.calibration)
+    return [seconds / kernel for seconds in timing.cpu_seconds]
 
 
 def _spread(seconds: Sequence[float]) -> float:
@@ -64,6 +97,8 @@ def _spread(seconds: Sequence[float]) -> float:
 def _differs(before: Sequence[float], after: Sequence[float], slower: bool) -> bool:
     """By rank where there are repeats enough; else the two sets must not overlap at all."""
     low, high = (before, after) if slower else (after, before)
+    if min(len(before), len(after)) < REPEATED:
+        return False
     if min(len(before), len(after)) < FEWEST:
         return max(low) < min(high)
     return rank_test(low, high) < SIGNIFICANT

@@ -24,6 +24,10 @@ from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge_m
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
 
 MOST_NAMED = 8  # tests in one sentence
+HOW_TO_COMPARE = (
+    "; to compare, put today's to the old commit: tracker backfill COMMIT, or the old ones to today's engine: "
+    "tracker judge RUN --old-questions"
+)
 NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
 
 
@@ -151,7 +155,7 @@ def not_compared(verdicts: Iterable[tuple[str, Verdict]]) -> list[str]:
     said = []
     for why, tests in sorted(counts.items()):
         named = ", ".join(sorted(tests)[:MOST_NAMED]) + (" …" if len(tests) > MOST_NAMED else "")
-        ask = "; to compare, put today's to the old commit: tracker backfill COMMIT" * (why == NEW_DEFINITION)
+        ask = HOW_TO_COMPARE if why == NEW_DEFINITION else ""
         said.append(f"not compared, {tests.total()} series of {len(tests)} tests ({named}): {why}{ask}")
     return said
 

@@ -2,7 +2,10 @@
 
 Work is the one measure of cost without noise: the same program does the same work on every machine, so one
 more block operation is more work, tonight. How many rounds an iteration takes may change by a hair where the
-data does, and gets a tolerance. Work is compared where the answers are the same and the build flags are.
+data does, and gets the tolerance that the test declares. Work is compared where the answers are the same and the
+build flags are. Each counter is judged by itself: fewer of one hide no more of another. Points of contact, samples read
+and evaluations of a search are not work of the engine's: the scene, what is observed and where a scene breaks decide
+them, and with equal answers they are equal.
 """
 
 from __future__ import annotations
@@ -37,7 +40,7 @@ ITERATIONS = frozenset(
         "halved_steps",
     }
 )
-GROUPS = {"operations": (EXACT, 0.0), "iterations": (ITERATIONS, 0.1)}  # counters, relative tolerance
+JUDGED = EXACT | ITERATIONS
 FAMILIES = {
     "scalar": "values",
     "ladder": "sweep",
@@ -51,7 +54,7 @@ Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 
 
 def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[SeriesDefinition, Sample]]:
-    """The samples of a run, and the sums of its counters as samples more.
+    """The samples of a run, and each of its counters, summed over a configuration, as samples more.
 
     The definition's hash stands for the series summed over and for the build: other sums are not comparable.
     """
@@ -64,34 +67,45 @@ def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[Series
     for (test, configuration, family), members in grouped.items():
         facts = tuple(sorted([f"{d.key} {d.test_version}" for d, _ in members]))
         answers = _hash(*sorted([f"{d.key} {s.value!r} {s.state_hash}" for d, s in members]))
-        for group, (counters, _) in GROUPS.items():
-            done = sum([n for _, s in members for name, n in s.counters.items() if name in counters])
-            if not done:
-                continue
-            asked = (test, configuration, family, group)
-            definition = _definition(asked, members[0][0].title, facts, engine.compiler, engine.flags)
+        tolerance = max(d.iteration_tolerance for d, _ in members)
+        done: dict[str, int] = {}
+        for _, sample in members:
+            for name, count in sample.counters.items():
+                if name in JUDGED:
+                    done[name] = done.get(name, 0) + count
+        for counter, count in done.items():
+            asked = (test, configuration, family, counter)
+            allowed = tolerance if counter in ITERATIONS else 0.0
+            definition = _definition(
+                asked, members[0][0].title, facts, allowed, engine.compiler, engine.flags
+            )
             found[definition.key] = (
                 definition,
                 Sample(
-                    series=definition.key, value=Number(done), outcome="value", passed=True, set_point_held=True,
+                    series=definition.key, value=Number(count), outcome="value", passed=True, set_point_held=True,
                     state_hash=answers,
                 ),
             )  # fmt: skip
     return found
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=16384)
 def _definition(
-    place: tuple[str, str, str, str], title: str, facts: tuple[str, ...], compiler: str, flags: str
+    place: tuple[str, str, str, str],
+    title: str,
+    facts: tuple[str, ...],
+    tolerance: float,
+    compiler: str,
+    flags: str,
 ) -> SeriesDefinition:
     """The series of a sum; from night to night it is mostly the same."""
-    test, configuration, family, group = place
+    test, configuration, family, counter = place
     return SeriesDefinition(
-        key=f"{test}/{configuration}/work:{family}:{group}", test=test, title=title, configuration=configuration,
-        metric=f"work:{family}:{group}", description=f"{group} counted in the {family}", unit="1",
+        key=f"{test}/{configuration}/work:{family}:{counter}", test=test, title=title, configuration=configuration,
+        metric=f"work:{family}:{counter}", description=f"{counter.replace('_', ' ')} counted in the {family}", unit="1",
         role="reported", better="smaller", kind="work", time_step=None, parameters={}, limit=None,
         limit_source="", set_point=None, set_point_source="", reference=None, tolerance=0.0,
-        relative_tolerance=GROUPS[group][1], test_version=_hash(*facts, compiler, flags),
+        relative_tolerance=tolerance, test_version=_hash(*facts, compiler, flags),
     )  # fmt: skip
 
 

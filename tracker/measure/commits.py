@@ -2,7 +2,7 @@
 
 A commit is checked out into a clone that shares the repository's objects; the repository itself is left alone.
 Where the engine of then can answer today's questions it is asked those, because only equal questions have comparable
-answers; else it is asked its own.
+answers; else it is asked its own. The other way round, today's engine is asked what a commit asked.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
@@ -82,8 +82,8 @@ def subject(repository: Path, commit: str) -> str:
     return _run(["git", "-C", str(repository), "show", "-s", "--format=%s (%an)", commit]).stdout.strip()
 
 
-def built(repository: Path, commit: str, folder: Path) -> Path:
-    """The folder with that commit and its engine, built; what is there already is used again. Raises CommitError."""
+def checked_out(repository: Path, commit: str, folder: Path) -> Path:
+    """The folder with that commit, not built; what is there already is used again. Raises CommitError."""
     place = folder / commit[:12]
     if (place / WORKS).exists():
         return place
@@ -92,6 +92,14 @@ def built(repository: Path, commit: str, folder: Path) -> Path:
     clone = ["git", "clone", "-q", "--shared", "--no-checkout", str(repository), str(place)]
     for command in (clone, ["git", "-C", str(place), "checkout", "-q", "--detach", commit]):
         _must(command, f"commit {commit[:12]} cannot be checked out")
+    return place
+
+
+def built(repository: Path, commit: str, folder: Path) -> Path:
+    """The folder with that commit and its engine, built; what is there already is used again. Raises CommitError."""
+    place = checked_out(repository, commit, folder)
+    if (place / WORKS).exists():
+        return place
     build_in_place(place)
     (place / WORKS).touch()
     return place
@@ -132,6 +140,26 @@ def ask_commit(place: Path, tests: Sequence[str], *options: str) -> tuple[RunDoc
     raise CommitError(f"{place.name} gives no answers; " + "; ".join(reasons))
 
 
+def ask_today(place: Path, tests: Sequence[str], *options: str) -> RunDocument:
+    """What today's engine answers to the questions of a checkout, which need not be built. Raises CommitError.
+
+    Today's tracker asks where the old catalogue still fits it, else that of then. `options` are those of
+    `tracker run`.
+    """
+    reasons = []
+    for whose, tracker in (("today's tracker", None), ("the tracker of then", place)):
+        file = place / "old.json"
+        file.unlink(missing_ok=True)
+        search = _with_old_questions(place, tracker)
+        done = call(search, "run", *tests, "--no-record", "--json", str(file), *options)
+        if done.returncode in (0, 1) and file.exists():
+            return decode(file.read_bytes(), RunDocument)
+        reasons.append(f"by {whose}: {_last(done.stderr)}")
+    raise CommitError(
+        f"today's engine does not answer the questions of {place.name}, asked " + "; ".join(reasons)
+    )
+
+
 def call(search: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """The tracker of a folder with that folder's engine, in a process of its own."""
     # -S leaves out the finder of an editable install, here and in the worker processes it starts.
@@ -142,16 +170,39 @@ def call(search: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def _with_todays_questions(place: Path) -> Path:
     """A folder in which the package is today's, but for the engine."""
+    return _mixed(place / "today", {"engine": place / "engine"})
+
+
+def _with_old_questions(place: Path, tracker: Path | None) -> Path:
+    """A folder in which the package is today's, but for the questions, and the tracker if another is given."""
+    older = {} if tracker is None else {name: tracker / name for name in ("tracker", "migrations", "site")}
+    mixed = _mixed(place / "old", {"scalar_tests": place / "scalar_tests", **older})
+    engine = mixed / PACKAGE / "engine"
+    beside = (
+        Path(sysconfig.get_path("purelib")) / PACKAGE / "engine"
+    )  # an editable install keeps what it built there
+    compiled = [file for suffix in EXTENSION_SUFFIXES for file in beside.glob(f"*{suffix}")]
+    if compiled and beside.resolve() != engine.resolve():
+        files = list(engine.resolve().iterdir())
+        engine.unlink()
+        engine.mkdir()
+        for file in (*files, *compiled):
+            if not (engine / file.name).exists():
+                (engine / file.name).symlink_to(file)
+    return mixed
+
+
+def _mixed(folder: Path, others: Mapping[str, Path]) -> Path:
+    """A folder in which the package is today's, but for the rooms that are given."""
     today = Path(spook_tracker.__file__).parent
-    mixed = place / "today"
-    package = mixed / PACKAGE
-    shutil.rmtree(mixed, ignore_errors=True)
+    package = folder / PACKAGE
+    shutil.rmtree(folder, ignore_errors=True)
     package.mkdir(parents=True)
     for file in today.glob("*.py"):
         shutil.copy(file, package)
     for name in OURS:
-        (package / name).symlink_to((place / name if name == "engine" else today / name).resolve())
-    return mixed
+        (package / name).symlink_to(others.get(name, today / name).resolve())
+    return folder
 
 
 def _must(command: list[str], complaint: str) -> None:

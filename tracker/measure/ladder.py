@@ -233,6 +233,8 @@ def _series(
         tolerance=0.0,
         relative_tolerance=1e-9,
         test_version=version,
+        time_tolerance=ladder.time_tolerance,
+        iteration_tolerance=test.iteration_tolerance,
     )
 
 

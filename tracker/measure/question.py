@@ -174,6 +174,7 @@ def metric_series(name: str, test: ScalarTest, measurement: Measurement, metric:
         tolerance=metric.tolerance,
         relative_tolerance=metric.relative_tolerance,
         test_version=definition_hash(measurement.measure, facts),
+        iteration_tolerance=test.iteration_tolerance,
     )
 
 
@@ -300,6 +301,7 @@ def study(
         tolerance=0.0,
         relative_tolerance=metric.relative_tolerance,
         test_version=definition_hash(question.study, (question.name, question.unit, question.better)),
+        iteration_tolerance=test.iteration_tolerance,
     )
     if found is not None:
         witness.counters["evaluations"] = found.evaluations
