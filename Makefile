@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay looks heaps campaign mutants mutants-tonight mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -23,6 +23,7 @@ help:
 	@echo "make campaign  random heaps from clean starts: does their energy ever rise?"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutants-tonight  four of them, others every night"
+	@echo "make past      a wrong commit planted in this history and found, and ten old commits asked: many builds"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava"
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
@@ -98,6 +99,9 @@ mutants: develop
 # A few of them, chosen by the date: all have had their turn within a fortnight.
 mutants-tonight: develop
 	$(BIN)/python bench/mutants.py --tonight 4
+
+past: develop
+	$(BIN)/python bench/past.py
 
 mutation: develop
 	$(BIN)/python bench/mutation.py

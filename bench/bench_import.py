@@ -4,6 +4,7 @@
 
 Synthetic runs (`tests/synthetic_history.py`) stand for the nights, 0.3 MB of JSON each, most of it figures. Times are of
 the processor; beside them stands what reading the same files as plain JSON takes, which nothing can be quicker than.
+Ends with 1 where a thousand nights take more than ten seconds.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from spook_tracker.tracker.store.transfer import write_document
 from tests.synthetic_history import decade
 
+MOST = 0.01  # s of the processor a night
 
-def main() -> None:
+
+def main() -> int:
     reader = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     reader.add_argument("--nights", type=int, default=1000)
     nights = reader.parse_known_args()[0].nights
@@ -45,7 +48,11 @@ def main() -> None:
         took = used.ru_utime + used.ru_stime
     print(said.stdout.decode().strip())
     print(f"{took:.1f} s of processor time, start included; {plain:.1f} s is what reading plain JSON takes")
+    if took > MOST * nights:
+        print(f"more than {MOST * nights:.0f} s of the processor", file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

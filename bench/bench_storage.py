@@ -3,7 +3,8 @@ that people wait for: two versions side by side, one series over all nights, all
 
     python bench/bench_storage.py [--samples 1000000] [--db URL]
 
-The default is a SQLite file in a temporary folder. The target: two runs compared in under 0.3 s.
+The default is a SQLite file in a temporary folder. Ends with 1 where `tracker compare` among these samples, or `tracker
+trend` of a thousand noisy nights with a change point, takes more than 0.3 s of the processor, start-up included.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import msgspec
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
@@ -33,6 +35,8 @@ from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 
 SERIES = 1000  # in one night
+MOST = 0.3  # s of the processor for a command, the quicker of two times
+NOISE, STEP = 0.01, 1.1  # of a run time over the noisy nights, and by how much it rises after 600 of them
 CHANGED = 0.02  # of them have other bits than the night before; most values never change
 
 
@@ -101,13 +105,25 @@ def night(number: int, series: tuple[SeriesDefinition, ...], chance: random.Rand
     )
 
 
-def command(what: str, *words: str) -> None:
+def noisy(number: int, definition: SeriesDefinition, chance: random.Random) -> RunDocument:
+    """A night of one run time alone, another engine's."""
+    found = night(number, (), chance)
+    level = 1e-3 * (STEP if number >= 600 else 1.0) * (1.0 + chance.gauss(0.0, NOISE))
+    taken = Sample(series=definition.key, value=level, outcome="value", passed=True, set_point_held=True)
+    return msgspec.structs.replace(
+        found, id=f"{number:031x}n", idempotency_key=f"noisy {number}", series=(definition,), samples=(taken,),
+        engine=msgspec.structs.replace(found.engine, name="noisy"),
+    )  # fmt: skip
+
+
+def command(what: str, *words: str) -> float:
     """Run a command of the tracker as a user does, its start-up included, and print what the processor did for it."""
     before, wall = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run([sys.executable, "-m", "spook_tracker", *words], stdout=subprocess.DEVNULL, check=False)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     print(f"{what:<58} {time.perf_counter() - wall:8.3f} s wall {processor:8.3f} s processor", flush=True)
+    return processor
 
 
 @contextmanager
@@ -118,7 +134,7 @@ def timed(what: str) -> Iterator[None]:
     print(f"{what:<58} {wall:8.3f} s wall {processor:8.3f} s processor", flush=True)
 
 
-def main() -> None:
+def main() -> int:
     options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     options.add_argument("--samples", type=int, default=1_000_000)
     options.add_argument("--db", default=None, help="an empty database; default: a temporary SQLite file")
@@ -151,19 +167,31 @@ def main() -> None:
             with timed("read all series over all nights, values only"):
                 assert len(History(session).series(evidence=False)) == SERIES
         engine.dispose()
-        for attempt in ("first", "second"):
-            command(
-                f"tracker compare, with its start ({attempt} time)",
-                "compare",
-                "previous",
-                "latest",
-                "--db",
-                url,
-            )
-            command(
-                f"tracker trend, with its start ({attempt} time)", "trend", "test7", "metric7", "--db", url
-            )
+        with (
+            Session(engine := open_database(url)) as session,
+            timed("record 1000 noisy nights of a run time"),
+        ):
+            (one,) = definitions()[:1]
+            time_of = msgspec.structs.replace(
+                one, key="noisy/plain/time", test="noisy", metric="time", kind="time", better="smaller", unit="s",
+                role="reported", limit=None, time_step=None,
+            )  # fmt: skip
+            for number in range(1000):
+                record(session, noisy(number, time_of, chance))
+        engine.dispose()
+        over = []
+        for words in (
+            ("compare", "--engine", "spook", "previous", "latest"),
+            ("trend", "test7", "metric7"),
+            ("trend", "noisy"),
+        ):
+            said = " ".join(words)
+            taken = [command(f"tracker {said}, with its start", *words, "--db", url) for _ in range(2)]
+            over += [f"tracker {said}: {min(taken):.2f} s" for _ in (1,) if min(taken) > MOST]
+    if over:
+        print(f"more than {MOST} s of the processor: {'; '.join(over)}", file=sys.stderr)
+    return 1 if over else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
