@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -22,9 +21,7 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
-from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
-    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -34,9 +31,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
-    StabilityStudy,
 )
-from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -50,8 +45,6 @@ ANGLES = (2.0, 5.0, 10.0)  # degrees, at which the surface meets only the sides
 UPRIGHT = (0.2, 0.8)  # ratios at which it stands
 TILTED = (0.2225, 0.5, 0.7775)  # and at which it falls
 NUDGE = 1e-4  # rad
-LIGHT, HEAVY = 0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0)  # GM = 0
-ROLLED = (0.15, 0.2, 0.8, 0.85)  # ratios at which the roll is timed
 
 
 def scene(ratio: float = RATIO, raised: float = 0.0, roll: float = 0.0) -> Scene:
@@ -145,56 +138,6 @@ def _wrong(simulate: Simulate, ratio: float, stands: bool) -> bool:
     return rolled > 1.1 * NUDGE if stands else rolled < 100.0 * NUDGE
 
 
-def roll_rate(ratio: float) -> float:
-    """ω = √(m g GM/I) [rad/s], I = m (B² + H²)/12 of the log about its length."""
-    return math.sqrt(GRAVITY * metacentric_height(ratio) * 12.0 / (2.0 * SIDE**2))
-
-
-def swing(simulate: Simulate, ratio: float) -> float:
-    """Frequency [rad/s] of a small roll: x₊ + x₋ = 2 x cos φ, by least squares."""
-    observe = {"q": Trace(quantity=Orientation("log"))}
-    result = simulate(scene(ratio, roll=NUDGE), time_step=TIME_STEP, duration=DURATION, observe=observe)
-    x = 2.0 * result["q"][:, 1]
-    inner = x[1:-1]
-    return math.acos(0.5 * float(inner @ (x[2:] + x[:-2])) / float(inner @ inner)) / TIME_STEP
-
-
-def swing_limit(ratio: float) -> float:
-    """A roll φ rights itself with GM + ½ BM tan²φ, and lifts the log by parts of φ²: φ² (1 + BM/GM) covers both while the
-    heave is not near twice the roll."""
-    return NUDGE**2 * (1.0 + SIDE / (12.0 * ratio) / metacentric_height(ratio))
-
-
-def swings(simulate: Simulate) -> dict[str, float]:
-    """Rolls outside of the densities at which it falls, against √(m g GM/I), slowed as the step does."""
-    worst = 0.0
-    for ratio in ROLLED:
-        discrete = math.acos(1.0 - 0.5 * (TIME_STEP * roll_rate(ratio)) ** 2) / TIME_STEP
-        worst = max(worst, abs(swing(simulate, ratio) / discrete - 1.0) / swing_limit(ratio))
-    return {
-        "roll_rate_error": worst,
-        "continuous_error": swing(simulate, ROLLED[0]) / roll_rate(ROLLED[0]) - 1.0,
-    }
-
-
-def upright(simulate: Simulate, ratio: float) -> bool:
-    """Whether a nudge has not grown tenfold within 20 s."""
-    observe = {"q": Trace(quantity=Orientation("log"), every=12)}
-    result = simulate(scene(ratio, roll=NUDGE), time_step=TIME_STEP, duration=20.0, observe=observe)
-    return result.completed and 2.0 * float(np.abs(result["q"][:, 1]).max()) < 10.0 * NUDGE
-
-
-def blurred(place: float) -> float:
-    """How far beyond GM = 0 a nudge grows tenfold within 20 s, cosh(20 √(−m g GM/I)) = 10, and what the search leaves."""
-    lacking = (math.acosh(10.0) / 20.0 / roll_rate(0.15)) ** 2 * metacentric_height(0.15)
-    return lacking / abs(0.5 * SIDE - SIDE / (12.0 * place**2)) + 1e-3 * place
-
-
-def edge(simulate: Simulate, easy: float, hard: float) -> BreakPoint:
-    """The last density ratio at which it stands upright."""
-    return break_point(functools.partial(upright, simulate), easy, hard, resolution=1e-3, walk=5)
-
-
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest distance from z_0 cos ω t in 2 s [m]."""
     observe = {"z": Trace(quantity=Position("log"))}
@@ -259,7 +202,6 @@ TEST = ScalarTest(
         "Draught = density ratio s times height.",
         "Heave: ω² = ρ g A/m = g/(s H). One step of the method: z_n = z₀ cos((n + ½) θ)/cos(θ/2) with sin(θ/2) = h ω/2.",
         "Roll: righting arm GZ = sin φ (GM + ½ BM tan² φ), GM = s H/2 + B²/(12 s H) − H/2, BM = B²/(12 s H).",
-        "Small rolls: ω² = m g GM/I; one step makes cos(θ) = 1 − (h ω)²/2 of it.",
         "GM < 0 between s = ½ − √(1/12) = .2113 and ½ + √(1/12) = .7887: there a square log does not stand.",
     ),
     reference="Hydrostatics in closed form, wall-sided formula; closed form of the discrete step.",
@@ -335,57 +277,11 @@ TEST = ScalarTest(
             measure=roll,
             note="one step rolled, and 20 s nudged",
         ),
-        ask(
-            swings,
-            (
-                error(
-                    "roll_rate_error",
-                    "largest relative error of the roll's frequency against the discrete √(m g GM/I), over what its size explains",
-                    "1",
-                    1.0,
-                    "φ² (1 + BM/GM): a roll of 1e-4 rad rights itself a little more than its metacentre says, and heaves",
-                ),
-                error(
-                    "continuous_error",
-                    "relative error of the roll's frequency against √(m g GM/I), ratio 0.15",
-                    "1",
-                    1.05 * (TIME_STEP * roll_rate(ROLLED[0])) ** 2 / 24.0,
-                    "(h ω)²/24 of the step",
-                    "companion",
-                ),
-            ),
-            "small rolls at four densities",
-            TIME_STEP,
-            "swing",
-        ),
     ),
     example=lambda: Example(scene=scene(0.5, roll=0.02), time_step=TIME_STEP),
     figures=(
         Figure(name="heave", title="Heave", draw=draw_heave),
         Figure(name="roll", title="Roll against density", draw=draw_roll),
-    ),
-    stability=(
-        StabilityStudy(
-            name="light",
-            title="Largest low density ratio at which a square log stands upright",
-            configuration="plain",
-            definition="nudged by 1e-4 rad it rolls by less than ten times that within 20 s",
-            study=functools.partial(edge, easy=0.16, hard=0.3),
-            unit="1",
-            expected=(LIGHT - blurred(LIGHT), LIGHT + blurred(LIGHT)),
-            expected_source="GM = 0 at ½ − √(1/12) = .2113; where a nudge grows tenfold in 20 s, and what the search leaves",
-        ),
-        StabilityStudy(
-            name="heavy",
-            title="Smallest high density ratio at which a square log stands upright",
-            configuration="plain",
-            definition="nudged by 1e-4 rad it rolls by less than ten times that within 20 s",
-            study=functools.partial(edge, easy=0.88, hard=0.7),
-            unit="1",
-            better="smaller",
-            expected=(HEAVY - blurred(HEAVY), HEAVY + blurred(HEAVY)),
-            expected_source="GM = 0 at ½ + √(1/12) = .7887; where a nudge grows tenfold in 20 s, and what the search leaves",
-        ),
     ),
     ladders=(
         Ladder(

@@ -14,6 +14,7 @@ from spook_tracker.engine import RigidBody
 from spook_tracker.scalar_tests import (
     bowl,
     card_house,
+    climb,
     grain,
     hanging_cable,
     masonry_arch,
@@ -152,22 +153,51 @@ def test_the_loads_of_a_braking_vehicle_balance_its_moments() -> None:
     assert v.front_load(-v.BRAKING) == pytest.approx(front, rel=1e-12)
     assert v.front_load(-v.BRAKING, rise=v.TIPPING) == pytest.approx(weights, rel=1e-12)
     assert rear > 0.0 and pytest.approx(0.19e-6, rel=0.02) == v.SINK
-    # Driven up: what T and the weights do along the slope, and moments about the rear footprints with every a and I a/r.
-    tilt, a = math.atan(v.SLOPE), v.CLIMBING
-    back = v.GRAVITY * math.sin(tilt)
-    assert pytest.approx(v.MASS * (a + back) + 4.0 * v.INERTIA * a / v.RADIUS**2) == 2.0 * v.TORQUE / v.RADIUS
-    base = v.FRONT + v.REAR
-    about = sum(m * (v.GRAVITY * math.cos(tilt) * (x + v.REAR) - (a + back) * z) for m, x, z in parts)
-    assert v.climbing_load() * base == pytest.approx(about - 4.0 * v.INERTIA * a / v.RADIUS, rel=1e-12)
-    grip = v.FRICTION * (v.MASS * v.GRAVITY * math.cos(tilt) - v.climbing_load())
-    assert grip > 2.0 * v.TORQUE / v.RADIUS  # the driven wheels do not slip
     assert v.stopping(1e-6) == pytest.approx(v.STOPPED**2 / (2.0 * v.BRAKING), rel=1e-5)
-    limits = {m.name: m.limit for m in measurement("vehicle", "braking").metrics}
     sinks = v.COMPLIANCE * front / 4.0  # each of two wheels on two points, within a step
+    limits = {m.name: m.limit for m in measurement("vehicle", "plain").metrics}
+    # Rolling down: the power of the weight is that of M v and of four wheels that turn with v/r, less their sinking.
+    gains = v.MASS * v.GRAVITY * math.sin(math.atan(v.SLOPE)) / (v.MASS + 2.0 * v.WHEEL)  # I = ½ m r² each
+    assert limits["speed_error"] == pytest.approx(sinks / v.RADIUS * gains * v.DURATION)
+    assert limits["spin_error"] == limits["speed_error"]
+    assert limits["sideways"] == pytest.approx(sinks / v.TIME_STEP)
+    limits = {m.name: m.limit for m in measurement("vehicle", "braking").metrics}
+    assert limits["speed_error"] == pytest.approx(sinks / v.TIME_STEP)
+    assert limits["transfer_error"] == limits["load_error"] == pytest.approx(sinks / v.RADIUS)
     assert limits["stands"] == pytest.approx(sinks / v.TIME_STEP)
     assert limits["stopping_error"] == pytest.approx(sinks / v.TIME_STEP * v.DURATION)
     short = v.stopping(v.TIME_STEP) - v.STOPPED**2 / (2.0 * v.BRAKING)
     assert short == pytest.approx(-0.5 * v.STOPPED * v.TIME_STEP, rel=0.01)
+
+
+def test_a_driven_vehicle_climbs_by_newton_and_slips_when_its_friction_is_used_up() -> None:
+    """Accelerations, loads and the friction of each axle as unknowns of one balance."""
+    v, c = vehicle, climb
+    parts = [(v.CHASSIS, 0.0, v.RADIUS + v.RISE)] + [(v.WHEEL, x, v.RADIUS) for x, _ in v.WHEELS.values()]
+    sine, cosine, base = math.sin(c.TILT), math.cos(c.TILT), v.FRONT + v.REAR
+    for torque in (c.TORQUE, c.SLIPS):
+        # a, loads of front and rear, friction of front and rear: along, across, moments, two front wheels, two rear ones.
+        balance = np.array(
+            (
+                (v.MASS, 0.0, 0.0, -1.0, -1.0),
+                (0.0, 1.0, 1.0, 0.0, 0.0),
+                (sum(m * z for m, _, z in parts) + 4.0 * v.INERTIA / v.RADIUS, base, 0.0, 0.0, 0.0),
+                (2.0 * v.INERTIA / v.RADIUS, 0.0, 0.0, v.RADIUS, 0.0),
+                (2.0 * v.INERTIA / v.RADIUS, 0.0, 0.0, 0.0, v.RADIUS),
+            )
+        )
+        lift = sum(m * v.GRAVITY * (cosine * (x + v.REAR) - sine * z) for m, x, z in parts)
+        right = (-v.MASS * v.GRAVITY * sine, v.MASS * v.GRAVITY * cosine, lift, 0.0, 2.0 * torque)
+        gain, front, rear, _, pushes = np.linalg.solve(balance, right)
+        assert (gain, front) == pytest.approx((c.climbing(torque), c.climbing_load(torque)), rel=1e-12)
+        assert v.FRICTION * rear - pushes == pytest.approx(c.slack(torque), abs=1e-8 * v.MASS)
+    assert c.slack(c.SLIPS) == pytest.approx(0.0, abs=1e-8 * v.MASS)
+    limits = {m.name: m.limit for m in measurement("climb", "plain").metrics}
+    shorter = v.SINK / v.RADIUS  # a wheel that has sunk so much drives with more force and turns faster
+    driven = shorter * 2.0 * c.TORQUE / v.RADIUS / v.MASS * c.DURATION
+    assert limits["speed_error"] == pytest.approx(driven)
+    assert limits["spin_error"] == pytest.approx(driven + shorter * c.climbing() * c.DURATION)
+    assert limits["transfer_error"] == pytest.approx(shorter)
 
 
 def ring_balance(
