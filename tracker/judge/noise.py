@@ -31,6 +31,7 @@ from spook_tracker.tracker.judge.shifts import (
 )
 from spook_tracker.tracker.judge.slower import Usual, change_in_words, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
+from spook_tracker.tracker.judge.visits import Visited, Visits, left_before, steadiness
 from spook_tracker.tracker.judge.vocabulary import State
 
 if TYPE_CHECKING:
@@ -51,12 +52,6 @@ SECOND = 2.5  # standard deviations that the second largest of two hundred night
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CREEP = 5  # nights in each median that is compared for drift
 BACK = 4  # nights whose mean must have come halfway back from a shift
-VISITS = 2  # to a level, before it is known as one of the machine's
-LONGER = 2  # times its longest visit, and it is no visit any more
-STRAYS = 2  # nights of a visit so far above its level that it is another
-REMEMBERED = 400  # nights in which visits are looked for
-NEAR = 0.15  # of its distance: so near to a level is at it
-QUARTER = 2.22  # standard deviations in the lower quartile of the differences from night to night
 
 
 class Noisy(NamedTuple):
@@ -92,15 +87,6 @@ def judge_noisy(
 
 
 @dataclass
-class _Visited:
-    """A level for the worse that was left again: how often, how far off, and for how long at most."""
-
-    change: float
-    times: int
-    longest: int
-
-
-@dataclass
 class _Walk:
     """What is known of a series, night after night."""
 
@@ -116,14 +102,15 @@ class _Walk:
     red_since: int | None = None
     crept: float = 0.0  # the largest drift since it is red; zero while it is not
     shifted: tuple[int, float] | None = None  # the place and the size of a shift that is red
-    visited: list[_Visited] = field(default_factory=list)
-    staying: list[int] = field(default_factory=list)  # nights in a row at a level that was visited before
-    strayed: int = 0  # how many of them lie above it
+    visits: Visits = field(init=False)
     start: int = 0  # the first night there is, or the last that was accepted
     levels: list[Usual] = field(default_factory=list)  # before each night
     _told: tuple[list[int], Usual] | None = None  # what was asked last, of which nights
     _known_spread: tuple[list[int], tuple[float, float]] | None = None
     _known_anchor: tuple[list[int], float | None] | None = None
+
+    def __post_init__(self) -> None:
+        self.visits = Visits(self._size_of, self._noise)
 
     def usual_now(self) -> Usual:
         """The level, and what stands clear of it for the worse."""
@@ -168,7 +155,7 @@ class _Walk:
         self.usual, self.level_since, self.anchor = [place], [place], [place]
         self.suspects, self.gains, self.red_since, self.shifted = [], [], None, None
         self.crept = 0.0
-        self.visited, self.staying, self.strayed, self.start = [], [], 0, place
+        self.visits, self.start = Visits(self._size_of, self._noise), place
 
     def _slow(self, place: int, change: float, level: float, accepted: bool) -> Noisy:
         """A night that stands clear of what is usual."""
@@ -183,8 +170,8 @@ class _Walk:
         if not confirmed and self.crept:  # red already, and no better for this night
             return self._drifted(replace(verdict, word="regressed", name="drift"))
         if confirmed and not known and (been := self._been_here(self.suspects)) is not None:
-            self.visited.append(been)
-            self.staying, self.suspects = self.suspects, []
+            self.visits.begin(self.suspects, been)
+            self.suspects = []
             words = f"{change_in_words(change)}, at a level that was left again before"
             return Noisy(verdict=Verdict(word="same", sentence=words), state="green", against=against)
         if not confirmed and (together := self._shift(self.suspects)) is not None:
@@ -239,98 +226,32 @@ class _Walk:
 
     def _visits(self, place: int, change: float, threshold: float) -> bool:
         """Whether the night is at a level that the machine went to and left again, and no longer than it does."""
-        known = self._known(change)
-        stays = known is not None and (bool(self.staying) or change > threshold)
-        if not stays and self._strays(change):
-            self.strayed += 1
-            if self.strayed < STRAYS:
-                self.staying.append(place)
-                return True
-            self.suspects, self.staying, self.strayed = self.staying, [], 0  # another level, since it came
+        if self.red_since is not None:
+            self.visits.left(change, counts=False)
             return False
-        if known is None or not stays or self.red_since is not None:
-            self._left(change)
-            return False
-        self.staying.append(place)
-        if len(self.staying) <= LONGER * known.longest:
-            return True
-        self.suspects, self.staying = self.staying[:-1], []  # it stays: red since it came
-        self.visited.remove(known)
-        return False
-
-    def _strays(self, change: float) -> bool:
-        """Whether a night of a visit lies above the level that is visited: one is noise, two are another level."""
-        return (
-            bool(self.staying)
-            and self.red_since is None
-            and math.isfinite(change)
-            and change > self._size_of(self.staying)
-        )
-
-    def _left(self, change: float) -> None:
-        """A visit that ended by itself tells more of its level."""
-        nights, self.staying, self.strayed = self.staying, [], 0
-        known = self._known(self._size_of(nights), len(nights)) if nights else None
-        if known is not None and self.red_since is None and change < 0.5 * known.change:
-            known.change += (self._size_of(nights) - known.change) / (known.times + 1)
-            known.times += 1
-            known.longest = max(known.longest, len(nights))
+        visits, seemed = self.visits.takes(place, change, threshold)
+        if seemed:
+            self.suspects = seemed  # it stays, or is another level: red since it came
+        return visits
 
     def _size_of(self, nights: Sequence[int]) -> float:
         """How far some nights lie off, in the middle."""
         level, _ = self._spread()
         return median(worse_by(level, self.values[i], self.larger_is_better) for i in nights)
 
-    def _known(self, change: float, nights: int = 1) -> _Visited | None:
-        """The level that so many nights lie so far off at in the middle, if it is known as one of the machine's.
-
-        Halfway to it is enough to stay there.
-        """
-        for known in self.visited:
-            if known.times >= VISITS and change > 0.5 * known.change:
-                noise = self._noise()
-                near = abs(change - known.change) <= max(LEAST, noise / math.sqrt(nights))
-                if near or (self.staying and change < 1.5 * known.change + 0.5 * noise):
-                    return known
-        return None
-
-    def _been_here(self, nights: Sequence[int]) -> _Visited | None:
-        """The level of these nights as one that was reached and left again at least twice, if it was.
-
-        Looked for in the values themselves: visits inside the spread were never red.
-        """
-        import numpy as np
-
-        span = len(nights)
-        cost = np.array([self._cost(value) for value in self.values[self.start : nights[0]]][-REMEMBERED:])
-        cost = cost[np.isfinite(cost)]
-        if len(cost) < 2 * span:
-            return None
-        level = min(float(np.quantile(cost, 0.25)), self._cost(self._spread()[0]))
-        here = float(np.mean([self._cost(self.values[i]) for i in nights]))
-        inside = QUARTER * float(np.quantile(np.abs(np.diff(cost)), 0.25))
-        short = max(inside / math.sqrt(span), NEAR * (here - level))
-        means = np.convolve(cost, np.full(span, 1.0 / span), "valid")
-        times, longest, since = 0, 0, -1
-        for place, mean in enumerate(means):
-            if since < 0 and mean >= here - short:
-                since = place
-            elif since >= 0 and mean < 0.5 * (here + level):
-                times, longest, since = times + 1, max(longest, place - since + span // 2), -1
-        return _Visited(here / level - 1.0, times, longest) if times >= VISITS else None
+    def _been_here(self, nights: Sequence[int]) -> Visited | None:
+        """The level of these nights, if it was reached and left again before: red or not."""
+        here = sum(self._cost(self.values[i]) for i in nights) / len(nights)
+        before = [self._cost(value) for value in self.values[self.start : nights[0]]]
+        return left_before(before, here, self._cost(self._spread()[0]), len(nights))
 
     def _noise(self) -> float:
-        """The relative change that may be noise about a level, whatever levels there are.
-
-        Most nights are at the level of the night before; a quarter of the differences are within half of those.
-        """
-        import numpy as np
-
+        """The relative change that may be noise about a level, whatever levels there are."""
         level, _ = self._spread()
         last = [self.values[i] for i in self.level_since[-BASE:] if math.isfinite(self.values[i])]
         if len(last) < FEWEST or not 0.0 < level < math.inf:
             return LEAST
-        return max(LEAST, SIGMAS * QUARTER * float(np.quantile(np.abs(np.diff(last)), 0.25)) / level)
+        return max(LEAST, SIGMAS * steadiness(last) / level)
 
     def _leave(self, place: int) -> None:
         """A red stretch that ends by itself is a visit to a level."""
@@ -338,12 +259,7 @@ class _Walk:
         change, nights = self._size(self.red_since, place), place - self.red_since
         if not math.isfinite(change):
             return
-        for known in self.visited:
-            if abs(change - known.change) <= self._noise():
-                known.times += 1
-                known.longest = max(known.longest, nights)
-                return
-        self.visited.append(_Visited(change, 1, nights))
+        self.visits.add(change, nights)
 
     def _after_shift(self, place: int, change: float, level: float, accepted: bool) -> Noisy:
         """A night not clear of what is usual, while several nights together were: red until they came back."""
@@ -421,13 +337,12 @@ class _Walk:
         self.level_since, nights = nights[: -found.span], nights[-found.span :]
         self.usual = [i for i in self.usual if i not in nights] or self.level_since[-WINDOW:]
         self.reached = self.reached[: len(suspects) - found.span]
-        known = None if found.apart else self._known(self._size_of(nights), len(nights))
-        if known is None and not found.apart and (been := self._been_here(nights)) is not None:
-            self.visited.append(been)
-            known = been
-        if known is not None:
-            self.staying = nights
-            return None
+        if not found.apart:
+            known = self.visits.known(self._size_of(nights), len(nights))
+            been = None if known is not None else self._been_here(nights)
+            if known is not None or been is not None:
+                self.visits.begin(nights, been)
+                return None
         self.red_since, self.shifted = nights[0], (nights[0], found.change)
         words = f"{change_in_words(found.change)} over {found.span} nights, by chance once in {1.0 / found.probability:.0e}"
         return self._red(
