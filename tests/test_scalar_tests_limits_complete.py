@@ -21,7 +21,6 @@ CHOICES = {
 }  # no theory: what would still be called a pile at rest
 OPEN = {  # evaluated beside the test from the formula its source states, and found again by nothing else yet
     *(("rolling_coin", name) for name in ("rate_error", "lean_error", "centre_error", "energy_error")),
-    ("suspension", "pitch_error"),
 }
 L, C, M, F, S, E = (
     f"tests.test_scalar_tests_{name}"
@@ -124,6 +123,7 @@ FOUND = {  # test: metric: what finds it again without the engine
     "masonry_arch": dict.fromkeys(("stands", "falls", "weight_error", "thrust"), ARCH),
     "stone_bridge": dict.fromkeys(("stands", "falls", "weight_error", "thrust", "stays"), BRIDGE),
     "suspension": {
+        "pitch_error": "tests.test_scalar_tests_chassis_limits.test_a_pitch_is_slower_by_what_an_integration_of_the_plane_finds",
         "continuous_error": f"{F}.test_a_bounce_in_steps_is_faster_than_the_continuum_by_its_limit",
     },
     "cornering": dict.fromkeys(("yaw_error", "front_error", "slowed"), BEND),

@@ -23,7 +23,6 @@ from spook_tracker.scalar_tests import (
     scissor_lift,
     sinking_sphere,
     slider_crank,
-    suspension,
     wires,
 )
 from tests.limits import measurement
@@ -318,18 +317,6 @@ def test_a_slider_with_play_flies_and_strikes_where_an_integration_with_events_s
         for shift in np.linspace(0.0, h, 9)
     )
     assert 0.0 < short < b.flight_error(h)
-
-
-def test_a_chassis_on_four_springs_rolls_fastest() -> None:
-    """Lengths of the springs by height, pitch and roll: one stiffness matrix, one mass matrix."""
-    s = suspension
-    stiff = np.zeros((3, 3))
-    for x, side, stiffness in s.CORNERS.values():
-        reach = np.array((1.0, -x, 0.5 * side * s.TRACK))
-        stiff += stiffness * np.outer(reach, reach)
-    squares = np.linalg.eigvals(np.diag((1.0 / s.MASS, 1.0 / s.PITCHING, 1.0 / s.ROLLING)) @ stiff).real
-
-    np.testing.assert_allclose(np.sort(np.sqrt(squares)), (s.BOUNCE, s.PITCH, s.ROLL), rtol=1e-12)
 
 
 def test_a_load_so_many_arms_heavy_is_seen_through_the_floor_of_pivots() -> None:
