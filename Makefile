@@ -29,7 +29,7 @@ help:
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
-	@echo "make package   a wheel built from the archive of the sources, at work in an environment of its own"
+	@echo "make package   a wheel built from the archive of the sources, installed by pip, at work, and weighed"
 	@echo "make release VERSION=1.2.3   check, test and package, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
 	@echo "make site      publish the website again from what is recorded"
@@ -63,13 +63,14 @@ tidy tidy-deep: tools
 	    -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null  # each source as it stands
 	sh .ci/tidy $(BIN)/clang-tidy build/tidy $(patsubst tidy-%,%,$@)
 
-# The archive of the sources, a wheel built from it, and that wheel at work in an environment of its own.
+# The archive of the sources, a wheel built from it, and that wheel installed by pip into environments of its own.
 package: develop
-	SPOOK_TEST_REAL_WHEEL=1 $(BIN)/pytest -q -p no:cacheprovider --timeout 1800 tests/test_packaging.py
+	$(BIN)/pip install -q $$(sed -n 's/^package = \[\(.*\)\]$$/\1/p' pyproject.toml | tr -d '",')
+	SPOOK_TEST_REAL_WHEEL=1 $(BIN)/pytest -q -s -p no:cacheprovider --timeout 1800 tests/test_packaging.py
 
 docs: develop
 	$(BIN)/mkdocs build --quiet
-	$(BIN)/click-man --target build/man tracker
+	$(BIN)/python .ci/manual_pages.py build/man "$$($(BIN)/python -m spook_tracker --version | cut -d, -f1 | cut -d" " -f2)"
 
 crashes: develop
 	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_crashes.py

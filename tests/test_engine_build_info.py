@@ -94,6 +94,15 @@ def test_clones_and_archives_are_told_apart(tmp_path: Path) -> None:
     (archive / ".source-archive").write_text(f"node: {head}\n")
     assert (facts(archive)["git_hash"], facts(archive)["dirty"]) == (head, "")
 
+    # An archive made by the build backend holds engine/ one deeper, and says all that it knows.
+    deeper = tmp_path / "deeper" / "spook_tracker"
+    shutil.copytree(archive / "engine", deeper / "engine")
+    told = f"node: {head}\ntime: 2026-11-21T03:17:00+00:00\nparents: {head} {head}\nchanged: true\n"
+    (deeper.parent / ".source-archive").write_text(told)
+    assert facts(deeper) | {
+        "git_hash": head, "commit_time": "2026-11-21T03:17:00+00:00", "parents": f"{head} {head}", "dirty": "true",
+    } == facts(deeper)  # fmt: skip
+
     # An unpacked archive inside somebody else's repository must not borrow that repository's commit.
     inside = full / "third_party"
     shutil.copytree(archive, inside)

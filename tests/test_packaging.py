@@ -1,18 +1,21 @@
 """What is installed: one name, complete, beside a team's own packages called engine, tracker and scalar_tests.
 
 The wheel here is made without compiling: its binary is the one of this environment, so that the test takes
-seconds. `make package` builds the real one from the archive of the sources and asks it the same.
+seconds, and what it depends on is this environment's, too. `make package` builds the real one from the archive of the
+sources, installs it by pip with all it depends on into environments of their own, and weighs those.
 """
 
 from __future__ import annotations
 
 import importlib.metadata
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tarfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -20,22 +23,19 @@ from pathlib import Path
 import pytest
 
 from spook_tracker.engine import _core
+from tests.installed_wheel import ask, lay_out, run
 
 backend = pytest.importorskip("scikit_build_core.build", reason="the build backend is not installed here")
 
 ROOT = Path(__file__).resolve().parents[1]
 REAL = os.environ.get("SPOOK_TEST_REAL_WHEEL") == "1"
 FOLDERS = ("engine", "scalar_tests", "tracker", "migrations", "site")
-THEIRS = ("engine", "tracker", "scalar_tests", "migrations")
-ASKS = """
-import engine, tracker, scalar_tests, migrations
-for module in (engine, tracker, scalar_tests, migrations):
-    assert module.OWNER == "the team", module
-from spook_tracker import engine as ours
-import spook_tracker.tracker, spook_tracker.scalar_tests.catalogue
-assert ours.Scene is not None and not hasattr(engine, "Scene")
-print(ours.__file__)
-"""
+SLIM, EVERYTHING = 150, 350  # MB installed, as `du -m` counts: without an extra, and with all of ours
+OURS = (
+    "standard,data,dask,postgresql"  # the other extras are other people's engines, and tools of development
+)
+real = pytest.mark.skipif(not REAL, reason="builds, installs and weighs: make package")
+elsewhere = pytest.mark.skipif(sys.platform == "win32", reason="environments look different there")
 
 
 def tracked() -> set[str]:
@@ -53,9 +53,14 @@ def tracked() -> set[str]:
     return {name for name in done.stdout.splitlines() if (ROOT / name).is_file()}
 
 
+def head() -> str:
+    done = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
 def built(kind: str, folder: Path, tree: Path = ROOT) -> Path:
-    """An archive of a tree, made in a process of its own: the backend changes folders."""
-    code = "import sys; from scikit_build_core import build; "
+    """An archive of a tree, made by its own backend in a process of its own: the backend changes folders."""
+    code = f"import sys; sys.path.insert(0, {str(tree / '.ci')!r}); import build_backend as build; "
     code += (
         "build.build_sdist(sys.argv[1])"
         if kind == "sdist"
@@ -70,11 +75,17 @@ def built(kind: str, folder: Path, tree: Path = ROOT) -> Path:
     return archive
 
 
-def test_the_archive_of_sources_holds_each_file_once(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The archive of the sources."""
+    return built("sdist", tmp_path_factory.mktemp("sources") / "sdist")
+
+
+def test_the_archive_of_sources_holds_each_file_once(sources: Path) -> None:
     """The folders are linked below the installed name: archived once, there, as files and not as links."""
     wanted = {f"spook_tracker/{name}" if name.split("/")[0] in FOLDERS else name for name in tracked()}
 
-    with tarfile.open(built("sdist", tmp_path / "sdist")) as archive:
+    with tarfile.open(sources) as archive:
         members = archive.getmembers()
 
     names = {member.name.partition("/")[2] for member in members}
@@ -84,6 +95,19 @@ def test_the_archive_of_sources_holds_each_file_once(tmp_path: Path) -> None:
     assert wanted - names == set()
 
 
+def test_the_archive_of_sources_knows_its_commit(sources: Path, tmp_path: Path) -> None:
+    tracked()  # or there is no commit
+    told = (unpacked(sources, tmp_path) / ".source-archive").read_text()
+    changed = subprocess.run(
+        ["git", "status", "--porcelain", "--untracked-files=no"], cwd=ROOT, capture_output=True, check=True
+    )
+
+    assert told.startswith(f"node: {head()}\ntime: 2")
+    assert "$Format" not in told
+    assert ("changed: true" in told) == bool(changed.stdout)
+    assert "$Format" in (ROOT / ".source-archive").read_text(), "the tree stays as it is"
+
+
 def unpacked(archive: Path, folder: Path) -> Path:
     """The tree in an archive."""
     shutil.unpack_archive(archive, folder, filter="data")
@@ -91,58 +115,51 @@ def unpacked(archive: Path, folder: Path) -> Path:
     return tree
 
 
+def pip(python: Path, *words: str) -> None:
+    """Install into that environment by the pip of this one, from wherever this machine's pip is told to."""
+    command = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q", *words]
+    environment = {k: v for k, v in os.environ.items() if k != "PIP_COMPILE"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def environment(place: Path) -> tuple[Path, Path]:
+    """A new environment without pip: its Python, and where packages go."""
+    venv.create(place, with_pip=False, symlinks=True)
+    return place / "bin" / "python", next(place.glob("lib/python3*/site-packages"))
+
+
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with the wheel, and the dependencies of this one: the network is not asked."""
-    folder = tmp_path_factory.mktemp("installed")
-    tree = unpacked(built("sdist", folder / "sdist"), folder / "sources") if REAL else ROOT
-    wheel = built("wheel", folder / "dist", tree)
+def wheel(tmp_path_factory: pytest.TempPathFactory, sources: Path) -> Path:
+    """The wheel; the real one is built from the archive of the sources."""
+    folder = tmp_path_factory.mktemp("wheel")
+    tree = unpacked(sources, folder / "sources") if REAL else ROOT
+    return built("wheel", folder / "dist", tree)
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory, wheel: Path) -> Path:
+    """A slim installation, as pip makes it."""
+    place = tmp_path_factory.mktemp("installed") / "environment"
+    python, site = environment(place)
+    if REAL:
+        pip(python, str(wheel))
+        return place
+    pip(python, "--no-deps", "--no-index", str(wheel))
+    shutil.copy(str(_core.__file__), site / "spook_tracker" / "engine")
+    (site / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n")  # its own .pth stay unread
+    return place
+
+
+def test_the_wheel_is_complete_under_one_name(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     wanted = {f"spook_tracker/{name}" for name in tracked() if name.split("/")[0] in FOLDERS}
     wanted = {name for name in wanted if not name.startswith("spook_tracker/engine/native/")}
+
     assert wanted - names == set()
     assert "spook_tracker/py.typed" in names  # type checkers of a team see our types
     assert {name.split("/")[0].partition("-")[0] for name in names} == {"spook_tracker"}
-
-    place = folder / "environment"
-    venv.create(place, with_pip=False, symlinks=True)
-    python = place / "bin" / "python"
-    install = ["-m", "pip", "--python", str(python), "install", "-q", "--no-deps", "--no-index", str(wheel)]
-    subprocess.run([sys.executable, *install], check=True, capture_output=True)
-    site = next(place.glob("lib/python3*/site-packages"))
-    if not REAL:
-        shutil.copy(str(_core.__file__), site / "spook_tracker" / "engine")
-    (site / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n")  # its own .pth stay unread
-    for name in THEIRS:
-        (site / name).mkdir()
-        (site / name / "__init__.py").write_text('OWNER = "the team"\n')
-    return place
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="environments look different there")
-def test_it_works_beside_a_teams_own_engine_tracker_and_scalar_tests(installed: Path, tmp_path: Path) -> None:
-    for name in THEIRS:  # once more in the folder they work in
-        shutil.copytree(next(installed.glob(f"lib/*/site-packages/{name}")), tmp_path / name)
-    environment = {
-        name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "TRACKER"))
-    }
-
-    def said(*command: str) -> str:
-        done = subprocess.run(
-            [str(installed / "bin" / command[0]), *command[1:]],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, (command, done.stdout, done.stderr)
-        return done.stdout
-
-    assert said("python", "-c", ASKS).startswith(str(installed))
-    assert said("python", "-m", "spook_tracker", "--version") == said("tracker", "--version")
-    said("tracker", "run", "falling_object", "--workers", "2")  # spawned workers import by name
-    assert "falling_object" in said("tracker", "trend", "falling_object")
-    said("tracker", "publish", "--out", "public")
-    assert (tmp_path / "public" / "index.html").is_file()
-    said("tracker", "db", "check")
 
 
 HIDDEN = """
@@ -157,50 +174,21 @@ class Hidden:
 
 sys.meta_path.insert(0, Hidden())
 """
-QUESTIONS = """
-import numpy as np
-from spook_tracker.engine import Final, Particle, Position, Scene
-from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest
-
-SCENE = Scene(bodies=(Particle(name="stone", position=(0, 0, 0), mass=1.0),), gravity=(0, 0, -10.0))
-
-def measure(simulate):
-    end = simulate(SCENE, time_step=0.1, duration=1.0, observe={"end": Final(quantity=Position("stone"))})["end"]
-    return {"error": float(end[2]) + 5.0}
-
-ERROR = Metric(name="error", description="depth minus ½ g t²", unit="m", role="gate", limit=0.6)
-FALL = ScalarTest(
-    title="Fall", question="How far does it fall?", why="", model="", parameters=(), theory=(), reference="",
-    conclusion="", source="", example=lambda: Example(scene=SCENE, time_step=0.1),
-    measurements=(Measurement(configuration="plain", time_step=0.1, metrics=(ERROR,), measure=measure),),
-)
-CATALOGUE = {"fall": FALL}
-"""
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="environments look different there")
+@elsewhere
 def test_a_night_of_a_teams_own_questions_needs_no_extra_and_no_compiler(
     installed: Path, tmp_path: Path
 ) -> None:
-    """Without SciPy, pandas and Plotly, and with nothing in PATH but the environment itself."""
-    shutil.copytree(next(installed.glob("lib/*/site-packages/engine")), tmp_path / "engine")
-    (tmp_path / "sitecustomize.py").write_text(HIDDEN)
-    (tmp_path / "questions.py").write_text(QUESTIONS)
-    (tmp_path / "tracker.toml").write_text('catalogue = "questions"\ntitle = "Ours"\n')
-    environment = {"PATH": str(installed / "bin"), "PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)}
+    """With nothing in PATH but the environment itself, and their own engine/, tracker/ and so on in the folder."""
+    lay_out(tmp_path)
+    if not REAL:
+        (tmp_path / "sitecustomize.py").write_text(HIDDEN)
 
-    def tracker(*words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [str(installed / "bin" / "tracker"), *words],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+    ask(tmp_path, installed / "bin")
+    standard = run(tmp_path, installed / "bin", "tracker", "list", "--catalogue", "standard")
+    table = run(tmp_path, installed / "bin", "tracker", "export", "--format", "csv", "--out", "x.csv")
 
-    night = tracker("nightly", "--out", "public")
-    standard = tracker("list", "--catalogue", "standard")
-    table = tracker("export", "--format", "csv", "--out", "x.csv")
-
-    assert night.returncode == 0, night.stderr
-    assert "Ours" in (tmp_path / "public" / "index.html").read_text(encoding="utf-8")
     assert standard.returncode == table.returncode == 2
     assert "pip install 'spook-tracker[standard]'" in standard.stderr
     assert "spook-tracker[data]" in table.stderr
@@ -209,3 +197,136 @@ def test_a_night_of_a_teams_own_questions_needs_no_extra_and_no_compiler(
         for name in importlib.metadata.requires("spook-tracker") or ()
         if "extra" not in name
     }
+
+
+def megabytes(folder: Path) -> float:
+    """What a folder takes on the disk, as `du -m` counts it."""
+    return sum(path.lstat().st_blocks * 512 for path in folder.rglob("*")) / 2**20
+
+
+@real
+def test_a_slim_installation_is_small(installed: Path, tmp_path: Path) -> None:
+    """As pip leaves it, byte code of everything included, and after a night."""
+    lay_out(tmp_path)
+    ask(tmp_path, installed / "bin")
+
+    found = megabytes(next(installed.glob("lib/python3*/site-packages")))
+    print(f"slim: {found:.0f} MB")
+    assert found <= SLIM
+
+
+@real
+def test_everything_installed_is_small(wheel: Path, tmp_path: Path) -> None:
+    """Without the byte code of what is never imported (`--no-compile`), but with that of a night, a table, a website."""
+    python, site = environment(tmp_path / "environment")
+    pip(python, "--no-compile", f"{wheel}[{OURS}]")
+    team = tmp_path / "team"
+    team.mkdir()
+    (team / "tracker.toml").write_text('catalogue = "standard"\n')
+    values = [
+        ("nightly", "--quick", "--out", "public"),
+        ("export", "--format", "parquet", "--out", "values.parquet"),
+        ("export", "--format", "csv", "--out", "values.csv"),
+    ]
+    for words in values:
+        done = run(team, python.parent, "tracker", *words)
+        assert done.returncode == 0, (words, done.stdout, done.stderr)
+
+    after = megabytes(site)
+    run(team, python.parent, "python", "-m", "compileall", "-q", str(site))
+    print(f"everything ({OURS}): {after:.0f} MB; with all byte code {megabytes(site):.0f} MB")
+    assert after <= EVERYTHING
+
+
+@real
+def test_the_commit_travels_from_the_archive_into_the_wheel(
+    installed: Path, sources: Path, tmp_path: Path
+) -> None:
+    told_of = (unpacked(sources, tmp_path / "sources") / ".source-archive").read_text().splitlines()
+    told = run(
+        tmp_path, installed / "bin", "python", "-c",
+        "from spook_tracker.engine.build_info import build_info as b; print(b.git_hash, b.commit_time, b.version)",
+    )  # fmt: skip
+
+    found, time, version = told.stdout.split()
+    assert f"node: {found}" == told_of[0]
+    assert time.startswith("2")
+    assert version != "0+unknown"
+
+
+@real
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="manylinux is Linux")
+def test_the_wheel_needs_nothing_that_linux_distributions_lack(wheel: Path) -> None:
+    """auditwheel names a manylinux policy for it: nothing but what every distribution has is linked. abi3audit sees the
+    stable interface of Python only."""
+    programs = Path(sys.executable).parent
+
+    def said(*command: str) -> str:
+        done = subprocess.run(
+            [str(programs / command[0]), *command[1:]], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return " ".join((done.stdout + done.stderr).split())
+
+    shown = said("auditwheel", "show", str(wheel))
+    print(shown)
+    assert re.search(r"following platform tag: \"manylinux_2_\d+_", shown), shown
+    said("abi3audit", "--strict", str(wheel))
+
+
+@real
+def test_the_release_builds_one_wheel_a_machine() -> None:
+    """cibuildwheel reads our settings; to build by them it wants containers, which not every machine has."""
+    programs = Path(sys.executable).parent
+    told = {}
+    for platform, arch in (("linux", "x86_64"), ("linux", "aarch64"), ("macos", "arm64")):
+        done = subprocess.run(
+            [str(programs / "cibuildwheel"), "--platform", platform, "--archs", arch, "--print-build-identifiers"],
+            cwd=ROOT, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        told[platform, arch] = done.stdout.split()
+
+    assert told == {
+        ("linux", "x86_64"): ["cp311-manylinux_x86_64"],
+        ("linux", "aarch64"): ["cp311-manylinux_aarch64"],
+        ("macos", "arm64"): ["cp311-macosx_arm64"],
+    }
+
+
+@elsewhere
+def test_there_is_a_manual_page_for_every_command(tmp_path: Path) -> None:
+    """With its options; the wheel brings them to share/man."""
+    command = [sys.executable, ".ci/manual_pages.py", str(tmp_path), "1.2.3"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stderr
+    assert {"tracker.1", "tracker-run.1", "tracker-db-copy.1"} <= {path.name for path in tmp_path.iterdir()}
+    page = (tmp_path / "tracker-run.1").read_text().replace("\\-", "-")
+    assert "--executor" in page
+    assert "1.2.3" in page
+
+
+@real
+@elsewhere
+def test_the_manual_pages_are_installed(installed: Path) -> None:
+    page = installed / "share" / "man" / "man1" / "tracker-run.1"
+
+    assert "--executor" in page.read_text().replace("\\-", "-")
+
+
+def test_what_is_released_is_named_as_it_is() -> None:
+    """The tools of the release are pinned, and the index is told who made this and under what licences."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    pinned = {
+        line.partition("==")[0].lower()
+        for line in (ROOT / ".ci" / "constraints.txt").read_text().splitlines()
+    }
+    release = (ROOT / ".github" / "workflows" / "release.yml").read_text()
+
+    assert {"build", "cibuildwheel", "auditwheel", "abi3audit"} <= pinned
+    for name in re.findall(r"pip install --quiet (\S+)", release):
+        assert name in pinned, name
+    assert {"authors", "keywords", "classifiers"} <= set(settings["project"])
+    script = settings["tool"]["cibuildwheel"]["test-command"].partition("{project}/")[2]
+    assert (ROOT / script).is_file()
