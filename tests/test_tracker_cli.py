@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import jsonschema
+import msgspec
 import pytest
 from click.testing import CliRunner, Result
 
@@ -330,6 +331,7 @@ def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypa
     assert too_heavy(Path("public")) == []
     assert second.exit_code == 1
     (red,) = [line for line in second.stdout.splitlines() if line.startswith("✗ stand/")]
+    assert "worse than the history, 1 new tonight; the worst: stand/" in second.stdout.splitlines()[0]
     assert "✓ green" in second.stdout  # every limit holds: only the history knows
     for part in (
         "worse",
@@ -339,6 +341,58 @@ def test_a_night_measures_judges_and_publishes_and_tells_what_got_worse(monkeypa
         "public/tests/stand.html",
     ):
         assert part in red
+
+
+def test_a_night_takes_the_levels_that_a_file_accepts(monkeypatch):
+    tracker("nightly", "--quick", "--workers", "0", "--out", "public")
+    for name, value in {"HASH": BAD, "PARENT": GOOD, "VERSION": "1.1.0", "ERROR": "0.0005"}.items():
+        monkeypatch.setenv(f"TOY_{name}", value)
+    Path("taken.toml").write_text(
+        '[[accepted]]\nseries = "stand/*"\nrange = [0.0, 0.6]\nwho = "Ada"\nwhy = "known"\n'
+    )
+    asked = ("nightly", "--quick", "--workers", "0", "--out", "public")
+    taken = tracker(*asked, "--accepted", "taken.toml")
+    missing = tracker(*asked, "--accepted", "nowhere.toml")
+
+    assert taken.exit_code == 0
+    assert not [line for line in taken.stdout.splitlines() if line.startswith("✗ stand/")]
+    assert missing.exit_code == 2
+
+
+def test_a_trend_is_of_commits_and_not_of_a_build_with_local_changes_long_ago(monkeypatch, two_versions):
+    measure(monkeypatch, VERSION="1.0.1.dev0", HASH=GOOD, DIRTY="1", ERROR="9.0")
+    measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD, ERROR="-0.2")
+    shown = tracker("trend", "fall", "position_error")
+
+    assert "1.2.0" in [line for line in shown.output.splitlines() if line.strip()][-1]
+    assert "1.0.1.dev0" not in shown.output
+
+
+def test_an_imported_run_of_another_engine_that_became_worse_is_red(tmp_path):
+    from spook_tracker.tracker.document.json_form import encode
+    from tests.synthetic_history import rival
+
+    for version, door in (("1", 0.0125), ("2", 0.0125), ("3", 0.02)):
+        Path(f"{version}.json").write_bytes(
+            encode(msgspec.structs.replace(rival(version, door=door), trigger="import"))
+        )
+        assert tracker("import", f"{version}.json").exit_code == 0
+
+    assert tracker("judge", "rival@2").exit_code == 0
+    shown = tracker("judge", "rival@3")
+    assert shown.exit_code == 1
+    assert "door/" in shown.output
+
+
+def test_list_and_rank_tell_of_what_is_asked_for(two_versions):
+    from spook_tracker.scalar_tests.catalogue import CATALOGUE
+
+    every = tracker("list", "--json", "--catalogue", "standard").output
+    gates = tracker("list", "--json", "--role", "gate", "--test", "fall").output
+    assert "fall" in gates
+    assert "stand" not in gates
+    assert len(CATALOGUE) > 1 and every
+    assert tracker("rank", "--test", "nothing").exit_code == 0
 
 
 def test_plain_letters_do_where_the_terminal_has_no_others(monkeypatch):

@@ -147,6 +147,15 @@ def test_two_steps_are_two_change_points():
     assert [round(point.place / 40) for point in change_points(values)] == [1, 2]
 
 
+def test_a_change_of_eight_nights_in_the_middle_of_a_history_is_found():
+    values = [*noisy(60, 1), *noisy(8, 2, level=1.1e-3), *noisy(60, 3)]
+    told = states(values)
+
+    assert told[61] == "detected"
+    assert "recovered" in told[68:71]
+    assert "detected" not in told[71:]
+
+
 def test_noise_has_no_change_points():
     assert not any(change_points(noisy(200, seed), name=str(seed)) for seed in range(30))
     assert change_points([1.0] * 50) == []

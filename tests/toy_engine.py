@@ -2,7 +2,7 @@
 
 What it was built from and how well it works are set by environment variables, so that a test has as many
 versions, good and bad, as it needs: TOY_VERSION, TOY_HASH, TOY_PARENT, TOY_ERROR (added to every position),
-TOY_COST (times the work), TOY_FAULT (diverge, nan, raise, die, hang, hog). TOY_FAULT_TIMED is the fault of runs of
+TOY_DIRTY (with local changes), TOY_COST (times the work), TOY_FAULT (diverge, nan, raise, die, hang, hog). TOY_FAULT_TIMED is the fault of runs of
 which nothing is kept, as they are timed; TOY_FAULT_STEP the only time step [s] that has it.
 """
 
@@ -30,7 +30,7 @@ class _BuildInfo:
             "name": "toy",
             "version": os.environ.get("TOY_VERSION", "1.0.0"),
             "git_hash": git_hash,
-            "dirty": False,
+            "dirty": bool(os.environ.get("TOY_DIRTY")),
             "commit_time": os.environ.get("TOY_TIME", "2026-01-01T00:00:00+00:00"),
             "parents": tuple(os.environ.get("TOY_PARENT", "").split()),
             "compiler": "none",

@@ -253,10 +253,18 @@ def trend(
 
 @click.command("list", epilog=example("tracker list"))
 @test_option
+@kind_options
 @json_option
 @source_options
-def list_tests(tests: tuple[str, ...], as_json: bool, engine: str, catalogue: str) -> None:
-    """List the scalar tests: what is asked, and against which limit."""
+def list_tests(
+    tests: tuple[str, ...],
+    kinds: tuple[str, ...],
+    roles: tuple[str, ...],
+    as_json: bool,
+    engine: str,
+    catalogue: str,
+) -> None:
+    """List the scalar tests: what is asked, and against which limit. With --kind or --role, those that have such."""
     from fnmatch import fnmatchcase
 
     from spook_tracker.tracker.cli.console import say
@@ -267,7 +275,9 @@ def list_tests(tests: tuple[str, ...], as_json: bool, engine: str, catalogue: st
     found = {
         name: test
         for name, test in source.tests().items()
-        if not tests or any(fnmatchcase(name, pattern) for pattern in tests)
+        if (not tests or any(fnmatchcase(name, pattern) for pattern in tests))
+        and (not kinds or _kinds_of(test) & set(kinds))
+        and (not roles or {metric.role for _, metric in test.metrics()} & set(roles))
     }
     if as_json:
         from spook_tracker.tracker.cli.report_json import list_json
@@ -275,6 +285,14 @@ def list_tests(tests: tuple[str, ...], as_json: bool, engine: str, catalogue: st
         click.echo(list_json(found))
     else:
         say(catalogue_table(found))
+
+
+def _kinds_of(test: Any) -> set[str]:
+    """The kinds of series that a test gives where all of it is asked."""
+    has = {"scalar": test.measurements, "ladder": test.ladders, "break_point": test.stability}
+    kinds = {kind for kind, parts in has.items() if parts}
+    kinds |= {"order", "time", "run_time"} if test.ladders else set()
+    return kinds | ({"map"} if test.stability else set()) | {"work"}
 
 
 @click.command(epilog=example("tracker show pendulum"))

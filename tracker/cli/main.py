@@ -195,14 +195,19 @@ def nightly(
         )
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
+    measured: list[Any] = []
+
     def tell(news: Any) -> None:
         if isinstance(news, list):
             from spook_tracker.tracker.cli.report_compare import finding_lines
 
-            say("\n".join(finding_lines(news, f"{out}/")))
+            summary, *lines = finding_lines(news, f"{out}/")
+            say(summary)  # what the night came to stands first
+            _print_run(measured[0], everything=False)
+            say("\n".join(lines))
             return
         recorded(news.id)
-        _print_run(news, everything=False)
+        measured.append(news)
         if json_file:
             _write(json_file, _json(news))
 

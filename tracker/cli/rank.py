@@ -8,13 +8,15 @@ from typing import Any
 
 import click
 
+from spook_tracker.tracker.cli.filters import test_option
 from spook_tracker.tracker.cli.options import database_option, example
 
 
 @click.command(epilog=example("tracker run --engine spook,mujoco --sweep", "tracker rank"))
 @click.argument("engines", nargs=-1, metavar="[ENGINE]...")
+@test_option
 @database_option
-def rank(engines: tuple[str, ...], database: str) -> None:
+def rank(engines: tuple[str, ...], tests: tuple[str, ...], database: str) -> None:
     """Table of engines and scenes: error at h = 1/60, run time to reach 1e-2, 1e-4 and 1e-6.
 
     ENGINE is a name (its latest run) or name@version; without any, every engine that is recorded.
@@ -28,11 +30,13 @@ def rank(engines: tuple[str, ...], database: str) -> None:
             raise click.UsageError(
                 "nothing is recorded yet; measure: tracker run --engine spook,mujoco --sweep"
             )
-        say("\n".join(table_lines(history, names)))
+        say("\n".join(table_lines(history, names, tests)))
 
 
-def table_lines(history: Any, names: Sequence[str]) -> list[str]:
-    """The table, and between two engines who is ahead where."""
+def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -> list[str]:
+    """The table, of these tests alone if some are named, and between two engines who is ahead where."""
+    from fnmatch import fnmatchcase
+
     import spook_tracker.tracker.judge.rank as ranks
     from spook_tracker.tracker.cli.console import Column, clean, table, width
     from spook_tracker.tracker.document.wording import day
@@ -42,6 +46,8 @@ def table_lines(history: Any, names: Sequence[str]) -> list[str]:
     found = ranks.standings(
         {title: history.samples(run.id) for title, run in zip(titles, runs.values(), strict=True)}
     )
+    if tests:
+        found = [one for one in found if any(fnmatchcase(one.test, pattern) for pattern in tests)]
     if not found:
         again = f"tracker run --engine {','.join(names)} --sweep"
         return [f"no error against run time is recorded of {' or '.join(names)}; measure it: {again}"]
