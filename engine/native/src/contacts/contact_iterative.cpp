@@ -9,8 +9,8 @@ namespace spook {
 
 namespace {
 
-constexpr int most_turns = 4;  // times `iterations` sweeps, for steps that would be unsettled otherwise
-constexpr double focus = 0.1;  // of the residual allowed: contacts that change less are left alone then
+constexpr int most_turns = 16;  // times `iterations` sweeps, where a step would be unsettled otherwise
+constexpr double focus = 0.5;   // of the residual allowed: contacts that change less are left alone then
 
 }  // namespace
 
@@ -77,7 +77,8 @@ bool ContactStage::is_settled(MixedSystem& system) {
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
     sweeps_.write(system);
-    const RowsResidual contact = sweeps_.worst(), joint = rows_residual(system, {}, options_.friction);
+    const RowsResidual contact = sweeps_.worst(focus * options_.unsettled_residual),
+                       joint = rows_residual(system, {}, options_.friction);
     residual_ = std::max(contact.residual, joint.residual);
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points_[contact.row].contact;
@@ -98,9 +99,8 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
     for (int turn = 0; turn < most_turns; ++turn) {
-        report = sweeps_.run(
-            options_.iterations, options_.residual_tolerance, [this] { return find_more(); },
-            turn == 0 ? 0.0 : focus * options_.unsettled_residual);
+        report = sweeps_.run(options_.iterations, options_.residual_tolerance,
+                             focus * options_.unsettled_residual, [this] { return find_more(); });
         counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
         if (!report.finite || is_settled(system) || report.converged) break;
     }

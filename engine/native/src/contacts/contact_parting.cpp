@@ -229,7 +229,7 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie
         parting_sweeps_.add(row);
     }
     const FrictionReport report =
-        parting_sweeps_.run(options_.iterations, options_.residual_tolerance, nullptr);
+        parting_sweeps_.run(options_.iterations, options_.residual_tolerance, 0.0, nullptr);
     counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
     if (!report.finite) return false;
     parting_sweeps_.write(parting);

@@ -13,6 +13,7 @@ namespace spook {
 namespace {
 
 constexpr int late_rounds = 3;  // of sweeps for contacts found after the last one
+constexpr int cold = -2;        // before every sweep
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
@@ -63,12 +64,14 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     head_.assign(bodies_ + 1, -1);
     tail_.assign(bodies_ + 1, -1);
     active_.assign(bodies_ + 1, 0);
+    spent_.assign(bodies_ + 1, 0);
     left_.assign(bodies_ + 1, 0.0);
     next_.clear();
-    body_of_.clear();
+    bodies_of_.clear();
     roots_.clear();
     chained_ = false;
     stamp_ = 0;
+    hot_.assign(bodies_ + 1, cold);
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
         for (const Beyond& other : rows.beyond) join(std::max(rows.first, rows.second), other.body);
@@ -119,9 +122,7 @@ int ContactSweeps::add(const SweepContact& given) {
     if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
         push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * c.across);
-    if (stamp_ > 0)
-        for (const int body : {given.first, given.second})
-            if (body >= 0) hot_[body] = stamp_;
+    heat({c.first, c.second});
     const int index = static_cast<int>(contacts_.size()) - 1;
     link(joint_count_ + index, given.first, given.second);
     return index;
@@ -135,9 +136,8 @@ int ContactSweeps::root(int body) noexcept {
 /// Joins the islands of both bodies, and once sweeping has begun their chains, too.
 void ContactSweeps::link(int item, int first, int second) {
     next_.push_back(-1);
-    const int body = first >= 0 ? first : second;
-    body_of_.push_back(body);
-    if (body < 0) return;
+    bodies_of_.push_back({first >= 0 ? first : bodies_, second >= 0 ? second : bodies_});
+    if (first < 0 && second < 0) return;
     if (first >= 0 && second >= 0) join(first, second);
     if (chained_) chain(item);
 }
@@ -147,6 +147,8 @@ void ContactSweeps::join(int first, int second) {
     if (a == b) return;
     if (a > b) std::swap(a, b);
     parent_[b] = a;
+    left_[a] = std::max(left_[a], left_[b]);
+    spent_[a] = spent_[a] || spent_[b];
     if (!chained_ || head_[b] < 0) return;
     if (head_[a] >= 0) {
         next_[tail_[a]] = head_[b];
@@ -160,8 +162,9 @@ void ContactSweeps::join(int first, int second) {
 }
 
 void ContactSweeps::chain(int item) {
-    if (body_of_[item] < 0) return;
-    const int island = root(body_of_[item]);
+    const int body = std::min(bodies_of_[item].first, bodies_of_[item].second);
+    if (body == bodies_) return;
+    const int island = root(body);
     if (head_[island] < 0) {
         head_[island] = item;
         roots_.push_back(island);
@@ -255,54 +258,54 @@ double ContactSweeps::sweep_island(int island) noexcept {
     return change;
 }
 
-/// As sweep_island(), but leaves out contacts between bodies that have come to an answer.
-double ContactSweeps::sweep_hot(int island, int stamp, double focus) noexcept {
+void ContactSweeps::heat(Both bodies) noexcept {
+    if (bodies.first < bodies_) hot_[bodies.first] = stamp_;
+    if (bodies.second < bodies_) hot_[bodies.second] = stamp_;
+}
+
+/// As sweep_island(), but of the contacts only those of hot bodies.
+double ContactSweeps::sweep_hot(int island, double focus) noexcept {
     double change = 0.0;
     for (int item = head_[island]; item >= 0; item = next_[item]) {
-        if (item < joint_count_) {
-            const double own = joints_.update_joint(static_cast<std::size_t>(item));
-            if (!(own <= change)) change = own;
-            continue;
-        }
-        fetch(item);
-        Contact& c = contacts_[item - joint_count_];
-        if (stamp > 1 && hot_[c.first] < stamp - 1 && hot_[c.second] < stamp - 1) continue;
-        const double own = update(c);
+        const Both bodies = bodies_of_[item];
+        const bool joint = item < joint_count_;
+        if (!joint && hot_[bodies.first] < stamp_ - 1 && hot_[bodies.second] < stamp_ - 1) continue;
+        const double own = joint ? joints_.update_joint(static_cast<std::size_t>(item))
+                                 : update(contacts_[item - joint_count_]);
         if (!(own <= change)) change = own;
-        if (own <= focus) continue;
-        if (c.first < bodies_) hot_[c.first] = stamp;
-        if (c.second < bodies_) hot_[c.second] = stamp;
+        if (!(own <= focus)) heat(bodies);
     }
     return change;
 }
 
-FrictionReport ContactSweeps::run(int iterations, double tolerance, const std::function<bool()>& more,
-                                  double focus) {
+FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus,
+                                  const std::function<bool()>& more) {
     FrictionReport report;
     if (!chained_) {
         for (int item = 0; item < static_cast<int>(next_.size()); ++item) chain(item);
         chained_ = true;
     }
-    if (focus > 0.0) {
-        hot_.assign(bodies_ + 1, -1);
-        for (const int island : roots_) active_[island] = 1;
-    }
+    for (const int island : roots_) active_[island] = active_[island] || spent_[island];
     int look = 2, late = 0;
     for (int sweep = 1, until = iterations;; ++sweep) {
         Watch::look();
-        if (focus > 0.0) stamp_ = sweep;
+        ++stamp_;
         bool any = false;
         for (std::size_t k = 0; k < roots_.size(); ++k) {
             const int island = roots_[k];
             if (!active_[island]) continue;
-            left_[island] = focus > 0.0 ? sweep_hot(island, sweep, focus) : sweep_island(island);
+            const bool spent = spent_[island] != 0;
+            const double change = spent ? sweep_hot(island, focus) : sweep_island(island);
+            left_[island] = spent ? std::max(left_[island], change) : change;
             ++report.sweeps;
-            active_[island] = !(left_[island] <= (focus > 0.0 ? focus : tolerance));
+            active_[island] = !(change <= (spent ? focus : tolerance));
             any = any || active_[island];
         }
         const bool over = !any || sweep >= until;
         if (!over && sweep < look) continue;
         look = 2 * sweep;
+        if (sweep >= until)
+            for (const int island : roots_) spent_[island] = spent_[island] || active_[island];
         const bool grown = more && more();
         if (!over) continue;
         if (!grown || late == late_rounds) break;
@@ -310,12 +313,10 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, const std::f
         until = sweep + iterations;
         look = sweep + 2;
     }
-    for (const int island : roots_) {
+    for (const int island : roots_)
         if (!(left_[island] <= report.residual)) report.residual = left_[island];
-        report.converged = report.converged && !active_[island];
-    }
+    report.converged = report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
-    if (focus > 0.0) report.converged = false;
     return report;
 }
 
@@ -324,7 +325,7 @@ void ContactSweeps::write(MixedSystem& system) const {
     else system.velocity.assign(joints_.velocity().begin(), joints_.velocity().end() - 1);
 }
 
-RowsResidual ContactSweeps::worst() const {
+RowsResidual ContactSweeps::worst(double focus) {
     RowsResidual worst{0.0, -1};
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& c = contacts_[k];
@@ -348,6 +349,7 @@ RowsResidual ContactSweeps::worst() const {
         }
         if (c.friction > 0.0)
             residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
+        if (!(residual <= focus)) heat({c.first, c.second});
         if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
     }
     return worst;

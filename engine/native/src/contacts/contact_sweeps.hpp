@@ -40,19 +40,19 @@ public:
     int add(const SweepContact& contact);
 
     /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
-    /// times. `more` is called after the 2nd, 4th, 8th … sweep and when all is done: it may add contacts and says
-    /// whether it did; those that come after the last sweep get `iterations` more, three times at most. May be called
-    /// again, to go on. With a `focus` [m/s] only contacts are swept, after a first sweep over all, that have a body
-    /// whose rows still change by more than that; the answer then counts as unconverged.
-    FrictionReport run(int iterations, double tolerance, const std::function<bool()>& more,
-                       double focus = 0.0);
+    /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep and when all is done: it may add
+    /// contacts and says whether it did; those that come after the last sweep get `iterations` more, three times at
+    /// most. May be called again, to go on. What is spent is swept only where a body is new to its contacts, was
+    /// found by worst(), or was just changed by more than `focus` [m/s]: in a large heap something somewhere always asks.
+    FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool()>& more);
 
     const Vec6& velocity(int body) const noexcept { return joints_.velocity()[body]; }
     const double* impulse(int contact) const noexcept { return contacts_[contact].impulse; }
     /// Multipliers of joints, and all velocities.
     void write(MixedSystem& system) const;
-    /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index.
-    RowsResidual worst() const;
+    /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index. Those
+    /// further off than `focus` [m/s] are where the next run goes on.
+    RowsResidual worst(double focus);
 
 private:
     struct Contact {
@@ -69,6 +69,9 @@ private:
         double inverse_mass = 0.0;
         Mat3 inverse;  // of the inertia, world axes, 1/(kg m²)
     };
+    struct Both {
+        int first, second;  // bodies; bodies_ for one that does not move
+    };
     void begin(MixedSystem& system, FrictionModel model);
     double update(Contact& contact) noexcept;
     void push(const Contact& contact, Vec3 impulse) noexcept;
@@ -77,8 +80,9 @@ private:
     void join(int first, int second);
     void chain(int item);
     void fetch(int item) const noexcept;
+    void heat(Both bodies) noexcept;
     double sweep_island(int root) noexcept;
-    double sweep_hot(int root, int stamp, double focus) noexcept;
+    double sweep_hot(int root, double focus) noexcept;
 
     FrictionModel model_ = FrictionModel::cone;
     Sweeper joints_;
@@ -86,12 +90,13 @@ private:
     std::vector<Inertia> inertia_;
     std::vector<Contact> contacts_;
     // Islands: bodies joined by union-find; the items of one, joints first, are a chain in the order they came.
-    std::vector<int> parent_, head_, tail_, next_, body_of_;
+    std::vector<int> parent_, head_, tail_, next_;
+    std::vector<Both> bodies_of_;
     std::vector<int> roots_;
-    std::vector<char> active_;
-    std::vector<double> left_;  // the last sweep's change, by root
-    std::vector<int> hot_;      // the last focused sweep that changed a body's rows much
-    int stamp_ = 0;             // of the focused sweep that runs, 0 if none
+    std::vector<char> active_, spent_;
+    std::vector<double> left_;  // the last sweep's change, by root; the largest since it is spent
+    std::vector<int> hot_;      // the last sweep that changed a body's rows much
+    int stamp_ = 0;             // counts sweeps
     bool chained_ = false;
 };
 
