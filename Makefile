@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile serve clean require install develop native-tests sanitize FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -14,6 +14,10 @@ help:
 	@echo "make tidy-deep the core read along every path by clang's analyser: weekly"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
+	@echo "make sanitize-threads  the same with what threads share watched"
+	@echo "make sanitize-python   the Python tests of the engine on a module whose every access is watched"
+	@echo "make fuzz MINUTES=10   each fuzz target, guided by what it reaches: shapes, scenes, documents, settings"
+	@echo "make fuzz-keep         the least of what they have reached goes into the tree"
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make bench-replay  what a frame of ten thousand bodies costs in a browser"
@@ -29,6 +33,7 @@ help:
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
+	@echo "make executors the whole catalogue on processes and on a Dask cluster of two workers: the same bits?"
 	@echo "make package   a wheel built from the archive of the sources, installed by pip, at work, and weighed"
 	@echo "make release VERSION=1.2.3   check, test and package, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"
@@ -81,7 +86,10 @@ looks: develop
 	SPOOK_TEST_EVERY_LOOK=1 $(BIN)/pytest -q --timeout 1800 tests/test_site_access.py
 
 hostile: develop
-	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py
+	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py tests/test_tracker_damaged.py
+
+executors: develop
+	SPOOK_WHOLE_CATALOGUE=yes $(BIN)/pytest -q --timeout 7200 tests/test_tracker_executors.py -k "same_bits"
 
 release:
 	@sh .ci/release --check "$(VERSION)"
@@ -170,11 +178,33 @@ native-tests: develop
 	$(BIN)/cmake --build build/cpp-tests
 	$(BIN)/ctest --test-dir build/cpp-tests --output-on-failure
 
-sanitize: develop
-	$(BIN)/cmake -S engine/native -B build/sanitize $(NINJA) \
-	    -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=ON
-	$(BIN)/cmake --build build/sanitize
-	$(BIN)/ctest --test-dir build/sanitize --output-on-failure
+sanitize: WATCHED = address,undefined
+sanitize-threads: WATCHED = thread
+sanitize sanitize-threads: develop
+	$(BIN)/cmake -S engine/native -B build/$@ $(NINJA) -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" \
+	    -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=$(WATCHED)
+	$(BIN)/cmake --build build/$@
+	$(BIN)/ctest --test-dir build/$@ --output-on-failure
+
+# The module is laid over the one in the environment by the tests' own path; what Python itself never frees is no leak.
+sanitize-python: develop
+	$(BIN)/cmake -S engine/native -B build/$@ $(NINJA) -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" \
+	    -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python -DSKBUILD_SABI_VERSION=3.11 -DSPOOK_SANITIZE=address,undefined
+	$(BIN)/cmake --build build/$@
+	sh .ci/sanitize-python $(BIN)/python build/$@
+
+# Coverage-guided fuzzing: clang with libFuzzer for C++ (.ci/install-system), atheris for Python.
+MINUTES ?= 10
+fuzz: develop
+	$(BIN)/cmake -S engine/native -B build/fuzz $(NINJA) -DCMAKE_CXX_COMPILER=clang++-19 -DCMAKE_BUILD_TYPE=None \
+	    -DCMAKE_CXX_FLAGS="-O1 -g1" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DSPOOK_PYTHON=OFF -DSPOOK_FUZZ=ON \
+	    -DSPOOK_SANITIZE=address,undefined
+	$(BIN)/cmake --build build/fuzz
+	$(BIN)/pip install -q atheris
+	sh .ci/fuzz $(BIN)/python $(MINUTES)
+
+fuzz-keep:
+	sh .ci/fuzz $(BIN)/python keep
 
 clean:
 	rm -rf build $(VENV) public .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -170,7 +170,12 @@ class RigidBody:
         if inertia is None:
             if self.shape is None:
                 raise SceneError(f"{owner}: a body without a shape needs an inertia; or use a Particle")
-            inertia = self.shape.inertia(self.mass)
+            try:
+                inertia = self.shape.inertia(self.mass)
+            except (OverflowError, ZeroDivisionError):
+                raise SceneError(
+                    f"{owner}: the inertia of its shape is no number of arithmetic; mind the units"
+                ) from None
         moments, found = _principal(owner, inertia)
         x, y, z = (check.positive(owner, "inertia", moment) for moment in moments)
         largest = max(x, y, z)

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.store import (
     connection,
     database,
-    revisions,  # noqa: F401 (imported by the first who migrates: here, so that it takes no time any more)
+    revisions,  # (imported by the first who migrates: here, so that it takes no time any more)
 )
 from spook_tracker.tracker.store.record import record
 from tests.run_documents import run_of
@@ -46,19 +46,27 @@ def write_once_told(said: Connection, url: str, name: int) -> None:
 
 def migrate_and_die(_said: Connection, url: str, statement: int) -> None:
     """Open an older database, and be killed before the given statement that changes something."""
-    left, real = [statement], connection.connected
-
-    def counting(*given: Any) -> Engine:
-        engine = real(*given)
-
-        @event.listens_for(engine, "before_cursor_execute")
-        def count(_connection: Any, _cursor: Any, words: str, *_rest: Any) -> None:
-            if words.startswith(("UPDATE", "CREATE", "INSERT", "DROP", "ALTER")):
-                left[0] -= 1
-                if left[0] == 0:
-                    os.kill(os.getpid(), signal.SIGKILL)
-
-        return engine
-
-    database.connected = counting  # type: ignore[assignment]
+    real = connection.connected
+    database.connected = lambda *given: mortal(real(*given), statement)  # type: ignore[assignment]
     database.open_database(url).dispose()
+
+
+def go_down_and_die(_said: Connection, url: str, target: str, statement: int) -> None:
+    """Go back to an older revision, and be killed before the given statement that changes something."""
+    engine = mortal(connection.connected(connection.database_url(url), readonly=False), statement)
+    with engine.begin() as going:
+        revisions.revert(going, target)
+
+
+def mortal(engine: Engine, statement: int) -> Engine:
+    """The engine, whose process is killed before so many statements have changed something."""
+    left = [statement]
+
+    @event.listens_for(engine, "before_cursor_execute")
+    def count(_connection: Any, _cursor: Any, words: str, *_rest: Any) -> None:
+        if words.startswith(("UPDATE", "CREATE", "INSERT", "DROP", "ALTER")):
+            left[0] -= 1
+            if left[0] == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    return engine

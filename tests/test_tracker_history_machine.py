@@ -6,12 +6,19 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 import msgspec
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.json_form import Number
@@ -32,16 +39,24 @@ KEYS = ["a", "b", "c"]
 class Storage(RuleBasedStateMachine):
     """The database beside a dictionary of run id → document."""
 
-    def __init__(self) -> None:
+    def __init__(self, server=None) -> None:
+        """`server` makes databases of PostgreSQL, every other one that is moved into; without one all are files."""
         super().__init__()
         self.folder = Path(tempfile.mkdtemp())
+        self.server, self.databases = server, ExitStack()
         self.copies = 0
         self.expected = {}
-        self.open(self.folder / "first.db")
+        self.open(self.new())
 
-    def open(self, path):
-        self.path = path
-        self.engine = open_database(str(path))
+    def new(self):
+        """The URL of an empty database."""
+        if self.server is not None and self.copies % 2 == 0:
+            return self.databases.enter_context(self.server.new_database())
+        return f"sqlite:///{self.folder}/{self.copies}.db"
+
+    def open(self, url):
+        self.url = url
+        self.engine = open_database(url)
         self.session = Session(self.engine)
 
     def close(self):
@@ -52,6 +67,7 @@ class Storage(RuleBasedStateMachine):
         self.session.close()
         faults = check(self.engine)
         self.close()
+        self.databases.close()
         shutil.rmtree(self.folder)
         assert faults == ()
 
@@ -82,15 +98,15 @@ class Storage(RuleBasedStateMachine):
         files = export_runs(self.history(), self.folder / f"files {self.copies}")
         self.close()
         self.copies += 1
-        self.open(self.folder / f"imported {self.copies}.db")
+        self.open(self.new())
         assert len(import_files(self.session, reversed(files)).stored) == len(self.expected)
 
     @rule()
     def moves_by_copy(self):
         self.close()
         self.copies += 1
-        target = self.folder / f"copied {self.copies}.db"
-        copy_database(str(self.path), str(target))
+        target = self.new()
+        copy_database(self.url, target)
         self.open(target)
 
     @precondition(lambda self: self.expected)
@@ -112,11 +128,20 @@ class Storage(RuleBasedStateMachine):
 
     @precondition(lambda self: not self.expected)
     @rule()
-    def goes_down_and_up(self):
+    def goes_all_the_way_down_and_up(self):
         self.session.rollback()
         with self.engine.begin() as connection:
             revert(connection, "base")
         upgrade(self.engine)
+
+    @precondition(lambda self: self.expected)
+    @rule(revision=st.sampled_from(["0008", "0007"]))
+    def goes_down_and_up_with_its_runs(self, revision):
+        """Over the revision that moves every id, and over those above it."""
+        self.session.rollback()
+        with self.engine.begin() as connection:
+            revert(connection, revision)
+        upgrade(self.engine, keep_copy=False)
 
     @invariant()
     def holds_what_was_given(self):
@@ -131,7 +156,15 @@ class Storage(RuleBasedStateMachine):
         self.session.rollback()
 
 
-TestStorage = Storage.TestCase
-TestStorage.settings = settings(
-    max_examples=8, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck)
+SETTINGS = settings(
+    max_examples=6, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck)
 )
+
+
+def test_storage_keeps_what_a_dictionary_keeps_in_files():
+    run_state_machine_as_test(Storage, settings=SETTINGS)
+
+
+def test_storage_keeps_what_a_dictionary_keeps_on_a_server_and_between_both(postgresql_server):
+    few = settings(SETTINGS, max_examples=3)
+    run_state_machine_as_test(lambda: Storage(postgresql_server), settings=few)

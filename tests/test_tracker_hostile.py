@@ -21,7 +21,7 @@ from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.measure.other_tools import of_other_tools
 from spook_tracker.tracker.measure.short_form import is_short, whole
-from spook_tracker.tracker.store.border import decoded
+from spook_tracker.tracker.store.border import checked, decoded
 from spook_tracker.tracker.store.database import open_database
 from spook_tracker.tracker.store.database_check import check
 from spook_tracker.tracker.store.history import History
@@ -99,7 +99,7 @@ def taken(session: Session, content: bytes) -> int:
             if record(session, document):
                 count += 1
                 back = History(session).document(document.id)
-                assert len(back.samples) == len(document.samples)
+                assert encode(back) == encode(checked(document))
                 assert all(math.isfinite(float(s.value)) or not s.passed for s in back.samples)
     except (DocumentError, DatabaseError) as refused:
         assert len(str(refused)) < 1000, str(refused)[:200]

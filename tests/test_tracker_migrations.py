@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import signal
+import sqlite3
+from functools import partial
 from shutil import copytree
+from types import SimpleNamespace
 from typing import get_args
 
 import pytest
@@ -15,7 +18,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.run_document import OutcomeClass
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.store import models
+from spook_tracker.tracker.store import database, models
 from spook_tracker.tracker.store.connection import connected
 from spook_tracker.tracker.store.database import database_url, head, open_database, upgrade
 from spook_tracker.tracker.store.database_check import check
@@ -24,7 +27,7 @@ from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.revisions import configuration, differences, revert
 from spook_tracker.tracker.website.publish import publish
-from tests.database_work import migrate_and_die
+from tests.database_work import go_down_and_die, migrate_and_die
 from tests.forked import begun, said
 from tests.run_documents import definition, run, run_of, sample
 
@@ -235,6 +238,26 @@ def test_a_copy_of_the_file_is_kept_before_an_upgrade(sqlite_url, monkeypatch, t
     kept.dispose()
 
 
+def test_a_copy_has_its_name_only_when_it_is_whole(sqlite_url, monkeypatch, tmp_path):
+    """Killed while copying: the file that bears the name of a copy would hold nothing."""
+    at_head_with_rows(sqlite_url).dispose()
+    pretend_a_newer_tracker(monkeypatch, tmp_path, REBUILD)
+
+    class Killed(sqlite3.Connection):
+        def backup(self, target, **named):
+            target.execute("CREATE TABLE half (done)")
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as dying:
+        dying.setattr(database, "sqlite3", SimpleNamespace(connect=partial(sqlite3.connect, factory=Killed)))
+        with pytest.raises(KeyboardInterrupt):
+            upgrade(connected(database_url(sqlite_url), readonly=False))
+    assert [path.name for path in tmp_path.glob("*.revision-*") if path.suffix != ".part"] == []
+
+    open_database(sqlite_url).dispose()
+    assert [path.name for path in tmp_path.glob("*.revision-*")] == [f"tracker.db.revision-{REVISIONS[-1]}"]
+
+
 def test_an_upgrade_that_fails_leaves_everything_as_it_was(url, monkeypatch, tmp_path):
     engine = at_head_with_rows(url)
     with engine.connect() as connection:
@@ -382,6 +405,18 @@ def test_a_migration_that_moves_every_row_is_whole_or_absent_wherever_it_is_kill
 
     open_database(url).dispose()
     assert contents(url) == above
+
+    for statement in (1, 6, 15, 40):
+        process, pipe = begun(go_down_and_die, url, "0007", statement)
+        assert said(pipe) == []
+        process.join()
+        assert process.exitcode == -signal.SIGKILL
+        assert contents(url) == above
+
+    with engine.begin() as connection:
+        revert(connection, "0007")
+    engine.dispose()
+    assert contents(url) == below
 
 
 def test_going_down_gives_the_ids_that_older_trackers_compute(session):

@@ -2,7 +2,7 @@
 
 What it was built from and how well it works are set by environment variables, so that a test has as many
 versions, good and bad, as it needs: TOY_VERSION, TOY_HASH, TOY_PARENT, TOY_ERROR (added to every position),
-TOY_DIRTY (with local changes), TOY_COST (times the work), TOY_FAULT (diverge, nan, raise, die, hang, hog). TOY_FAULT_TIMED is the fault of runs of
+TOY_DIRTY (with local changes), TOY_COST (times the work), TOY_FAULT (diverge, nan, raise, die, hang, hog: takes TOY_HOG bytes). TOY_FAULT_TIMED is the fault of runs of
 which nothing is kept, as they are timed; TOY_FAULT_STEP the only time step [s] that has it.
 """
 
@@ -61,7 +61,7 @@ def simulate(
     if fault == "die":
         os._exit(9)
     if fault == "hog":
-        bytearray(64 << 30)
+        bytearray(int(os.environ.get("TOY_HOG", 64 << 30)))
     while fault == "hang":  # in Python, where no time limit of an engine reaches
         pass
     count = steps if steps is not None else round((duration or 0.0) / time_step)

@@ -14,8 +14,10 @@ from spook_tracker.tracker.cli.ci import ci
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.options import (
     RED,
+    UNUSABLE,
     OneLineErrors,
     accepted_option,
+    complain,
     database_option,
     documents_option,
     example,
@@ -97,6 +99,7 @@ def run_command(
     junit_file: Path | None,
     executor: str,
     workers: int,
+    memory: int,
     time_limit: float,
     engine: str,
     limit: float | None,
@@ -113,23 +116,23 @@ def run_command(
         sweep=sweep,
         stability=stability,
         workers=workers,
+        memory_limit=memory << 20,
         time_limit=time_limit,
         executor=executor,
     )
     names = engine.split(",")
-    red = False
+    red, kept = False, True
     for name in names:
         document = _measure(request, name, limit, catalogue, None if no_record else database)
         _print_run(document, everything)
         if json_file:
-            _write(_of_engine(json_file, name, names), _json(document))
+            kept &= _write(_of_engine(json_file, name, names), _json(document))
         if junit_file:
             from spook_tracker.tracker.cli.report_junit import junit_of_run
 
-            _write(_of_engine(junit_file, name, names), junit_of_run(document))
+            kept &= _write(_of_engine(junit_file, name, names), junit_of_run(document))
         red = red or _red(document)
-    if red:
-        click.get_current_context().exit(RED)
+    _end(red, kept)
 
 
 def _of_engine(file: Path, name: str, names: list[str]) -> Path:
@@ -167,6 +170,7 @@ def nightly(
     documents: Path | None,
     executor: str,
     workers: int,
+    memory: int,
     time_limit: float,
     accepted: Path | None,
     json_file: Path | None,
@@ -179,6 +183,7 @@ def nightly(
     """Run everything, record it, judge it against the history and publish the website."""
     from spook_tracker.tracker.cli.console import say, watching
     from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.run import Request
     from spook_tracker.tracker.website.folder import refuse_unusable
@@ -191,59 +196,70 @@ def nightly(
     first, *others = engine.split(",")
     for other in others:
         asked = Request(
-            sweep=not quick, workers=workers, time_limit=time_limit, trigger="nightly", executor=executor
-        )
+            sweep=not quick, workers=workers, memory_limit=memory << 20, time_limit=time_limit, trigger="nightly",
+            executor=executor,
+        )  # fmt: skip
         _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
 
     measured: list[Any] = []
+    judged: list[Any] = []
+    kept = True
 
     def tell(news: Any) -> None:
+        nonlocal kept
         if isinstance(news, list):
             from spook_tracker.tracker.cli.report_compare import finding_lines
 
+            judged.append(news)
             summary, *lines = finding_lines(news, f"{out}/")
             say(summary)  # what the night came to stands first
             _print_run(measured[0], everything=False)
             say("\n".join(lines))
+            if junit_file:
+                from spook_tracker.tracker.cli.report_junit import junit_of_night
+
+                kept &= _write(junit_file, junit_of_night(news))
             return
         recorded(news.id)
         measured.append(news)
         if json_file:
-            _write(json_file, _json(news))
+            kept &= _write(json_file, _json(news))
 
-    with watching("measuring") as step, terminated_is_interrupted():
-        report = night(
-            database,
-            out,
-            accepted=accepted_levels(accepted),
-            watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
-            tell=tell,
-            with_database=with_database,
-            title=title,
-            home_page=home_page,
-            colour=colour,
-            mutants=mutants,
-            documents=documents,
-            catalogue=catalogue,
-            engine=first,
-            limits=present().limits_of(first),
-            limit=limit,
-            figures=True,
-            sweep=not quick,
-            stability=not quick,
-            workers=workers,
-            time_limit=time_limit,
-            executor=executor,
-        )
+    try:
+        with watching("measuring") as step, terminated_is_interrupted():
+            report = night(
+                database,
+                out,
+                accepted=accepted_levels(accepted),
+                watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
+                tell=tell,
+                with_database=with_database,
+                title=title,
+                home_page=home_page,
+                colour=colour,
+                mutants=mutants,
+                documents=documents,
+                catalogue=catalogue,
+                engine=first,
+                limits=present().limits_of(first),
+                limit=limit,
+                figures=True,
+                sweep=not quick,
+                stability=not quick,
+                workers=workers,
+                memory_limit=memory << 20,
+                time_limit=time_limit,
+                executor=executor,
+            )
+    except TrackerError as error:
+        if not judged:
+            raise
+        complain(str(error))  # the website, for one: what the night came to is the exit code all the same
+        return _end(any(finding.red for finding in judged[-1]), kept=False)
     for sentence in report.notes:
         say(f"note: {sentence}")
-    if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_night
-
-        _write(junit_file, junit_of_night(report.findings))
     _say_published(report.published, out)
-    if report.red:
-        click.get_current_context().exit(RED)
+    return _end(report.red, kept)
 
 
 @main.command(epilog=example("tracker engines"))
@@ -315,8 +331,8 @@ def report(
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
     with History.open(database) as history:
         text = one_file(history, accepted_levels(accepted), title, home_page, colour)
-    if html is not None:
-        _write(html, text)
+    kept = html is None or _write(html, text)
+    if html is not None and kept:
         say(f"wrote {html}")
     if pdf is not None:
         with tempfile.TemporaryDirectory() as folder:
@@ -324,6 +340,7 @@ def report(
             page.write_text(text, encoding="utf-8")
             print_pdf(page, pdf)
         say(f"wrote {pdf}")
+    _end(red=False, kept=kept)
 
 
 @main.command(epilog=example("tracker serve public --port 8000"))
@@ -429,5 +446,17 @@ def _json(document: Any) -> str:
     return readable(document) + "\n"
 
 
-def _write(file: Path, text: str) -> None:
-    file.write_text(text, encoding="utf-8")
+def _write(file: Path, text: str) -> bool:
+    """Whether it could be written; if not, that is said, and takes nothing from what was measured."""
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        complain(f"{file} cannot be written: {error.strerror}; what was measured stands")
+        return False
+    return True
+
+
+def _end(red: bool, kept: bool) -> None:
+    """Red goes before a file that could not be written."""
+    if red or not kept:
+        click.get_current_context().exit(RED if red else UNUSABLE)

@@ -22,6 +22,7 @@ import spook_tracker.tracker.cli.settings as tracker_toml
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 MOST = 600  # characters of a complaint
+MEMORY = 4096  # MB for one piece of work, unless something else is said
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
 
 
@@ -136,8 +137,16 @@ def limit_option(command: Command) -> Command:
 
 
 def workers_option(command: Command) -> Command:
-    """How many processes measure values, and how long one may take; run times are always taken alone."""
+    """How many processes measure values, and what one may take; run times are always taken alone."""
     for option in (
+        click.option(
+            "--memory",
+            metavar="MB",
+            default=MEMORY,
+            show_default=True,
+            type=click.IntRange(0, 1 << 30),
+            help="More than a process has at its start, for one piece of work; 0: no limit. Linux only.",
+        ),
         click.option(
             "--time-limit",
             metavar="SECONDS",

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.options import database_option, example, limit_option, workers_option
+from spook_tracker.tracker.cli.options import MEMORY, database_option, example, limit_option, workers_option
 
 KEPT = ".tracker-releases"
 MEGABYTE = 1e6
@@ -62,6 +62,7 @@ def backfill(
     catalogue: str,
     limit: float | None,
     workers: int,
+    memory: int,
     time_limit: float,
     database: str,
 ) -> None:
@@ -88,6 +89,7 @@ def backfill(
             )
         asked = [*["--sweep"] * sweep, "--workers", str(workers), "--time-limit", str(time_limit)]
         asked += [] if limit is None else ["--limit", str(limit)]
+        asked += [] if memory == MEMORY else ["--memory", str(memory)]  # older commits do not know the option
         backfill_commits(versions, tests, asked, folder or Path(COMMITS), database)
         return
     folder = folder or Path(KEPT)
@@ -96,8 +98,9 @@ def backfill(
     def measure(version: str) -> Any:
         where = releases.install(engine, version, folder.resolve())
         return releases.measure_release(
-            engine, where, tests, limit=limit, time_limit=time_limit, catalogue=catalogue, workers=workers
-        )
+            engine, where, tests, limit=limit, time_limit=time_limit, memory=memory, catalogue=catalogue,
+            workers=workers,
+        )  # fmt: skip
 
     ends = None if budget is None else time.monotonic() + 60.0 * budget
     for line in progress(engine, chosen, measure, database, ends):

@@ -41,6 +41,7 @@ KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an op
     "mutants": (str,),
     "executor": (str,),
     "workers": (int,),
+    "memory": (int,),
     "limit": (int, float),
     "time_limit": (int, float),
 }

@@ -121,9 +121,11 @@ def db() -> None:
 @database_option
 def upgrade(database: str) -> None:
     """Bring the schema to the newest revision; of an older SQLite file a copy is kept."""
+    from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database import head, open_database
 
-    open_database(database).dispose()
+    with told_of_damage(database):
+        open_database(database).dispose()
     click.echo(f"the schema is at revision {head()}, the newest")
 
 
@@ -152,9 +154,11 @@ def check(database: str) -> None:
 @click.argument("target", metavar="TO")
 def copy(source: str, target: str) -> None:
     """Copy a whole history into an empty database, of the other kind as well, without loss."""
+    from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database_copy import copy_database
 
-    digests = copy_database(source, target)
+    with told_of_damage(source):
+        digests = copy_database(source, target)
     click.echo(
         f"copied {sum(digest.rows for digest in digests.values())} rows in {len(digests)} tables, all equal"
     )
@@ -174,12 +178,14 @@ def partition(kind: Any) -> None:
 @database_option
 def stats(as_json: bool, database: str) -> None:
     """Say how much is stored."""
+    from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.storage_counts import statistics
 
     opened = open_database(database, readonly=True)
     try:
-        found = statistics(opened)
+        with told_of_damage(database):
+            found = statistics(opened)
     finally:
         opened.dispose()
     if as_json:

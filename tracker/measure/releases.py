@@ -105,6 +105,7 @@ def measure_release(
     *,
     limit: float | None,
     time_limit: float,
+    memory: int,
     catalogue: str,
     workers: int,
 ) -> RunDocument:
@@ -112,7 +113,7 @@ def measure_release(
     file = place / "run.json"
     file.unlink(missing_ok=True)
     asked = ["run", *tests, "--engine", engine, "--catalogue", catalogue, "--no-record", "--json", str(file)]
-    asked += ["--workers", str(workers), "--time-limit", str(time_limit)]
+    asked += ["--workers", str(workers), "--time-limit", str(time_limit), "--memory", str(memory)]
     asked += [*([] if limit is None else ["--limit", str(limit)])]
     done = _python(place, "-m", "spook_tracker", *asked, limit=None)
     if not file.exists():

@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.store.connection import connected, database_url, in_words, is_file, shown
+from spook_tracker.tracker.store.damage import told_of_damage
 from spook_tracker.tracker.store.head import head, known_revisions
 
 __all__ = [
@@ -61,12 +62,13 @@ def open_database(url: str | URL | None = None, readonly: bool = False) -> Engin
 @contextmanager
 def session_on(url: str | URL | None = None, readonly: bool = False) -> Iterator[Session]:
     """A session on the database at `url`, opened as `open_database` does, closed at the end."""
-    engine = open_database(url, readonly)
-    try:
-        with Session(engine) as session:
-            yield session
-    finally:
-        engine.dispose()
+    with told_of_damage(url):
+        engine = open_database(url, readonly)
+        try:
+            with Session(engine) as session:
+                yield session
+        finally:
+            engine.dispose()
 
 
 def upgrade(engine: Engine, target: str = "head", *, keep_copy: bool = True) -> None:
@@ -112,10 +114,13 @@ def _keep_copy(url: URL, revision: str) -> None:
     while copy.exists():
         number += 1
         copy = source.with_name(f"{source.name}.revision-{revision}-{number}")
-    with sqlite3.connect(source) as old, sqlite3.connect(copy) as new:
+    part = source.with_name(f"{source.name}.revision-{revision}.part")  # a name of its own until it is whole
+    part.unlink(missing_ok=True)  # of one who was killed; this one alone writes now
+    with sqlite3.connect(source) as old, sqlite3.connect(part) as new:
         old.backup(new)
     old.close()
     new.close()
+    part.rename(copy)
 
 
 def _check_file(url: URL, readonly: bool) -> None:

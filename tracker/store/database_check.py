@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
+from spook_tracker.tracker.store.damage import NONSENSE
 from spook_tracker.tracker.store.database import in_words
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.identity import identity
@@ -24,9 +25,18 @@ def check(engine: Engine) -> tuple[str, ...]:
             damage = tuple(_damage(connection))
             if damage:
                 return damage  # what a damaged file says about its contents means nothing
-            faults = (*_schema(connection), *_references(connection), *_identities(connection))
+            faults = tuple(_told(_schema(connection), _references(connection), _identities(connection)))
         with Session(engine) as session:
-            return (*faults, *_documents(session))
+            return (*faults, *_told(_documents(session)))
+
+
+def _told(*kinds: Iterator[str]) -> Iterator[str]:
+    """Their faults; what cannot even be looked at is one."""
+    for faults in kinds:
+        try:
+            yield from faults
+        except NONSENSE as error:
+            yield f"something there cannot be read: {error!s:.200}"
 
 
 def _damage(connection: Connection) -> Iterator[str]:
@@ -88,5 +98,5 @@ def _documents(session: Session) -> Iterator[str]:
             document = checked(history.document(run.id))
             if run.content not in ("", rows.content_of(document)):
                 yield f"what was measured in the run {run.id!r} was changed after it was stored"
-        except (TrackerError, ValueError, OSError) as error:
+        except (TrackerError, OSError, *NONSENSE) as error:
             yield f"the run {run.id!r} cannot be read: {error!s:.200}"

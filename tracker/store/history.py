@@ -24,6 +24,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.store import git, rows
 from spook_tracker.tracker.store.ancestry import commit_order
+from spook_tracker.tracker.store.damage import told_of_damage
 from spook_tracker.tracker.store.identity import identity
 from spook_tracker.tracker.store.reader import CHUNK, Reader, SessionReader, file_reader, listed
 from spook_tracker.tracker.store.release_order import in_release_order
@@ -74,10 +75,11 @@ class History:
     @contextmanager
     def open(cls, database: str) -> Iterator[History]:
         """The history in a database, for reading: sqlite:///FILE or postgresql://…"""
-        if (reader := file_reader(database)) is not None:
-            with closing(reader):
-                yield cls(reader)
-            return
+        with told_of_damage(database):
+            if (reader := file_reader(database)) is not None:
+                with closing(reader):
+                    yield cls(reader)
+                return
         from spook_tracker.tracker.store.database import session_on
 
         with session_on(database, readonly=True) as session:

@@ -52,7 +52,7 @@ class FileReader:
     def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]:
         try:
             return self.connection.execute(statement, parameters).fetchall()
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             from spook_tracker.tracker.store.connection import sentence
 
             raise DatabaseError(sentence(str(self.path), error)) from error
@@ -88,7 +88,7 @@ def file_reader(database: str) -> FileReader | None:
         connection.execute("BEGIN")
         revisions = connection.execute("SELECT version_num FROM alembic_version").fetchall()
         triggers = connection.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall()
-    except (sqlite3.Error, OSError, RuntimeError):
+    except (sqlite3.Error, OSError, RuntimeError, UnicodeDecodeError):
         revisions, triggers = [], []
     if connection is not None and (revisions != [(head(),)] or triggers):
         connection.close()

@@ -55,7 +55,8 @@ Nearest nearest_on_cylinder(const Primitive& cylinder, Vec3 p) noexcept {
     const double rho = std::min(away, r), z = clamped(p.z, -half, half);
     const Vec3 on{rho * out.x, rho * out.y, z}, between = p - on;
     const double distance = norm(between);
-    return {on, (1.0 / distance) * between, distance};
+    if (distance > 0.0) return {on, (1.0 / distance) * between, distance};
+    return {on, beside > beyond ? out : Vec3{0.0, 0.0, side}, 0.0};  // outside by less than rounding
 }
 
 Manifold sphere_cylinder(const Primitive& sphere, const Pose& at, const Primitive& cylinder,

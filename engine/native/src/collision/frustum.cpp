@@ -122,7 +122,7 @@ Vec3 normal_to(Vec3 e, Vec3 v) noexcept {
 template <class Gap> void meet_corner(Search<Gap>& search, const Frustum& frustum, Vec3 p) noexcept {
     const Vec3 away = frustum.radial(p - frustum.centre[0]);
     const double distance = norm(away);
-    const Vec3 out = distance > 0.0 ? (1.0 / distance) * away : frustum.sideways;
+    const Vec3 out = frustum.unit_across(away);
     search.curved(frustum.cosine * out + frustum.sine * frustum.axis);
     for (int i = 0; i < 2; ++i) {
         if (distance <= frustum.radius[i]) continue;
@@ -194,8 +194,7 @@ void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& 
         const Vec3 p = two.centre[j] + far * (turn.cosine * u + turn.sine * v);
         second_along = turn.cosine * v - turn.sine * u;
         const Vec3 away = one.radial(p - one.centre[i]);
-        const double distance = norm(away);
-        const Vec3 out = distance > 0.0 ? (1.0 / distance) * away : one.sideways;
+        const Vec3 out = one.unit_across(away);
         first_along = cross(one.axis, out);
         apart = p - (one.centre[i] + r * out);
         return dot(apart, second_along);
@@ -241,6 +240,16 @@ Frustum::Frustum(const Primitive& primitive, const Pose& at) noexcept
     const double fall = radius[0] - radius[1], rise = high - low, side = length(fall, rise);
     sine = fall / side, cosine = rise / side;
     thickness = std::min(rise, 2.0 * primitive.radius);
+}
+
+Vec3 Frustum::unit_across(Vec3 v) const noexcept {
+    const double length = norm(v);
+    if (!(length > 0.0)) return sideways;
+    const Vec3 unit = (1.0 / length) * v;
+    if (std::abs(dot(unit, axis)) <= 1e-12) return unit;
+    const Vec3 again = radial(unit);  // v is so short that rounding has a part along the axis
+    const double left = norm(again);
+    return left > 0.5 ? (1.0 / left) * again : sideways;
 }
 
 Vec3 Frustum::outward(Vec3 n) const noexcept {
@@ -326,8 +335,7 @@ PartingAxes parting_axes(const Frustum& one, const Frustum& two, double margin) 
         meet_corner(search, one, two.centre[i]);
         const Vec3 out = two.radial(one.centre[i] - two.centre[0]);
         const double distance = norm(out);
-        const Vec3 n =
-            two.cosine * (distance > 0.0 ? (1.0 / distance) * out : two.sideways) + two.sine * two.axis;
+        const Vec3 n = two.cosine * two.unit_across(out) + two.sine * two.axis;
         search.curved(-n);
         if (one.radius[i] == 0.0)
             for (int j = 0; j < 2; ++j) {

@@ -24,6 +24,9 @@ struct Frustum {
         return std::max(end(0, n, across), end(1, n, across));
     }
     Vec3 radial(Vec3 v) const noexcept { return v - dot(v, axis) * axis; }
+    /// What lies across the axis but for rounding, as a unit vector that does; one fixed in the body where only rounding
+    /// is left.
+    Vec3 unit_across(Vec3 v) const noexcept;
     /// The unit vector across the axis nearest to n; of one along the axis the one fixed in the body.
     Vec3 outward(Vec3 n) const noexcept;
 };

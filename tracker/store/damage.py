@@ -1,0 +1,59 @@
+"""Whose fault an error is: what a damaged database makes of its contents is no defect of the program."""
+
+from __future__ import annotations
+
+import lzma
+import sqlite3
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from spook_tracker.tracker.document.errors import DatabaseError, TrackerError
+
+if TYPE_CHECKING:
+    from sqlalchemy import URL
+
+NONSENSE = (
+    ValueError, LookupError, TypeError, AttributeError, ArithmeticError, sqlite3.Error, zlib.error, lzma.LZMAError,
+    msgspec.MsgspecError,
+)  # fmt: skip  # what comes of reading bytes that mean nothing
+
+
+@contextmanager
+def told_of_damage(url: str | URL | None) -> Iterator[None]:
+    """An error that nonsense could cause is asked about: DatabaseError, one sentence, if something is wrong there.
+
+    Reading all of the database takes time, which is spent only where an error would end the command anyway.
+    """
+    try:
+        yield
+    except TrackerError:
+        raise
+    except NONSENSE as error:
+        from spook_tracker.tracker.store.connection import database_url, shown
+
+        place = database_url(url) if url is None or isinstance(url, str) else url
+        fault = _fault(place)
+        if fault is None:
+            raise
+        raise DatabaseError(
+            f"the database {shown(place)} is damaged: {fault:.300}; restore it from a copy (tracker db check says more)"
+        ) from error
+
+
+def _fault(url: URL) -> str | None:
+    """The first thing that is wrong there, if anything is."""
+    from spook_tracker.tracker.store.database import open_database
+    from spook_tracker.tracker.store.database_check import check
+
+    try:
+        engine = open_database(url, readonly=True)
+        try:
+            return next(iter(check(engine)), None)
+        finally:
+            engine.dispose()
+    except TrackerError as error:
+        return str(error)
