@@ -16,7 +16,9 @@ from spook_tracker.engine.bodies import WORLD
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.errors import SceneError
 
-COMPLIANCE = 1e-8  # m/N and rad/(N m) of every constraint, where none is given; see joints
+COMPLIANCE = (
+    1e-8  # m/N and rad/(N m) of every constraint, where none is given: docs/explanation/compliance.md
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

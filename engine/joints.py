@@ -5,9 +5,8 @@ of freedom: one number for all, or one for each in the order its docstring gives
 time steps, chosen at compile time: a scene knows no time step.
 
 The default compliance gives 10 µm, or 10 µrad, to every 1 kN, or 1 kN m: right for machines of metres and kilograms,
-where redundant joints then share their load as real ones do. What is long or small yields more than it may: a beam of
-eighty locked boxes of 2.5 kg sags by 2.1 mm, and Andrews' mechanism of millimetres and grams is 0.4 % off (tests/test_engine_compliance.py measures
-both). There 0 is meant: as rigid as the arithmetic carries; redundant joints that then lock are refused by name.
+where redundant joints then share their load as real ones do. What is long or small yields more than it may; there 0 is
+meant, and redundant joints that then lock are refused by name. docs/explanation/compliance.md says it with numbers.
 """
 
 from __future__ import annotations

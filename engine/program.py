@@ -14,6 +14,7 @@ from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
 from spook_tracker.engine.result import Array, Broken, Result
 
+MOST_NAMED = 8  # joints in one failure
 _REDUCTIONS: dict[type[Observable], str] = {
     Trace: "trace",
     Final: "final",
@@ -107,7 +108,7 @@ class Program:
         observe: Mapping[str, Observable],
         shapes: Sequence[tuple[int, ...]],
     ) -> None:
-        """`shapes` are those of one sample of each observable, in order."""
+        """`shapes` are those of one sample of each observable, in order; `joints` are named where they fail."""
         self._native = native
         self._running = threading.Lock()  # one native state: a second thread waits
         self._choices = tuple(StageChoice(*choice) for choice in native.choices)
@@ -160,9 +161,11 @@ class Program:
                 observables[name] = recording.reshape(shape)
         status, step, body = report["status"], report["failed_step"], report["failed_body"]
         failed_body = self._bodies[body] if body >= 0 else None
+        joints = [self._joints[joint] for joint in report["failed_joints"]]
+        reason = report["reason"].replace("{joints}", _named(joints))
         return Result(
             status=status,
-            failure=_failure(status, failed_body, step, time_limit, report["reason"], report["residual"]),
+            failure=_failure(status, failed_body, step, time_limit, reason, report["residual"]),
             failed_body=failed_body,
             failed_step=step if step >= 0 else None,
             time_step=self.time_step,
@@ -182,6 +185,12 @@ class Program:
                 for joint, step, time, force, torque in report["broken"]
             ),
         )
+
+
+def _named(joints: Sequence[str]) -> str:
+    shown = [repr(name) for name in joints[:MOST_NAMED]]
+    more = len(joints) - len(shown)
+    return f"{', '.join(shown)} and {more} more" if more else ", ".join(shown)
 
 
 def _failure(

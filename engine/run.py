@@ -161,7 +161,8 @@ class Run:
     def _result(self, report: Mapping[str, Any] | None, time_limit: float | None) -> Result:
         now = self._native.read()
         times = {"seconds": self._seconds, "cpu_seconds": self._cpu_seconds}
-        ending = {k: report[k] for k in ("status", "failed_step", "failed_body", "reason")} if report else {}
+        told = ("status", "failed_step", "failed_body", "failed_joints", "reason")
+        ending = {k: report[k] for k in told} if report else {}
         return self._program.result({**now, **times, **ending}, time_limit)
 
     # --- setting ------------------------------------------------------------------------------------------

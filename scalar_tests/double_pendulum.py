@@ -120,8 +120,8 @@ def angles(simulate: Simulate, time_step: float, method: Method) -> tuple[np.nda
     result = simulate(
         scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
-    first, between = np.unwrap(result["first"]), np.unwrap(result["second"])
-    return result.sample_times["first"], np.stack([first, first + between], axis=1)
+    first = result["first"]
+    return result.sample_times["first"], np.stack([first, first + result["second"]], axis=1)
 
 
 def error_after_a_second(simulate: Simulate, time_step: float, method: Method) -> float:

@@ -22,18 +22,21 @@ from spook_tracker.engine import (
     WORLD,
     Ball,
     CentralGravity,
+    Cylindrical,
     Distance,
     Hinge,
     Load,
     Lock,
     Particle,
+    Planar,
+    PointOnLine,
     Prismatic,
     RigidBody,
     Scene,
     Spring,
     Universal,
 )
-from spook_tracker.engine.joints import AxialJoint, Constraint, Joint
+from spook_tracker.engine.joints import AxialJoint, Constraint, GuidedJoint, Joint
 
 Array = npt.NDArray[Any]
 TINY = 1e-40  # of a complex step
@@ -102,7 +105,7 @@ class Placed:
                 at = scene.body([end for end in constraint.between if end != WORLD][-1]).position
             points = [np.array(at)] * 2
             self.axes = np.eye(3)
-            if isinstance(constraint, AxialJoint):
+            if isinstance(constraint, AxialJoint | GuidedJoint):
                 self.axes = frame(np.array(constraint.axis))
             elif isinstance(constraint, Universal):
                 axis, across = np.array(constraint.axis), np.array(constraint.cross_axis)
@@ -142,9 +145,16 @@ class Placed:
             return np.concatenate([offset, 2.0 * turn[1:]])
         if isinstance(kind, Ball):
             return offset
+        if isinstance(kind, PointOnLine):
+            return offset[1:]
         carried = rotation(turn)  # columns: the second frame's axes in the first frame
+        tilt = cross(np.array([1.0, 0.0, 0.0]), carried[:, 0])[1:]
         if isinstance(kind, Hinge):
-            return np.concatenate([offset, cross(np.array([1.0, 0.0, 0.0]), carried[:, 0])[1:]])
+            return np.concatenate([offset, tilt])
+        if isinstance(kind, Cylindrical):
+            return np.concatenate([offset[1:], tilt])
+        if isinstance(kind, Planar):
+            return np.concatenate([offset[:1], tilt])
         if isinstance(kind, Prismatic):
             return np.concatenate([offset[1:], 2.0 * turn[1:]])
         assert isinstance(kind, Universal)

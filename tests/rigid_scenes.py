@@ -10,6 +10,7 @@ from spook_tracker.engine import (
     WORLD,
     Ball,
     CentralGravity,
+    Cylindrical,
     Distance,
     Hinge,
     JointSpring,
@@ -17,6 +18,8 @@ from spook_tracker.engine import (
     Lock,
     Motor,
     Particle,
+    Planar,
+    PointOnLine,
     Prismatic,
     RigidBody,
     Scene,
@@ -36,6 +39,7 @@ JOINTS: dict[str, type[Any]] = {
     "universal": Universal,
     "distance": Distance,
 }
+EVERY_JOINT = JOINTS | {"planar": Planar, "cylindrical": Cylindrical, "point on line": PointOnLine}
 
 
 def vector(rng: np.random.Generator, scale: float) -> tuple[float, float, float]:
@@ -64,7 +68,7 @@ def some(rng: np.random.Generator, choices: list[float], count: int) -> tuple[fl
 
 def joint(rng: np.random.Generator, kind: str, first: str, second: str, at: Any, **extra: Any) -> Constraint:
     """A joint of that kind with its own compliance and damping for every degree of freedom."""
-    make = JOINTS[kind]
+    make = EVERY_JOINT[kind]
     rows = make.rows
     name = f"{kind} {first} {second}"
     compliance = some(rng, [1e-9, 1e-6, 1e-4], rows)
@@ -77,7 +81,7 @@ def joint(rng: np.random.Generator, kind: str, first: str, second: str, at: Any,
         )
     axis = rng.standard_normal(3)
     axis /= np.linalg.norm(axis)
-    if kind in ("hinge", "prismatic"):
+    if kind in ("hinge", "prismatic", "planar", "cylindrical", "point on line"):
         extra = {"axis": tuple(axis), **extra}
     if kind == "universal":
         cross = np.cross(axis, rng.standard_normal(3))

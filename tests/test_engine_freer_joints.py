@@ -73,7 +73,8 @@ def test_each_holds_what_it_says_and_leaves_the_rest_free(kind: Any) -> None:
 @pytest.mark.parametrize("kind", FREE)
 @pytest.mark.parametrize("method", [Method(), Method(corrections=1), Method(composition="order4")])
 def test_energy_is_kept_while_they_move(kind: Any, method: Method) -> None:
-    """A spinning body with three different moments on a joint at its side; order 4 keeps its energy to 1e-6."""
+    """A spinning body with three different moments on a joint at its side; order 4 keeps its energy to 1e-6, a
+    plain step to 1e-4."""
     body = RigidBody(
         name="body",
         mass=2.0,
@@ -102,7 +103,8 @@ def test_energy_is_kept_while_they_move(kind: Any, method: Method) -> None:
     rest = result["E"][0]
 
     assert np.abs(result["g"]).max() < 1e-6
-    assert np.abs(result["E"] - rest).max() < 1e-4 * rest
+    kept = 1e-4 if method.composition == "none" else 1e-6
+    assert np.abs(result["E"] - rest).max() < kept * rest
 
 
 @pytest.mark.parametrize("kind", FREE)

@@ -42,7 +42,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.scalar_tests import spinning_top, swinging_door
 from tests.oracle_rigid_composition import ComposedOracle
-from tests.rigid_scenes import JOINTS, one_joint
+from tests.rigid_scenes import EVERY_JOINT, one_joint
 
 HALF = Method(half_step_velocities=True)
 CURVED = Method(half_step_velocities=True, corrections=1)
@@ -155,7 +155,7 @@ def held(kind: str, bodies: int) -> Scene:
 
 
 @pytest.mark.parametrize("bodies", [1, 2])
-@pytest.mark.parametrize("kind", JOINTS)
+@pytest.mark.parametrize("kind", EVERY_JOINT)
 def test_a_composition_is_the_dense_one_for_every_joint(kind: str, bodies: int) -> None:
     scene, h, steps = held(kind, bodies), 0.04, 5
     oracle = ComposedOracle(scene, h)
@@ -175,7 +175,7 @@ def test_a_composition_is_the_dense_one_for_every_joint(kind: str, bodies: int) 
         assert np.abs(same * run["q"][k] - oracle.q).max() < 1e-11
 
 
-@pytest.mark.parametrize("kind", JOINTS)
+@pytest.mark.parametrize("kind", EVERY_JOINT)
 def test_half_steps_are_of_order_two_for_every_joint(kind: str) -> None:
     """Against the composition of order 8, after a start its rows allow."""
     scene = held(kind, 2)

@@ -129,7 +129,7 @@ def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dic
     result = simulate(
         scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
-    angles = {name: START[name] + np.unwrap(result[name]) for name in HINGES}
+    angles = {name: START[name] + result[name] for name in HINGES}
     early = _turn(float(angles["crank"][round(0.01 / time_step)])) @ [0.007, 0.0]
     return {
         "library_error": library_error([angles[name][-1] for name in END], list(END.values())),

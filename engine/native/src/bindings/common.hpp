@@ -23,8 +23,9 @@ inline Vec3 to_vec(const Point& t) { return {std::get<0>(t), std::get<1>(t), std
 /// A float64 array that owns a copy of the values.
 nb::object to_array(const std::vector<double>& values, std::size_t rows, std::size_t columns);
 
-/// {status, steps, failed_step, failed_body, seconds, residual, counters, stage_seconds, recordings: list of
-/// (samples, width) arrays, final_state: (bodies, 13), state_hash, broken: [(joint, step, time, force, torque)]}
+/// {status, steps, failed_step, failed_body, failed_joints, reason, seconds, residual, counters, stage_seconds,
+/// recordings: list of (samples, width) arrays, final_state: (bodies, 13), state_hash,
+/// broken: [(joint, step, time, force, torque)]}
 nb::dict to_dict(const RunReport& report);
 
 /// [(stage, kept, reason)] for every stage there is, in the order of the step.

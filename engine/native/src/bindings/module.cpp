@@ -47,6 +47,9 @@ nb::dict to_dict(const RunReport& report) {
     out["failed_step"] = report.failed_step;
     out["failed_body"] = report.failed_body;
     out["reason"] = report.reason;
+    nb::list joints;
+    for (const int joint : report.failed_joints) joints.append(joint);
+    out["failed_joints"] = joints;
     out["seconds"] = report.seconds;
     out["cpu_seconds"] = report.cpu_seconds;
     out["residual"] = report.residual;

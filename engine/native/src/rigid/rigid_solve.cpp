@@ -163,6 +163,7 @@ void RigidSystem::solve_block() {
     }
     if (method_.corrections > 0) correct_curvature();
     if (stiff_) keep_angular_momentum();
+    if (may_lock_) watch_redundancy();
     take_block_solution();
     if (clock_) clock_->mark(Stage::solve_block);
 }
@@ -195,7 +196,7 @@ bool RigidSystem::factor_and_solve() {
         [this](std::span<const double> left) { return settled(left); });
     if (redundant_.finite() && doubtful) find_contradiction();
     if (redundant_.parted() && method_.corrections == 0 && !composed_)
-        live_.locked = body_of(busiest_block());
+        find_repeated() ? note_locked() : void(live_.locked = body_of(busiest_block()));
     return redundant_.finite();
 }
 
@@ -231,6 +232,7 @@ void RigidSystem::find_contradiction() {
     const Worst worst = worst_row(redundant_.residual(matrix_, right_.data(), solution_.data()));
     if (worst.residual <= 1e-3 * worst.speed) return;
     live_.contradicted = body_of(worst.block);
+    live_.named = {joints_.blocks()[worst.block].joint};
 }
 
 int RigidSystem::body_of(int row_block) const noexcept {

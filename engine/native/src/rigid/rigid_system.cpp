@@ -165,6 +165,7 @@ void RigidSystem::reset(StageClock* clock) {
     live_.bodies = start_;
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
     redundant_.reset(matrix_);
+    may_lock_ = may_lock();
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
     joints_.breaks.clear();
     clock_ = clock;
@@ -241,12 +242,17 @@ Health RigidSystem::health() const {
             "joints can move, or take a smaller time step"};
     if (live_.contradicted >= 0)
         return {Status::diverged, live_.contradicted,
-                "is held by rows that contradict each other; give one of them a compliance"};
+                "is held by rows that contradict each other, of {joints}; give one of them a compliance",
+                live_.named};
     if (live_.locked >= 0)
         return {
             Status::diverged, live_.locked,
-            "is held by redundant joints without compliance, which linearised rows pull apart until they lock; "
-            "use corrections=1 or a composition, or give the joints a compliance"};
+            method_.corrections > 0
+                ? "is locked by redundant joints, {joints}: they say nearly the same and yet not quite; put the loop "
+                  "together more exactly, or give them more compliance"
+                : "is locked by redundant joints, {joints}: linearised rows pull them apart, or the loop does not fit; "
+                  "use corrections=1 or a composition, or give them more compliance",
+            live_.named};
     for (int body = 0; body < bodies(); ++body) {
         const BodyState& s = live_.bodies[body];
         if (!finite(s.displacement) || !finite(s.velocity) || !finite(s.angular_momentum) ||

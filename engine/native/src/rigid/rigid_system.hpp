@@ -135,6 +135,12 @@ private:
         double pending = 0.0;  // s: half a stage still to be kicked
         int locked = -1;       // a body of redundant rows that contradict each other by now
         int lost = -1;         // a body of rows that no motion satisfies
+        struct Watched {       // of redundant rows, see rigid_locking.cpp
+            double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
+            double held = 0.0, load = 0.0;    // √(2 J): what they held back, and what the loads gave
+            std::int64_t next = 0, wait = 1;  // steps: of the next look, and to it
+        } watched;
+        std::vector<int> named;  // joints that health() tells of
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         // Stages × differences × unknowns: of the rows' forces [N], or of the paces of joint coordinates, from step
         // to step; per stage: how many of them tell the next.
@@ -175,6 +181,12 @@ private:
         Mat3 inertia;
     };
     IslandFrame island_frame(const std::vector<int>& members) const;
+    bool may_lock();
+    void take_probe(double part);
+    void find_extents();
+    void watch_redundancy();
+    bool find_repeated();
+    void note_locked();
     void take_stages(const RigidScene& scene);
     void step();
     void velocity_stage();
@@ -313,6 +325,10 @@ private:
     std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     RedundantRows redundant_;
+    bool may_lock_ = false;                             // whether redundant rows are watched
+    BlockLdlt probe_;                                   // matrix_ with rigid rows
+    std::vector<double> weakness_, repeated_, square_;  // per row; per unknown; per tied body, m²
+    std::vector<int> ends_;                             // per tied body: joints
     LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_

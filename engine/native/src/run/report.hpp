@@ -33,13 +33,14 @@ struct Broken {
 
 struct RunReport {
     Status status = Status::completed;
-    std::int64_t steps = 0;         // steps done; of a failed run, those before the failing step
-    std::int64_t failed_step = -1;  // counted from 1
-    int failed_body = -1;           // index in the scene
-    std::string reason;             // what is wrong with that body, when the status does not say it
-    double seconds = 0.0;           // wall time of the native loop
-    double cpu_seconds = 0.0;       // processor time of it; 0 where it cannot be told
-    double residual = 0.0;          // largest row residual an iterative solve stopped at, m/s
+    std::int64_t steps = 0;          // steps done; of a failed run, those before the failing step
+    std::int64_t failed_step = -1;   // counted from 1
+    int failed_body = -1;            // index in the scene
+    std::string reason;              // what is wrong with that body, when the status does not say it
+    std::vector<int> failed_joints;  // indices: what {joints} stands for in the reason
+    double seconds = 0.0;            // wall time of the native loop
+    double cpu_seconds = 0.0;        // processor time of it; 0 where it cannot be told
+    double residual = 0.0;           // largest row residual an iterative solve stopped at, m/s
     std::map<std::string, std::int64_t> counters;
     std::map<std::string, double> stage_seconds;
     std::vector<Broken> broken;         // in the order they broke

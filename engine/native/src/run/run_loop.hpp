@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "run/recorder.hpp"
 #include "run/report.hpp"
@@ -15,7 +16,8 @@ namespace spook {
 struct Health {
     Status status = Status::completed;
     int body = -1;
-    const char* reason = "";  // what is wrong with the body, when the status does not say it
+    const char* reason = "";       // what is wrong with the body, when the status does not say it
+    std::vector<int> joints = {};  // that the reason speaks of as {joints}
 };
 
 /// A System has
@@ -94,6 +96,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
         report.status = health.status;
         report.failed_body = health.body;
         report.reason = health.reason;
+        report.failed_joints = health.joints;
     }
     report.steps = done;
     report.seconds = watch.elapsed();
