@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay pictures looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -21,6 +21,7 @@ help:
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make bench-replay  what a frame of ten thousand bodies costs in a browser"
+	@echo "make pictures  the pictures in docs/ again, of the nights in $(DB) and of a red night"
 	@echo "make looks     every page of the website in every width and theme, to axe"
 	@echo "make engines   every engine that is installed on every scene: docs/engines.md"
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
@@ -79,6 +80,15 @@ docs: develop
 
 crashes: develop
 	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_crashes.py
+
+# Every picture in docs/: of the website of $(DB), and of a red night that is measured once and kept in build/.
+RED := build/red-night
+pictures: develop
+	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
+	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json
+	rm -f $(RED)/red.db
+	$(BIN)/python bench/red_night.py --keep $(RED)/measured --db sqlite:///$(RED)/red.db --out $(RED)/public
+	$(BIN)/python bench/pictures.py $(OUT) $(RED)/public
 
 # Every page in every width and theme to axe; `make test` shows it each page in two of the eight.
 looks: develop

@@ -1,10 +1,8 @@
 """A real browser for the tests of the website: headless Chromium, without a network.
 
-The pictures in the README and in docs/ come from here, after `make nightly` and `bench/red_night.py`:
+A picture of any page, such as those that `make pictures` puts into docs/ (bench/pictures.py):
 
-    python -m tests.browser public/index.html docs/dashboard.png
-    python -m tests.browser public-red/index.html docs/red-night.png --most 900
-    python -m tests.browser public-red/tests/pendulum.html docs/error-run-time.png --most 620 --at "#error-time"
+    python -m tests.browser public/tests/pendulum.html pendulum.png --most 620 --at "#error-time"
 """
 
 from __future__ import annotations

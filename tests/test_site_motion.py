@@ -396,13 +396,16 @@ def test_the_box_on_a_slope_shows_friction_over_normal_force_while_it_runs(drive
       const p = document.querySelector('.live').page.player;
       p.seek(60);
       const box = [...document.querySelectorAll('.curve')].find((c) => c.textContent.includes('friction / normal'));
-      return [box.querySelectorAll('path.line').length, box.querySelector('.value').textContent];
+      const heights = (path) => path.getAttribute('d').split(/[ML]/).slice(3).map((p) => Number(p.split(' ')[1]));
+      const [now] = [...box.querySelectorAll('path.line')].map(heights);
+      return [box.querySelectorAll('path.line').length, box.querySelector('.value').textContent, Math.max(...now) - Math.min(...now)];
     """)
 
     assert float(told.split()[0]) == pytest.approx(ratio, abs=1e-4)
     assert "µ = 0.5" in told
-    lines, value = curve
+    lines, value, wobble = curve
     assert lines == 2
+    assert wobble < 0.2, "rounding is not drawn as if it were motion"
     assert [float(v) for v in value.split(" · ")] == pytest.approx([ratio, 0.5], abs=1e-4)
 
 

@@ -44,11 +44,12 @@ function figureOf(value, digits = 4) {
 
 // --- one curve over time, with a cursor that is the time slider's ---
 const WIDE = 320, HIGH = 74;
+const LEVEL = 1e-12;  // share of a value below which its changes are rounding, and drawn as none
 
 class TimeCurve {
-  // curves: [{ name, values, colour }]; `values` has one number per sample
-  constructor(title, unit, curves, onTime) {
-    Object.assign(this, { unit, curves, onTime });
+  // curves: [{ name, values, colour }]; `values` has one number per sample. `ground` is a value that is shown, too.
+  constructor(title, unit, curves, onTime, ground = NaN) {
+    Object.assign(this, { unit, curves, onTime, ground });
     this.value = make("span", { class: "value" });
     this.svg = drawnIn("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, preserveAspectRatio: "none", "aria-hidden": "true" });
     this.cursor = drawnIn("path", { class: "cursor" });
@@ -69,7 +70,8 @@ class TimeCurve {
     for (const curve of curves) {
       for (const v of curve.values) { if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); } }
     }
-    if (!(high > low)) { const pad = Math.abs(low) || 1; low -= pad; high += pad; }
+    if (Number.isFinite(this.ground)) { low = Math.min(low, this.ground); high = Math.max(high, this.ground); }
+    if (!(high - low > LEVEL * Math.max(Math.abs(low), Math.abs(high)))) { const pad = Math.abs(low) || 1; low -= pad; high += pad; }
     for (const curve of curves) {
       let path = "", pen = "M";
       const n = curve.values.length, stride = Math.max(1, Math.floor(n / 640));
@@ -181,10 +183,10 @@ class Player {
     if (movie.rows) { movie.largest = largestEach(movie.violation, movie.rows, movie.count); given.push(["largest violation", movie.violationUnit || "m", [{ values: movie.largest, colour: 1 }]]); }
     if (movie.energy) { given.push(["energy", "J", movie.ghost && movie.ghost.energy ? [{ values: movie.energy, colour: 0 }, { values: movie.ghost.energy, colour: 1 }] : [{ values: movie.energy, colour: 0 }]]); }
     if (movie.penetration) { given.push(["deepest penetration", "m", [{ values: movie.penetration, colour: 3 }]]); }
-    if (movie.ratio) { given.push(["friction / normal force, and µ", "", [{ values: movie.ratio, colour: 0 }, { values: movie.ratio.map(() => movie.bound), colour: 1 }]]); }
+    if (movie.ratio) { given.push(["friction / normal force, and µ", "", [{ values: movie.ratio, colour: 0 }, { values: movie.ratio.map(() => movie.bound), colour: 1 }], 0]); }
     this.worst.hidden = !movie.error && !movie.largest;
     this.worst.textContent = movie.error ? "Largest distance" : "Largest violation";
-    this.curves = given.map(([title, unit, curves]) => new TimeCurve(title, unit, curves, (share) => { this.pause(); this.seek(share * (this.movie.count - 1)); this.remember(); }));
+    this.curves = given.map(([title, unit, curves, ground]) => new TimeCurve(title, unit, curves, (share) => { this.pause(); this.seek(share * (this.movie.count - 1)); this.remember(); }, ground));
     this.curvesBox.replaceChildren(...this.curves.map((curve) => curve.element));
     this.seek(seconds / movie.step);
   }

@@ -161,7 +161,8 @@ class Marks {
     this.axes.forEach((axis, k) => {
       const dx = AXIS * right[k], dy = -AXIS * up[k], long = Math.hypot(dx, dy), away = long > 3 ? (long + 9) / long : 0;
       axis.line.setAttribute("d", `M${x} ${y}l${dx.toFixed(1)} ${dy.toFixed(1)}`);
-      axis.letter.setAttribute("x", (x + away * dx + (long < AXIS / 2 ? Math.sign(dx) * 9 : 0)).toFixed(1));  // a short one's stands aside
+      const aside = long < AXIS / 2 ? Math.max(9, Math.abs(away * dx)) : Math.abs(away * dx);  // clear of one that stands upright
+      axis.letter.setAttribute("x", (x + Math.sign(dx) * aside).toFixed(1));
       axis.letter.setAttribute("y", (y + away * dy + 4).toFixed(1));
     });
   }

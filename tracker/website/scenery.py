@@ -344,9 +344,9 @@ def _axes(camera: Camera, height: float) -> list[Mark]:
         x, y, _ = camera.see(axis)
         long = math.hypot(x, y)
         far = AXIS + LETTER / long if long > 0.1 else 0.0
-        aside = math.copysign(LETTER, x) if long < SHORT else 0.0
+        aside = max(abs(far * x), LETTER) if long < SHORT and abs(x) > 0.01 else abs(far * x)
         ends.append((AXIS * x, -AXIS * y))
-        letters.append((far * x + aside, -far * y))
+        letters.append((math.copysign(aside, x), -far * y))
     left = WIDTH - BASE - LETTER / 2.0 - max(x for x, _ in [*letters, (0.0, 0.0)])
     top = height - BASE - max(y for _, y in [*letters, (0.0, 0.0)])
     return [
