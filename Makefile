@@ -86,7 +86,7 @@ RED := build/red-night
 pictures: develop
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
 	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json
-	rm -f $(RED)/red.db
+	mkdir -p $(RED) && rm -f $(RED)/red.db
 	$(BIN)/python bench/red_night.py --keep $(RED)/measured --db sqlite:///$(RED)/red.db --out $(RED)/public
 	$(BIN)/python bench/pictures.py $(OUT) $(RED)/public
 

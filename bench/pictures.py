@@ -68,7 +68,9 @@ def main() -> None:
         site = sites[picture.site]
         page = going_wrong(site) if picture.page == "wrong" else picture.page
         made = DOCS / f"{picture.name}.png"
-        photograph(f"{site}/{page}", made, width=picture.width, most=picture.most, dark=picture.dark, at=picture.at)
+        photograph(
+            f"{site}/{page}", made, width=picture.width, most=picture.most, dark=picture.dark, at=picture.at
+        )
         print(made.relative_to(DOCS.parent))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
+from bench.pictures import PICTURES
 from spook_tracker.tracker.cli.main import main as cli
 
 ROOT = Path(__file__).parent.parent
@@ -63,3 +64,14 @@ def test_commands_and_options_that_are_not_there_are_seen() -> None:
     assert "--nowhere" in unknown("tracker run --nowhere")
     assert "--nowhere" in unknown("tracker db copy --nowhere")
     assert unknown("make coffee") == "target coffee"
+
+
+def test_every_picture_is_made_by_one_command_and_shown_somewhere() -> None:
+    made = {picture.name for picture in PICTURES}
+    shown = set()
+    for document in DOCUMENTS:
+        shown |= set(
+            re.findall(r"!\[[^\]]+\]\((?:docs/|\.\./)?([\w-]+)\.png\)", (ROOT / document).read_text())
+        )
+
+    assert made == {path.stem for path in (ROOT / "docs").rglob("*.png")} == shown
