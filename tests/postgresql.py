@@ -11,7 +11,7 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,9 +54,14 @@ class Server:
 
 
 @contextlib.contextmanager
-def running_server(programs: Path) -> Iterator[Server]:
-    """Start a server, as another user if we are root (it refuses to run as root), and stop it at the end."""
-    folder = Path(tempfile.mkdtemp(prefix="pg-", dir=_where()))
+def running_server(
+    programs: Path, more: Mapping[str, str] | None = None, where: str | None = None
+) -> Iterator[Server]:
+    """Start a server, as another user if we are root (it refuses to run as root), and stop it at the end.
+
+    `more` are further settings; the server's folder is made in `where`, or where it is quickest.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="pg-", dir=where or _where()))
     user: dict[str, int] = {}
     if os.geteuid() == 0:
         other = _other_user()
@@ -73,7 +78,7 @@ def running_server(programs: Path) -> Iterator[Server]:
         "wal_level": "minimal",
         "max_wal_senders": "0",
         "max_wal_size": "64MB",
-    }
+    } | dict(more or {})
     process = None
     try:
         initialise = [

@@ -1,0 +1,243 @@
+"""How does the history grow? Nights of 1000 series up to ten million samples, on SQLite and on PostgreSQL, and at each
+size what people wait for: one night in, one series, one comparison, the website, and how large it all is.
+
+    python bench/bench_growth.py [--samples 100000 1000000 10000000] [--only sqlite] [--without-website]
+
+The first hundred nights are recorded as any other; further ones are copied inside the database, 2 % of their values
+changed, which takes a tenth of the time and leaves the same rows. Each measure is a command of its own, as a user runs
+it, start included, the less of two goes; times are of the processor, on PostgreSQL the server's beside the client's.
+What is there beyond the smallest size grows with a power of the samples: its exponent is taken between the two largest
+sizes, and carried on to a hundred million, on paper. Ten million are 27 years of these nights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sqlalchemy import BigInteger, Column, Connection, Engine, MetaData, Table, insert, select, text
+from sqlalchemy.orm import Session
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from bench.bench_storage import CHANGED, SERIES, definitions, night
+from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
+from spook_tracker.tracker.store import models, rows
+from spook_tracker.tracker.store.database import open_database
+from spook_tracker.tracker.store.identity import identity
+from spook_tracker.tracker.store.record import record
+from spook_tracker.tracker.store.transfer import write_document
+
+RECORDED = 100  # nights that go the usual way before others are copied
+AT_ONCE = 500  # nights in one statement
+NOISE = 0.1  # of a measure: a smaller difference between two sizes is none
+PLANNED = 100_000_000  # samples, on paper
+MEASURES = ("one night in", "one series", "one comparison", "the website")
+CHANCE = {"sqlite": f"abs(random() % {round(1 / CHANGED)}) = 0", "postgresql": f"random() < {CHANGED}"}
+
+
+@dataclass
+class Measured:
+    """One size of one database."""
+
+    samples: int
+    size: int  # bytes
+    seconds: dict[str, float] = field(default_factory=dict)  # of the processor
+    memory: dict[str, float] = field(default_factory=dict)  # GB, of the command at its largest
+
+
+@dataclass
+class Place:
+    """A database to fill: its URL, and the server's process where there is one."""
+
+    url: str
+    server: int | None = None
+
+    def busy(self) -> float:
+        """Seconds of processor time that the server's ended connections have taken."""
+        if self.server is None:
+            return 0.0
+        ticks = Path(f"/proc/{self.server}/stat").read_text().rpartition(")")[2].split()[11:15]
+        return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
+
+
+def fill(engine: Engine, begin: int, end: int, series: tuple[SeriesDefinition, ...]) -> None:
+    """Bring the history from `begin` nights to `end`."""
+    chance = random.Random(begin)
+    with Session(engine) as session:
+        for number in range(begin, min(end, RECORDED)):
+            record(session, night(number, series, chance))
+    for first in range(max(begin, RECORDED), end, AT_ONCE):
+        with engine.begin() as connection:
+            if connection.dialect.name == "sqlite":
+                connection.exec_driver_sql("PRAGMA cache_size = -500000")
+            copy(connection, [night(n, (), chance) for n in range(first, min(end, first + AT_ONCE))])
+
+
+def copy(connection: Connection, nights: list[RunDocument]) -> None:
+    """Further nights as copies of a recorded one: engine and run by us, samples and evidence by the database."""
+    template = connection.execute(
+        select(models.Run.__table__).where(models.Run.idempotency_key == f"night {RECORDED // 2}")
+    ).mappings().one()  # fmt: skip
+    engines = [rows.engine_row(document.engine) for document in nights]
+    runs = [
+        dict(template)
+        | {
+            "key": identity("run", document.id), "id": document.id, "idempotency_key": document.idempotency_key,
+            "started_at": rows.moment(document.started), "started": document.started,
+            "finished": document.finished, "engine_version_id": engine["id"], "content": "",
+        }
+        for document, engine in zip(nights, engines, strict=True)
+    ]  # fmt: skip
+    connection.execute(insert(models.EngineVersion), engines)
+    connection.execute(insert(models.Run), runs)
+    wanted = Table(
+        "wanted", MetaData(), Column("started_at", models.UTCDateTime), Column("run_key", BigInteger),
+        prefixes=["TEMPORARY"],
+    )  # fmt: skip
+    wanted.create(connection)
+    connection.execute(insert(wanted), [{"started_at": r["started_at"], "run_key": r["key"]} for r in runs])
+    changed = f"s.value + CASE WHEN {CHANCE[connection.dialect.name]} THEN 1e-13 ELSE 0.0 END"
+    for model in (models.Sample, models.Evidence):
+        names = [column.name for column in model.__table__.columns][2:]
+        said = ", ".join(changed if name == "value" else f"s.{name}" for name in names)
+        connection.execute(
+            text(
+                f"INSERT INTO {model.__tablename__} (started_at, run_key, {', '.join(names)}) "
+                f"SELECT w.started_at, w.run_key, {said} FROM wanted w CROSS JOIN {model.__tablename__} s "
+                "WHERE s.run_key = :run AND s.started_at = (SELECT started_at FROM run WHERE key = :run) "
+                "ORDER BY w.started_at, w.run_key, s.series_id"
+            ),
+            {"run": template["key"]},
+        )
+    wanted.drop(connection)
+
+
+def command(place: Place, *words: str) -> tuple[float, float]:
+    """Run a command of the tracker as a user does: seconds of processor time, and GB at its largest."""
+    before = place.busy()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "spook_tracker", *words, "--db", place.url], stdout=subprocess.DEVNULL
+    )
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode not in (0, 1):
+        raise SystemExit(f"tracker {' '.join(words)} ended with {process.returncode}")
+    time.sleep(0.2)  # the server notices a little later that a connection has ended
+    return used.ru_utime + used.ru_stime + place.busy() - before, used.ru_maxrss * 1024 / 1e9
+
+
+def measure(place: Place, engine: Engine, number: int, folder: Path, without_website: bool) -> Measured:
+    """What people wait for in a history of that many nights; it has two more afterwards."""
+    series, chance = definitions(), random.Random(number)
+    if engine.dialect.name == "postgresql":
+        with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            connection.execute(text("VACUUM ANALYZE"))
+            size = connection.scalar(text("SELECT pg_database_size(current_database())"))
+    else:
+        size = Path(str(engine.url.database)).stat().st_size
+    found = Measured(number * SERIES, int(size or 0))
+    for further in (number, number + 1):
+        write_document(night(further, series, chance), folder / f"{further}.json")
+    asked: dict[str, list[tuple[str, ...]]] = {
+        "one night in": [("import", str(folder / f"{n}.json")) for n in (number, number + 1)],
+        "one series": [("trend", "test7", "metric7")] * 2,
+        "one comparison": [("compare", "previous", "latest")] * 2,
+        "the website": [("publish", "--out", str(folder / "public"))],
+    }
+    for name in MEASURES:
+        if name == "the website" and without_website:
+            continue
+        taken = [command(place, *words) for words in asked[name]]
+        found.seconds[name], found.memory[name] = (
+            min(seconds for seconds, _ in taken),
+            max(gb for _, gb in taken),
+        )
+        print(f"  {found.samples:>11,} samples, {name}: {found.seconds[name]:.2f} s, "
+              f"{found.memory[name]:.2f} GB", flush=True)  # fmt: skip
+        shutil.rmtree(folder / "public", ignore_errors=True)
+    return found
+
+
+def table(kind: str, found: list[Measured]) -> Iterator[str]:
+    """What was measured, the exponent between the two largest sizes, and what follows for the size on paper."""
+    yield f"| {kind} | {' | '.join(f'{at.samples:,}' for at in found)} | exponent | {PLANNED:,}, on paper |"
+    yield "|---" * (len(found) + 3) + "|"
+    for name in MEASURES:
+        yield line(
+            name, [(at.samples, at.seconds[name]) for at in found if name in at.seconds], "s", len(found)
+        )
+    memory = [(at.samples, at.memory["the website"]) for at in found if "the website" in at.memory]
+    yield line("the website, memory", memory, "GB", len(found))
+    yield line("the database", [(at.samples, at.size / 1e9) for at in found], "GB", len(found))
+
+
+def line(name: str, values: list[tuple[int, float]], unit: str, columns: int) -> str:
+    """One measure over the sizes."""
+    told = [f"{value:.2g} {unit}" for _, value in values]
+    told += ["not measured"] * (columns - len(told))
+    if len(values) < 3:
+        return f"| {name} | {' | '.join(told)} | | |"
+    (_, least), (smaller, before), (larger, last) = values[0], *values[-2:]
+    if last - before < NOISE * last:
+        return f"| {name} | {' | '.join(told)} | none seen | {last:.2g} {unit} |"
+    exponent = math.log((last - least) / (before - least)) / math.log(larger / smaller)
+    planned = least + (last - least) * (PLANNED / larger) ** exponent
+    return f"| {name} | {' | '.join(told)} | {exponent:.2f} | {planned:.2g} {unit} |"
+
+
+@contextlib.contextmanager
+def place_of(kind: str, folder: Path) -> Iterator[Place]:
+    """An empty database of that kind."""
+    if kind == "sqlite":
+        yield Place(f"sqlite:///{folder}/bench.db")
+        return
+    from tests.postgresql import MISSING, binaries, running_server
+
+    if (programs := binaries()) is None:
+        raise SystemExit(MISSING)
+    settings = {"shared_buffers": "512MB", "max_wal_size": "2GB", "work_mem": "64MB"}
+    with running_server(programs, settings, str(folder.parent)) as server, server.new_database() as url:
+        number = int((server.folder / "data" / "postmaster.pid").read_text().split()[0])
+        yield Place(url, number)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    options.add_argument("--samples", type=int, nargs="+", default=[100_000, 1_000_000, 10_000_000])
+    options.add_argument("--only", choices=("sqlite", "postgresql"), help="one kind of database")
+    options.add_argument(
+        "--without-website", action="store_true", help="it needs some 6 GB of memory at ten million"
+    )
+    given = options.parse_args()
+    tables = []
+    for kind in [given.only] if given.only else ["sqlite", "postgresql"]:
+        with tempfile.TemporaryDirectory() as name, place_of(kind, Path(name)) as place:
+            engine, there, found = open_database(place.url), 0, []
+            for samples in sorted(given.samples):
+                nights = max(2, samples // SERIES)
+                start = time.process_time()
+                fill(engine, there, nights, definitions())
+                print(f"  filled to {nights * SERIES:,} in {time.process_time() - start:.0f} s of our processor time",
+                      flush=True)  # fmt: skip
+                engine.dispose()
+                found.append(measure(place, engine, nights, Path(name), given.without_website))
+                there = nights + 2
+            engine.dispose()
+        tables.append("\n".join(table({"sqlite": "SQLite", "postgresql": "PostgreSQL"}[kind], found)))
+        print(tables[-1], flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,106 @@
+"""What a year of nights costs a CI service that keeps its history as one file a month.
+
+    python bench/bench_months.py [--nights 365]
+
+Synthetic runs (`tests/synthetic_history.py`, 0.3 MB of JSON each, most of it figures) stand for the nights, one a day;
+every run time and one value in fifty is another one each night, as those of a real night are.
+Times are of the processor, as `tracker ci night` spends them beside measuring: bringing the files in, with the database
+remembered from the night before (the usual case) and without, and writing the month again with one night more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from spook_tracker.tracker.document.json_form import encode
+from spook_tracker.tracker.document.run_document import RunDocument, Sample
+from spook_tracker.tracker.store.database import session_on
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.months import export_months, import_months
+from spook_tracker.tracker.store.record import record
+from tests.synthetic_history import decade
+
+FIRST = datetime(2025, 12, 1, 3, 17, tzinfo=UTC)
+
+
+def other(run: RunDocument, chance: random.Random) -> RunDocument:
+    """A night whose run times, and some of whose values, nobody has seen before."""
+
+    def changed(sample: Sample) -> Sample:
+        if sample.timing is not None:
+            seconds = tuple(
+                second * (1.0 + 0.01 * chance.gauss(0.0, 1.0)) for second in sample.timing.seconds
+            )
+            timing = msgspec.structs.replace(sample.timing, seconds=seconds)
+            return msgspec.structs.replace(sample, timing=timing)
+        if sample.value is None or chance.random() > 0.02:
+            return sample
+        return msgspec.structs.replace(
+            sample, value=type(sample.value)(sample.value * (1.0 + 1e-13 * chance.random()))
+        )
+
+    return msgspec.structs.replace(run, samples=tuple(map(changed, run.samples)))
+
+
+def taken(what: str, work: Callable[[], Any]) -> Any:
+    """Do it and print what the processor did for it."""
+    start = time.process_time()
+    result = work()
+    print(f"{what:<64}{time.process_time() - start:8.2f} s", flush=True)
+    return result
+
+
+def size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.iterdir())
+
+
+def main() -> None:
+    reader = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    reader.add_argument("--nights", type=int, default=365)
+    nights = reader.parse_args().nights
+    with tempfile.TemporaryDirectory() as name:
+        place, url = Path(name), f"sqlite:///{name}/tracker.db"
+        months = place / "history"
+        plain, chance = 0, random.Random(1)
+        with session_on(url) as session:
+            for number, run in enumerate(decade(nights).documents.values()):
+                day = (FIRST + timedelta(days=number)).isoformat()
+                dated = other(run, chance)
+                dated = msgspec.structs.replace(dated, idempotency_key=run.id, started=day, finished=day)
+                plain += len(encode(dated))
+                if number == nights - 1:  # the last day of a month, where its file is largest
+                    taken(
+                        f"write {nights - 1} nights, all months",
+                        lambda: export_months(History(session), months),
+                    )
+                    before = size(months)
+                record(session, dated)
+            files = taken(
+                "write the month again with one night more", lambda: export_months(History(session), months)
+            )
+        print(f"{nights} nights: {plain / 1e6:.0f} MB as plain JSON, {size(months) / 1e6:.1f} MB in "
+              f"{len(list(months.iterdir()))} files; one night more: {(size(months) - before) / 1e3:.0f} kB, "
+              f"{len(files)} file of {files[0].stat().st_size / 1e6:.2f} MB written")  # fmt: skip
+        every = sorted(months.iterdir())
+        with session_on(url) as session:
+            there = taken("bring all months in, database remembered", lambda: import_months(session, every))
+            assert there == (0, nights)
+        with session_on(f"sqlite:///{name}/new.db") as session:
+            new = taken("bring all months in, database lost", lambda: import_months(session, every))
+            assert new == (nights, 0)
+
+
+if __name__ == "__main__":
+    main()
