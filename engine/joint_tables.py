@@ -67,7 +67,7 @@ def couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
     """Joints of relations and drums, points of wires, those they rub on, and tyres, by the index of the constraint."""
     index = {constraint.name: k for k, constraint in enumerate(scene.constraints)}
     terms = [
-        {"relation": index[row.name], "joint": index[joint], "coefficient": factor}
+        {"row": index[row.name], "joint": index[joint], "coefficient": factor}
         for row in scene.constraints
         if isinstance(row, Relation)
         for joint, factor in row.terms
@@ -79,7 +79,7 @@ def couplings(scene: Scene, bodies: Mapping[str, int]) -> dict[str, Any]:
         for end, point in row.through
     ]
     terms += [
-        {"relation": index[row.name], "joint": index[hinge], "coefficient": radius}
+        {"row": index[row.name], "joint": index[hinge], "coefficient": radius}
         for row in scene.constraints
         if isinstance(row, Wire)
         for hinge, radius in row.wound

@@ -17,7 +17,7 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.smooth import ORDERS, check_smooth
+from spook_tracker.engine.smooth import check_smooth
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
@@ -98,7 +98,7 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
             "residual_tolerance": method.residual_tolerance,
             "refinements": method.refinements,
             "floor": method.floor,
-            "composition": ORDERS[method.composition],
+            "composition": method.composition,
         },
     }
 

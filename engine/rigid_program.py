@@ -37,7 +37,7 @@ from spook_tracker.engine.particle_program import ends
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
-from spook_tracker.engine.smooth import ORDERS, check_rigid, check_wide_rows
+from spook_tracker.engine.smooth import check_rigid, check_wide_rows
 from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, TimeFunction
 from spook_tracker.engine.tyres import Tyre
@@ -145,7 +145,7 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
             "unsettled_residual": method.unsettled_residual,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
-            "composition": ORDERS[method.composition],
+            "composition": method.composition,
             "string_stiffness": method.string_stiffness,
             "half_step_velocities": method.half_step_velocities,
             "corrections": method.corrections,

@@ -14,7 +14,6 @@ from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.tyres import Tyre
 
-ORDERS = {"none": 2, "order4": 4, "order6": 6, "order8": 8}  # of a composition, by name
 RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
 
 

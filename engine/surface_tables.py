@@ -30,7 +30,7 @@ def surfaces(scene: Scene, hulls: dict[Outlined, int]) -> list[dict[str, Any]]:
         for position, orientation, shape in placed:
             row: dict[str, Any] = {"body": index, "position": position, "orientation": orientation}
             row |= {"kind": shape.kind, "radius": 0.0, "length": 0.0, "size": ORIGIN, "normal": ORIGIN}
-            row["hull"] = hulls.setdefault(shape, len(hulls)) if isinstance(shape, Outlined) else -1
+            row["outline"] = hulls.setdefault(shape, len(hulls)) if isinstance(shape, Outlined) else -1
             colliders.append(row | shape.columns())
     return colliders
 
@@ -38,12 +38,12 @@ def surfaces(scene: Scene, hulls: dict[Outlined, int]) -> list[dict[str, Any]]:
 def hull_tables(hulls: Mapping[Outlined, int]) -> dict[str, Any]:
     """Corners of hulls and meshes, and the loops of corners round their faces."""
     corners = [
-        {"hull": index, "position": corner} for hull, index in hulls.items() for corner in hull.corners
+        {"outline": index, "position": corner} for hull, index in hulls.items() for corner in hull.corners
     ]
     loops = [
-        {"hull": index, "face": face, "corner": corner}
+        {"outline": index, "face": face, "corner": corner}
         for hull, index in hulls.items()
         for face, loop in enumerate(hull.faces)
         for corner in loop
     ]
-    return {"hull_corners": table(corners), "hull_faces": table(loops)}
+    return {"outline_corners": table(corners), "outline_faces": table(loops)}

@@ -115,7 +115,7 @@ def test_a_kind_that_nobody_knows_is_named_at_the_start(table: str, column: str,
             "length": np.zeros(1),
             "size": np.zeros((1, 3)),
             "normal": np.zeros((1, 3)),
-            "hull": np.zeros(1),
+            "outline": np.zeros(1),
         }
     _core.RigidProgram(**planted)
     planted[table] = planted[table] | {column: ["unheard of", *planted[table][column][1:]]}

@@ -26,7 +26,9 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from spook_tracker.scalar_tests import bouncing_ball
 from tests.contact_scenes import DOWN, GRAVITY, TIME_STEP, ball, ground
+from tests.oracle_ball import dropped
 
 
 @pytest.mark.parametrize("psi", [0.0, 0.25, 0.5, 1.0])
@@ -140,3 +142,12 @@ def test_a_fast_body_neither_enters_nor_rebounds() -> None:
 
 
 # Rest -------------------------------------------------------------------------------------------------------
+
+
+def test_a_ball_bounces_where_the_map_of_its_steps_says() -> None:
+    """Five bounces of a metre: a blow within a step adds what gravity does until then, and takes what it does after."""
+    _, found = bouncing_ball.gaps(simulate, bouncing_ball.TIME_STEP, 3.0)
+    _, expected = bouncing_ball.gaps(dropped, bouncing_ball.TIME_STEP, 3.0)
+
+    assert np.count_nonzero(np.diff(np.sign(np.diff(expected))) > 0) >= 5
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)

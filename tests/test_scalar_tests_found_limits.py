@@ -13,7 +13,6 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from spook_tracker.scalar_tests import (
-    bouncing_ball,
     card_house,
     conveyor,
     grasp,
@@ -34,6 +33,7 @@ from spook_tracker.scalar_tests.chain import small_motion
 from spook_tracker.scalar_tests.n_pendulum import measure as chain
 from spook_tracker.scalar_tests.planetarium import scene as planetarium
 from tests import oracle_chain, oracle_rigid_simulate, oracle_simulate
+from tests.oracle_ball import dropped
 
 
 def metric(test: str, name: str, index: int = 0) -> Metric:
@@ -234,38 +234,6 @@ def test_a_ball_on_the_slope_of_the_seams_rolls_by_newton_and_euler() -> None:
 
 
 # --- maps of one step -------------------------------------------------------------------------------------
-
-
-def dropped(
-    scene: Any, *, time_step: float, duration: float = 0.0, steps: int = 0, observe: Any, **_: Any
-) -> Any:
-    """A ball on a floor, step by step: a step that would reach the floor turns the ball there, then."""
-    ball = scene.bodies[1]
-    z, v, h, g = ball.position[2] - bouncing_ball.RADIUS, ball.velocity[2], time_step, bouncing_ball.GRAVITY
-    places, energies = [z], [0.0]
-    start = 0.5 * v * v + g * z
-    for _ in range(steps or round(duration / h)):
-        reached = z + h * (v - h * g) <= 0.0
-        if reached and -v > g * h:
-            until = z / -(v - h * g)
-            v = -bouncing_ball.RESTITUTION * (v - until * g) - (h - until) * g
-            z = (h - until) * v
-        elif reached:
-            z, v = 0.0, 0.0
-        else:
-            v -= h * g
-            z += h * v
-        places.append(z)
-        energies.append(0.5 * v * v + g * z - start)
-    path = np.zeros((len(places), 3))
-    path[:, 2] = np.array(places) + bouncing_ball.RADIUS
-    values = {"place": path, "energy": np.array(max(energies))}
-    times = {name: h * np.arange(len(places)) for name in observe}
-
-    class Found(dict):  # type: ignore[type-arg]
-        sample_times = times
-
-    return Found(values)
 
 
 def test_a_discrete_ball_bounces_as_high_and_as_long_as_the_limits_allow() -> None:

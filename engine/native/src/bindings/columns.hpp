@@ -9,14 +9,25 @@
 
 namespace spook {
 
+/// How many there are of what an index counts, and what these are called; `world` says whether −1 is one, too.
+struct Range {
+    std::size_t count;
+    const char* what;
+    bool world = false;
+};
+
 /// One column: `width` numbers per row.
 class Numbers {
 public:
-    Numbers(std::vector<double> values, std::size_t width) : values_(std::move(values)), width_(width) {}
+    Numbers(std::string name, std::vector<double> values, std::size_t width)
+        : name_(std::move(name)), values_(std::move(values)), width_(width) {}
 
     double operator[](std::size_t row) const noexcept { return values_[row * width_]; }
-    int index(std::size_t row) const noexcept { return static_cast<int>(values_[row * width_]); }
-    bool flag(std::size_t row) const noexcept { return values_[row * width_] != 0.0; }
+    /// A whole number; one that is none is an error that names the column, and so is one outside of a range.
+    int index(std::size_t row) const;
+    int index(std::size_t row, const Range& range) const;
+    /// 0 or 1; anything else is an error.
+    bool flag(std::size_t row) const;
     const double* at(std::size_t row) const noexcept { return values_.data() + row * width_; }
     Vec3 vec(std::size_t row, std::size_t k = 0) const noexcept {
         const double* p = at(row) + 3 * k;
@@ -25,6 +36,9 @@ public:
     Quat quat(std::size_t row) const noexcept { return {at(row)[0], at(row)[1], at(row)[2], at(row)[3]}; }
 
 private:
+    [[noreturn]] void refuse(const std::string& why) const;
+
+    std::string name_;  // "joints: the column 'first'"
     std::vector<double> values_;
     std::size_t width_;
 };

@@ -8,22 +8,24 @@ namespace spook {
 
 /// Two ends, each the index of a body or −1 for a point of the world.
 struct Ends {
-    explicit Ends(Columns& table)
-        : first(table.numbers("first")),
+    Ends(Columns& table, std::size_t bodies)
+        : there{bodies, "bodies", true},
+          first(table.numbers("first")),
           second(table.numbers("second")),
           first_point(table.numbers("first_point", 3)),
           second_point(table.numbers("second_point", 3)) {}
     End operator()(std::size_t row, int side) const {
-        if (side == 0) return {first.index(row), first_point.vec(row)};
-        return {second.index(row), second_point.vec(row)};
+        if (side == 0) return {first.index(row, there), first_point.vec(row)};
+        return {second.index(row, there), second_point.vec(row)};
     }
+    Range there;
     Numbers first, second, first_point, second_point;
 };
 
-inline std::vector<SpringForce> read_springs(const nb::dict& springs) {
+inline std::vector<SpringForce> read_springs(const nb::dict& springs, std::size_t bodies) {
     std::vector<SpringForce> read;
     Columns table(springs, "springs");
-    const Ends end(table);
+    const Ends end(table, bodies);
     const Numbers stiffness = table.numbers("stiffness"), length = table.numbers("rest_length"),
                   viscosity = table.numbers("viscosity");
     for (std::size_t i = 0; i < table.rows(); ++i)

@@ -1,6 +1,7 @@
 // The particle pipeline for Python: tables in, a report out.
 #include "bindings/forces.hpp"
 #include "particles/particle_program.hpp"
+#include "run/composition.hpp"
 
 namespace spook {
 
@@ -21,7 +22,9 @@ ParticleMethod to_method(const nb::dict& method) {
     options.read("residual_tolerance", out.residual_tolerance);
     options.read("refinements", out.refinements);
     options.read("floor", out.floor);
-    options.read("composition", out.composition);
+    Composition composition{};
+    options.read_kind("composition", composition);
+    out.composition = order_of(composition);
     options.expect_all_read();
     return out;
 }
@@ -37,7 +40,7 @@ void read_bodies(const nb::dict& bodies, ParticleScene& scene) {
 
 void read_rows(const nb::dict& rows, ParticleScene& scene) {
     Columns table(rows, "rows");
-    const Ends end(table);
+    const Ends end(table, scene.bodies.size());
     const Numbers length = table.numbers("rest_length"), compliance = table.numbers("compliance"),
                   damping = table.numbers("damping");
     for (std::size_t i = 0; i < table.rows(); ++i)
@@ -54,7 +57,7 @@ void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, c
     scene.method = to_method(method);
     read_bodies(bodies, scene);
     read_rows(rows, scene);
-    scene.springs = read_springs(springs);
+    scene.springs = read_springs(springs, scene.bodies.size());
     scene.fields = read_fields(fields);
     new (self) ParticleProgram(scene, quantities, observations);
 }

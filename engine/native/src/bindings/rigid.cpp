@@ -1,6 +1,7 @@
 // The rigid-body pipeline for Python: tables in, a report out.
 #include "bindings/forces.hpp"
 #include "rigid/rigid_program.hpp"
+#include "run/composition.hpp"
 
 namespace spook {
 
@@ -54,11 +55,12 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
                   damping = table.numbers("damping", 6), one_sided = table.numbers("one_sided"),
                   restitution = table.numbers("restitution"), strength = table.numbers("strength"),
                   torque_strength = table.numbers("torque_strength");
+    const Range bodies{scene.bodies.size(), "bodies", true};
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& joint = scene.joints.emplace_back();
         joint.kind = kind[i];
-        joint.first = first.index(i);
-        joint.second = second.index(i);
+        joint.first = first.index(i, bodies);
+        joint.second = second.index(i, bodies);
         joint.first_point = first_point.vec(i);
         joint.second_point = second_point.vec(i);
         for (std::size_t k = 0; k < 3; ++k) joint.axes[k] = axes.vec(i, k);
@@ -73,12 +75,14 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
     table.expect_all_read();
 }
 
+Range all_joints(const RigidScene& scene) { return {scene.joints.size(), "joints"}; }
+
 void read_motors(const nb::dict& motors, RigidScene& scene) {
     Columns table(motors, "motors");
     const Numbers joint = table.numbers("joint"), speed = table.numbers("speed"),
                   force = table.numbers("max_force"), pushes = table.numbers("pushes");
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        JointSpec& spec = scene.joints.at(joint.index(i));
+        JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
         spec.has_motor = true;
         spec.motor_speed = speed[i];
         spec.motor_force = force[i];
@@ -92,7 +96,7 @@ void read_frictions(const nb::dict& frictions, RigidScene& scene) {
     const Numbers joint = table.numbers("joint"), constant = table.numbers("constant", 2),
                   load = table.numbers("load", 2);
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        JointSpec& spec = scene.joints.at(joint.index(i));
+        JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
         std::copy_n(constant.at(i), 2, spec.dry_friction.begin());
         std::copy_n(load.at(i), 2, spec.load_friction.begin());
     }
@@ -105,7 +109,7 @@ void read_limits(const nb::dict& limits, RigidScene& scene) {
                   upper = table.numbers("upper"), compliance = table.numbers("compliance"),
                   damping = table.numbers("damping"), restitution = table.numbers("restitution");
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        JointSpec& spec = scene.joints.at(joint.index(i));
+        JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
         spec.has_limit = true;
         spec.limit_lower = lower[i];
         spec.limit_upper = upper[i];
@@ -122,7 +126,7 @@ void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
                   rest = table.numbers("rest"), damping = table.numbers("damping"),
                   force = table.numbers("max_force");
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        JointSpec& spec = scene.joints.at(joint.index(i));
+        JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
         spec.has_spring = true;
         spec.spring_force = force[i];
         spec.spring_stiffness = stiffness[i];
@@ -152,46 +156,47 @@ struct Outline {
         return mesh;
     }
 };
-using Hulls = std::vector<Outline>;
+using Outlines = std::vector<Outline>;
 
-/// Corners of hulls and meshes, and the loops round their faces; both in ascending order of hull and face.
-Hulls read_hulls(const nb::dict& corners, const nb::dict& loops) {
-    Columns points(corners, "hull_corners"), rounds(loops, "hull_faces");
-    const Numbers hull_of = points.numbers("hull"), place = points.numbers("position", 3),
-                  loop_of = rounds.numbers("hull"), face = rounds.numbers("face"),
+/// Corners of hulls and meshes, and the loops round their faces; both in ascending order of outline and face.
+Outlines read_outlines(const nb::dict& corners, const nb::dict& loops) {
+    Columns points(corners, "outline_corners"), rounds(loops, "outline_faces");
+    const Numbers outline_of = points.numbers("outline"), place = points.numbers("position", 3),
+                  loop_of = rounds.numbers("outline"), face = rounds.numbers("face"),
                   corner = rounds.numbers("corner");
-    Hulls hulls;
+    Outlines outlines;
     std::size_t point = 0, row = 0;
     while (point < points.rows()) {
-        const int hull = hull_of.index(point);
+        const int outline = outline_of.index(point);
         std::vector<Vec3> places;
         std::vector<int> indices, counts;
-        for (; point < points.rows() && hull_of.index(point) == hull; ++point)
+        for (; point < points.rows() && outline_of.index(point) == outline; ++point)
             places.push_back(place.vec(point));
-        for (int last = -1; row < rounds.rows() && loop_of.index(row) == hull; ++row) {
+        for (int last = -1; row < rounds.rows() && loop_of.index(row) == outline; ++row) {
             if (face.index(row) != last) counts.push_back(0);
             last = face.index(row);
             ++counts.back();
-            indices.push_back(corner.index(row));
+            indices.push_back(corner.index(row, {places.size(), "corners"}));
         }
-        hulls.push_back({std::move(places), std::move(indices), std::move(counts)});
+        outlines.push_back({std::move(places), std::move(indices), std::move(counts)});
     }
     points.expect_all_read();
     rounds.expect_all_read();
-    return hulls;
+    return outlines;
 }
 
-std::vector<Collider> read_colliders(const nb::dict& colliders, Hulls& hulls, const char* name) {
+std::vector<Collider> read_colliders(const nb::dict& colliders, Outlines& outlines, std::size_t bodies,
+                                     const char* name) {
     std::vector<Collider> read;
     Columns table(colliders, name);
     const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
     const Numbers body = table.numbers("body"), position = table.numbers("position", 3),
                   orientation = table.numbers("orientation", 4), radius = table.numbers("radius"),
                   length = table.numbers("length"), size = table.numbers("size", 3),
-                  normal = table.numbers("normal", 3), hull = table.numbers("hull");
+                  normal = table.numbers("normal", 3), outline = table.numbers("outline");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         Collider& collider = read.emplace_back();
-        collider.body = body.index(i);
+        collider.body = body.index(i, {bodies, "bodies"});
         collider.part = {position.vec(i), rotation(orientation.quat(i))};
         switch (kind[i]) {
             case ShapeKind::sphere: collider.shape = Primitive::sphere(radius[i]); break;
@@ -201,11 +206,11 @@ std::vector<Collider> read_colliders(const nb::dict& colliders, Hulls& hulls, co
             case ShapeKind::cone: collider.shape = Primitive::cone(radius[i], length[i]); break;
             case ShapeKind::hull:
                 collider.shape =
-                    Primitive::convex(hulls.at(static_cast<std::size_t>(hull.index(i))).as_hull());
+                    Primitive::convex(outlines[outline.index(i, {outlines.size(), "outlines"})].as_hull());
                 break;
             case ShapeKind::plane: collider.shape = Primitive::plane(normal.vec(i)); break;
             case ShapeKind::triangle: {  // a row for a mesh, a collider for each of its triangles
-                const auto& mesh = hulls.at(static_cast<std::size_t>(hull.index(i))).as_mesh();
+                const auto& mesh = outlines[outline.index(i, {outlines.size(), "outlines"})].as_mesh();
                 const Collider whole = collider;
                 read.pop_back();
                 for (int k = 0; k < static_cast<int>(mesh->triangles.size()); ++k)
@@ -220,10 +225,11 @@ std::vector<Collider> read_colliders(const nb::dict& colliders, Hulls& hulls, co
 
 void read_terms(const nb::dict& terms, RigidScene& scene) {
     Columns table(terms, "terms");
-    const Numbers relation = table.numbers("relation"), joint = table.numbers("joint"),
+    const Numbers row = table.numbers("row"), joint = table.numbers("joint"),
                   coefficient = table.numbers("coefficient");
     for (std::size_t i = 0; i < table.rows(); ++i)
-        scene.joints.at(relation.index(i)).terms.push_back({joint.index(i), coefficient[i]});
+        scene.joints[row.index(i, all_joints(scene))].terms.push_back(
+            {joint.index(i, all_joints(scene)), coefficient[i]});
     table.expect_all_read();
 }
 
@@ -232,7 +238,8 @@ void read_wire_points(const nb::dict& points, RigidScene& scene) {
     const Numbers wire = table.numbers("wire"), body = table.numbers("body"),
                   point = table.numbers("point", 3);
     for (std::size_t i = 0; i < table.rows(); ++i)
-        scene.joints.at(wire.index(i)).points.push_back({body.index(i), point.vec(i)});
+        scene.joints[wire.index(i, all_joints(scene))].points.push_back(
+            {body.index(i, {scene.bodies.size(), "bodies", true}), point.vec(i)});
     table.expect_all_read();
 }
 
@@ -241,11 +248,11 @@ void read_eyes(const nb::dict& eyes, RigidScene& scene) {
     const Numbers wire = table.numbers("wire"), point = table.numbers("point"),
                   friction = table.numbers("friction"), turns = table.numbers("turns");
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        const JointSpec& over = scene.joints.at(wire.index(i));
+        const JointSpec& over = scene.joints[wire.index(i, all_joints(scene))];
         JointSpec eye;
         eye.kind = JointKind::eye;
         eye.wire = wire.index(i);
-        eye.eye = point.index(i);
+        eye.eye = point.index(i, {over.points.size(), "points of this wire"});
         eye.points.assign(over.points.begin() + eye.eye, over.points.end());
         eye.terms = over.terms;
         eye.friction[0] = friction[i];
@@ -260,7 +267,7 @@ void read_tyres(const nb::dict& tyres, RigidScene& scene) {
     const Numbers joint = table.numbers("joint"), radius = table.numbers("radius"),
                   stiffness = table.numbers("slip_stiffness", 2), friction = table.numbers("friction", 2);
     for (std::size_t i = 0; i < table.rows(); ++i) {
-        JointSpec& tyre = scene.joints.at(joint.index(i));
+        JointSpec& tyre = scene.joints[joint.index(i, all_joints(scene))];
         tyre.radius = radius[i];
         std::copy_n(stiffness.at(i), 2, tyre.slip_stiffness.begin());
         std::copy_n(friction.at(i), 2, tyre.friction.begin());
@@ -297,7 +304,7 @@ void read_drives(const nb::dict& drives, const nb::dict& knots, RigidScene& scen
     Columns rows(knots, "knots");
     const Numbers drive = rows.numbers("drive"), time = rows.numbers("time"), value = rows.numbers("value");
     for (std::size_t i = 0; i < rows.rows(); ++i) {
-        TimeFunction& of = scene.drives.at(drive.index(i)).function;
+        TimeFunction& of = scene.drives[drive.index(i, {scene.drives.size(), "drives"})].function;
         of.times.push_back(time[i]);
         of.values.push_back(value[i]);
     }
@@ -307,8 +314,9 @@ void read_drives(const nb::dict& drives, const nb::dict& knots, RigidScene& scen
 void read_no_contact(const nb::dict& no_contact, RigidScene& scene) {
     Columns table(no_contact, "no_contact");
     const Numbers first = table.numbers("first"), second = table.numbers("second");
+    const Range bodies{scene.bodies.size(), "bodies"};
     for (std::size_t i = 0; i < table.rows(); ++i)
-        scene.no_contact.push_back({first.index(i), second.index(i)});
+        scene.no_contact.push_back({first.index(i, bodies), second.index(i, bodies)});
     table.expect_all_read();
 }
 
@@ -325,7 +333,9 @@ RigidMethod to_method(const nb::dict& method) {
     options.read("residual_tolerance", out.residual_tolerance);
     options.read_kind("impacts", out.impacts);
     options.read("unsettled_residual", out.unsettled_residual);
-    options.read("composition", out.composition);
+    Composition composition{};
+    options.read_kind("composition", composition);
+    out.composition = order_of(composition);
     options.read("string_stiffness", out.string_stiffness);
     options.read("half_step_velocities", out.half_step_velocities);
     options.read("corrections", out.corrections);
@@ -341,8 +351,8 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
           const nb::dict& springs, const nb::dict& terms, const nb::dict& wire_points, const nb::dict& eyes,
           const nb::dict& tyres, const nb::dict& fields, const nb::dict& fluids, const nb::dict& floaters,
           const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
-          const nb::dict& hull_corners, const nb::dict& hull_faces, const nb::dict& no_contact, bool contacts,
-          const Point& gravity, const nb::dict& method, bool loads_change,
+          const nb::dict& outline_corners, const nb::dict& outline_faces, const nb::dict& no_contact,
+          bool contacts, const Point& gravity, const nb::dict& method, bool loads_change,
           const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
@@ -355,7 +365,7 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_limits(limits, scene);
     read_joint_springs(joint_springs, scene);
     read_frictions(joint_frictions, scene);
-    scene.springs = read_springs(springs);
+    scene.springs = read_springs(springs, scene.bodies.size());
     scene.fields = read_fields(fields);
     read_terms(terms, scene);
     read_wire_points(wire_points, scene);
@@ -363,9 +373,9 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_tyres(tyres, scene);
     read_fluids(fluids, scene);
     read_drives(drives, knots, scene);
-    Hulls hulls = read_hulls(hull_corners, hull_faces);
-    scene.floaters = read_colliders(floaters, hulls, "floaters");
-    scene.colliders = read_colliders(colliders, hulls, "colliders");
+    Outlines outlines = read_outlines(outline_corners, outline_faces);
+    scene.floaters = read_colliders(floaters, outlines, scene.bodies.size(), "floaters");
+    scene.colliders = read_colliders(colliders, outlines, scene.bodies.size(), "colliders");
     read_no_contact(no_contact, scene);
     new (self) RigidProgram(scene, quantities, observations);
 }
@@ -378,11 +388,11 @@ void bind_rigid(nb::module_& m) {
         nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"),
         nb::arg("joint_frictions"), nb::arg("springs"), nb::arg("terms"), nb::arg("wire_points"),
         nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"), nb::arg("fluids"), nb::arg("floaters"),
-        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("hull_corners"),
-        nb::arg("hull_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
+        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("outline_corners"),
+        nb::arg("outline_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
         nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
-        "hulls are numbered in the order they come;\n"
+        "outlines of hulls and meshes are numbered in the order they come;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits,\n"
         "joint_springs and joint_frictions name the joint they drive.");
 }

@@ -118,8 +118,11 @@ Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& p
         case ShapeKind::cylinder: return {height - cylinder_reach(shape, column(at.rotation, 2), n), n};
         case ShapeKind::cone: return {-Frustum(shape, at).reach(-n) - dot(n, at_plane.position), n};
         case ShapeKind::hull: return {height - farthest(*shape.hull, -local(at.rotation, n)), n};
-        default: return {height - box_reach(shape, at, n), n};
+        case ShapeKind::box: return {height - box_reach(shape, at, n), n};
+        case ShapeKind::triangle:
+        case ShapeKind::plane: break;
     }
+    return {1e300, n};  // both are fixed
 }
 
 }  // namespace
@@ -179,8 +182,14 @@ double turning_arm(const Primitive& shape, const Pose& part) noexcept {
     switch (shape.kind) {
         case ShapeKind::sphere: return offset;
         case ShapeKind::capsule: return offset + shape.half_length;
-        default: return offset + reach(shape);
+        case ShapeKind::box:
+        case ShapeKind::cylinder:
+        case ShapeKind::cone:
+        case ShapeKind::hull:
+        case ShapeKind::triangle:
+        case ShapeKind::plane: break;
     }
+    return offset + reach(shape);
 }
 
 namespace {

@@ -23,9 +23,9 @@ struct Row {                       // constants
     double violation_gain, velocity_gain, relaxation, softness, rest_inverse, rest_inverse_square;
 };
 
-struct Link {  // of this step
-    Vec3 u;    // unit, from a to b
-    double length, g, rhs, lambda, pivot_inverse, lower;
+struct Link {                                                // of this step
+    Vec3 u;                                                  // unit, from a to b
+    double length, g, rhs, y, lambda, pivot_inverse, lower;  // y: the right side on the way down a path
 };
 
 /// In path order if the rows form open paths.

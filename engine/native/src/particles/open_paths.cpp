@@ -23,13 +23,12 @@ void OpenPaths::substitute(DistanceRows& rows) const noexcept {
     for (std::size_t path = 0; path + 1 < first_.size(); ++path) {
         const int first = first_[path], end = first_[path + 1];
         double y = rows.link[first].rhs;
-        rows.link[first].lambda = y;
-        for (int k = first + 1; k < end; ++k)
-            rows.link[k].lambda = y = rows.link[k].rhs - rows.link[k].lower * y;
-        double lambda = rows.link[end - 1].lambda *= rows.link[end - 1].pivot_inverse;
+        rows.link[first].y = y;
+        for (int k = first + 1; k < end; ++k) rows.link[k].y = y = rows.link[k].rhs - rows.link[k].lower * y;
+        double lambda = rows.link[end - 1].lambda = y * rows.link[end - 1].pivot_inverse;
         for (int k = end - 2; k >= first; --k)
             rows.link[k].lambda = lambda =
-                rows.link[k].lambda * rows.link[k].pivot_inverse - rows.link[k + 1].lower * lambda;
+                rows.link[k].y * rows.link[k].pivot_inverse - rows.link[k + 1].lower * lambda;
     }
 }
 

@@ -176,7 +176,7 @@ bool ParticleComposition::constrained_stage(double tau, double* history) {
 }
 
 /// Residual of every row and the way down: L U of the Jacobian if `fresh`, else forward substitution only.
-/// Returns the largest |d₊²/L² − 1|. rhs: y; lambda keeps the impulse so far.
+/// Returns the largest |d₊²/L² − 1|; lambda keeps the impulse so far.
 double ParticleComposition::lengthen_paths(double tau, bool fresh) noexcept {
     double worst = 0.0;
     for (std::size_t path = 0; path + 1 < paths_.first().size(); ++path) {
@@ -201,7 +201,7 @@ double ParticleComposition::lengthen_paths(double tau, bool fresh) noexcept {
                 link.pivot_inverse = inverse;
                 upper_[k] = upper;
             }
-            link.rhs = y = -0.5 * residual - link.lower * y;
+            link.y = y = -0.5 * residual - link.lower * y;
         }
     }
     return worst;
@@ -215,7 +215,7 @@ void ParticleComposition::shorten_paths() noexcept {
         const int first = paths_.first()[path], end = paths_.first()[path + 1];
         for (int k = end - 1; k >= first; --k) {
             Link& link = rows_.link[k];
-            change = (link.rhs - upper_[k] * change) * link.pivot_inverse;
+            change = (link.y - upper_[k] * change) * link.pivot_inverse;
             link.lambda += change;
             const Vec3 in = change * link.u;
             nodes_.v[rows_.row[k].b] += nodes_.w[rows_.row[k].b] * (in - out);

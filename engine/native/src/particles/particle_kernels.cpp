@@ -98,7 +98,7 @@ template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcep
                     y = rhs - lower * y;
                 }
                 link[k].u = u;
-                link[k].lambda = y;
+                link[k].y = y;
                 link[k].lower = lower;
                 link[k].pivot_inverse = inverse;
                 xa = xb;
@@ -111,7 +111,7 @@ template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcep
                 Vec3 out;
                 double lambda = 0.0, lower_below = 0.0;
                 for (int k = end - 1, at = node; k >= first; --k, --at) {
-                    const double above = link[k].lambda * link[k].pivot_inverse;
+                    const double above = link[k].y * link[k].pivot_inverse;
                     lambda = k == end - 1 ? above : above - lower_below * lambda;
                     lower_below = link[k].lower;
                     link[k].lambda = lambda;
@@ -140,7 +140,7 @@ template <bool Curved> void ParticleSystem::swing_by(std::int64_t steps) noexcep
                                  curvature(link[k].u, link[k].length, h * (trial[at + 1] - trial[at])));
                     const double rhs = first_rhs[k] - r.violation_gain * (0.25 + r.relaxation) * ahead;
                     y = k == first ? rhs : rhs - link[k].lower * y;
-                    link[k].lambda = y;
+                    link[k].y = y;
                 }
             }
             ++node;

@@ -56,8 +56,19 @@ bool of_places(Quantity quantity) {
         case Quantity::violation:
         case Quantity::joint_coordinate:
         case Quantity::potential_energy: return true;
-        default: return false;
+        case Quantity::velocity:
+        case Quantity::angular_velocity:
+        case Quantity::kinetic_energy:
+        case Quantity::energy:
+        case Quantity::momentum:
+        case Quantity::angular_momentum:
+        case Quantity::constraint_force:
+        case Quantity::contact_force:
+        case Quantity::contact_count:
+        case Quantity::penetration:
+        case Quantity::contact_points: break;
     }
+    return false;
 }
 
 }  // namespace

@@ -2,13 +2,21 @@
 #pragma once
 
 #include <span>
+#include <stdexcept>
+
+#include "run/named_enum.hpp"
 
 namespace spook {
+
+SPOOK_NAMED_ENUM(Composition, none, order4, order6, order8)
+
+/// The order of accuracy of a step that is composed so.
+inline int order_of(Composition composition) noexcept { return 2 + 2 * static_cast<int>(composition); }
 
 /// Stage lengths γ of an order, in time steps; they sum to 1 and read the same backwards.
 /// Order 4: Suzuki, Phys. Lett. A 146 (1990) 319. Orders 6 and 8: Kahan and Li, Math. Comp. 66 (1997) 1089,
 /// nine and seventeen stages; their largest |γ| is about half that of the schemes with fewest stages.
-inline std::span<const double> composition_stages(int order) noexcept {
+inline std::span<const double> composition_stages(int order) {
     static constexpr double FOUR[] = {0.41449077179437573714, 0.41449077179437573714, -0.65796308717750294857,
                                       0.41449077179437573714, 0.41449077179437573714};
     static constexpr double SIX[] = {0.39216144400731413928,  0.33259913678935943860, -0.70624617255763935981,
@@ -24,7 +32,7 @@ inline std::span<const double> composition_stages(int order) noexcept {
         case 4: return FOUR;
         case 6: return SIX;
         case 8: return EIGHT;
-        default: return {};
+        default: throw std::invalid_argument("there is no composition of this order; there are 4, 6 and 8");
     }
 }
 
