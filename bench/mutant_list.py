@@ -14,7 +14,7 @@ class Mutant:
     room: str
     name: str
     story: str
-    caught_by: str  # a scalar test, or a test of the suite: tests/test_….py::test_…
+    caught_by: str  # a scalar test, or a test of the suite: tests/test_….py::test_…, engine/native/tests/test_….cpp::…
     changes: tuple[tuple[str, str, str], ...]  # file, text as it is, text put in its place
     sweep: bool = False  # told by error against run time
 
@@ -335,6 +335,15 @@ MUTANTS = (
         "contacts/contact_detect.cpp",
         "const double psi = point.material.restitution, speed",
         "const double psi = 0.97 * point.material.restitution, speed",
+    ),
+    wrong(
+        "contacts",
+        "tight-for-ever",
+        "contacts that contradict each other by rounding are searched at one tolerance, however often that stalls",
+        "engine/native/tests/test_pivot_solver.cpp::a_contradiction_of_rounding_ends_the_search",
+        "contacts/pivot_solver.cpp",
+        "tolerance_ = std::min(10.0 * tolerance_, loosest);",
+        "tolerance_ = std::min(tolerance_, loosest);",
     ),
     wrong(
         "friction",

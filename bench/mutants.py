@@ -15,6 +15,7 @@ import argparse
 import datetime
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -76,8 +77,40 @@ def caught_by_scalar_test(place: Path, mutant: Mutant, sound: RunDocument) -> tu
     return True, f"{worst.series}: {worst.name or worst.word}, {worst.sentence}"
 
 
+def caught_by_native_test(place: Path, mutant: Mutant) -> tuple[bool, str]:
+    """Whether the named function of a C++ test fails: the program says its name, and at which line."""
+    file, _, name = mutant.caught_by.partition("::")
+    commits.build_in_place(place)
+    cmake, folder = str(Path(sys.executable).with_name("cmake")), place / "build" / "cpp-tests"
+    (library,) = (place / "build").rglob("libspook.a")
+    source = (f"-S{place / 'engine/native/tests'}", f"-B{folder}", "-DCMAKE_BUILD_TYPE=Release")
+    test = Path(file).stem
+    for command in (
+        (cmake, *source, f"-DSPOOK_LIBRARY={library}"),
+        (cmake, "--build", str(folder), "--target", test),
+    ):
+        subprocess.run(command, check=True, capture_output=True)
+    done = subprocess.run([str(folder / test)], capture_output=True, text=True)
+    where = lines_of(place / file, name)
+    git(place, "reset", "-q", "--hard")
+    said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+    failed = [int(number) for line in said for number in re.findall(rf"{test}\.cpp:(\d+)", line)]
+    return done.returncode != 0 and any(line in where for line in failed), said[
+        0
+    ] if said else "nothing fails"
+
+
+def lines_of(file: Path, function: str) -> range:
+    """Where a function of a C++ test stands: from its name to the brace that ends it."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    start = next(i for i, line in enumerate(lines, 1) if re.match(rf"\w+ {function}\(", line))
+    return range(start, next(i for i in range(start, len(lines) + 1) if lines[i - 1] == "}") + 1)
+
+
 def caught_by_test(place: Path, mutant: Mutant) -> tuple[bool, str]:
     """Whether the named test of the suite fails."""
+    if ".cpp::" in mutant.caught_by:
+        return caught_by_native_test(place, mutant)
     if mutant.native:
         commits.build_in_place(place)
     search = os.pathsep.join([str(place), sysconfig.get_path("purelib")])
