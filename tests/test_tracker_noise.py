@@ -156,6 +156,12 @@ def test_a_change_of_eight_nights_in_the_middle_of_a_history_is_found():
     assert "detected" not in told[71:]
 
 
+def test_the_change_point_of_a_thousand_nights_is_at_its_night():
+    (point,) = change_points([*noisy(600, 5), *noisy(400, 6, level=1.1e-3)])
+
+    assert point.place == 600
+
+
 def test_noise_has_no_change_points():
     assert not any(change_points(noisy(200, seed), name=str(seed)) for seed in range(30))
     assert change_points([1.0] * 50) == []
