@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-replay pictures looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -19,6 +19,7 @@ help:
 	@echo "make fuzz MINUTES=10   each fuzz target, guided by what it reaches: shapes, scenes, documents, settings"
 	@echo "make fuzz-keep         the least of what they have reached goes into the tree"
 	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
+	@echo "make bench-smooth  what smooth rigid scenes cost to a given error"
 	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
 	@echo "make bench-replay  what a frame of ten thousand bodies costs in a browser"
 	@echo "make pictures  the pictures in docs/ again, of the nights in $(DB) and of a red night"
@@ -147,6 +148,10 @@ bench-publish: develop
 
 bench-replay: develop
 	$(BIN)/python bench/bench_replay.py
+
+# What smooth rigid scenes cost to a given error.
+bench-smooth: develop
+	$(BIN)/python bench/run.py smooth
 
 bench-heaps: develop
 	$(BIN)/python bench/bench_heaps.py
