@@ -249,7 +249,7 @@ const LIVE_SCENES = {
   pile: {
     title: "A small pile", about: "Boxes and balls fall on a plane and on each other.",
     duration: 4, smooth: false,
-    parameters: { friction: choice("friction model", FRICTIONS, "cone"), solver: choice("solver", SOLVERS, "hybrid"), rate: stepsPerSecond(), count: number("bodies", 1, 24, 1, 10), mu: number("friction µ", 0, 1.2, 0.05, 0.4), restitution: number("restitution", 0, 1, 0.05, 0.1) },
+    parameters: { friction: choice("friction model", FRICTIONS, "cone"), solver: choice("solver", SOLVERS, "direct"), rate: stepsPerSecond(), count: number("bodies", 1, 24, 1, 10), mu: number("friction µ", 0, 1.2, 0.05, 0.4), restitution: number("restitution", 0, 1, 0.05, 0.1) },
     build(engine, p, h) {
       engine.begin(true, [0, 0, -9.81], h, { friction: p.friction, solver: p.solver });
       const surface = { friction: p.mu, restitution: p.restitution };
