@@ -43,6 +43,7 @@ from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
 LINKS, LENGTH, RADIUS, MASS = 5, 0.12, 0.02, 0.1  # m, m, kg of a link
+FEW = 3  # links of the ladder: rough ground that holds a straight chain twice over takes long to solve
 DROP, PUSH = 0.3, (0.5, 0.3, 0.0)  # m, m/s
 FLOOR, DOLL_PUSH = -1.2, (1.0, 0.7, -1.0)  # m, m/s: of the ragdoll
 FRICTION = 0.5
@@ -59,10 +60,10 @@ def floor(height: float) -> RigidBody:
 
 
 @functools.cache
-def chain() -> Scene:
+def chain(count: int = LINKS) -> Scene:
     """Capsules on ball joints in a zigzag over the floor, pushed sideways."""
     links, joints, x, z = [], [], 0.0, DROP
-    for k in range(LINKS):
+    for k in range(count):
         lean = 0.5 * math.sin(1.3 * k) + 0.2
         along, up = LENGTH * math.cos(lean), LENGTH * math.sin(lean)
         turn = 0.5 * (0.5 * math.pi - lean)
@@ -85,7 +86,7 @@ def chain() -> Scene:
         bodies=(floor(0.0), *links),
         constraints=tuple(joints),
         gravity=(0.0, 0.0, -GRAVITY),
-        no_contact=tuple((f"link {k}", f"link {k + 1}") for k in range(LINKS - 1)),
+        no_contact=tuple((f"link {k}", f"link {k + 1}") for k in range(count - 1)),
     )
 
 
@@ -131,13 +132,13 @@ def measure(simulate: Simulate, scene: Scene, time_step: float, method: Method =
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
-    """Momentum that came from nowhere, of the chain, over the largest."""
-    return measure(simulate, chain(), time_step, method)["momentum_error"]
+    """Momentum that came from nowhere, of a chain of three, over the largest."""
+    return measure(simulate, chain(FEW), time_step, method)["momentum_error"]
 
 
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same fall with nothing observed."""
-    return simulate(chain(), time_step=time_step, duration=DURATION, method=method)
+    return simulate(chain(FEW), time_step=time_step, duration=DURATION, method=method)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -227,13 +228,10 @@ TEST = ScalarTest(
     ladders=(
         Ladder(
             name="momentum",
-            description="momentum of the chain that came from nowhere: none is right",
+            description="momentum of a chain of three that came from nowhere: none is right",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 45, 60)),
-            configurations=(  # rounding: no order
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
-            ),
+            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),  # rounding
             error=ladder_error,
             run=ladder_run,
             target_error=1e-9,
