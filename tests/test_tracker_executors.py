@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.tracker.document.json_form import encode
@@ -17,10 +19,14 @@ from spook_tracker.tracker.measure import executors
 from spook_tracker.tracker.measure.executors import ExecutorError, Place
 from spook_tracker.tracker.measure.run import Questions, Request, run
 from spook_tracker.tracker.measure.workers import Lost
+from spook_tracker.tracker.store.border import decoded
+from tests.test_tracker_cli import tracker
 
 HERE = Path(__file__).parent
 ASKED: dict[str, Any] = {"figures": True, "stability": True}
-TESTS = ("falling_object", "oscillator_spring")
+# A few tests of the catalogue; all of them where SPOOK_WHOLE_CATALOGUE is set (make executors).
+TESTS = () if "SPOOK_WHOLE_CATALOGUE" in os.environ else ("falling_object", "oscillator_spring")
+PATIENCE = 7200 if not TESTS else 600  # s
 
 
 def threads() -> Executor:
@@ -48,12 +54,14 @@ def cluster() -> Iterator[Any]:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed here")
     before = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(HERE), before]))
+    sys.path.insert(0, str(HERE))  # which its processes take over
     try:
         with distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
         ) as started:
             yield started
     finally:
+        sys.path.remove(str(HERE))
         os.environ.pop("PYTHONPATH")
         if before is not None:
             os.environ["PYTHONPATH"] = before
@@ -63,12 +71,42 @@ def dask(cluster: Any) -> str:
     return str(cluster.scheduler_address).replace("tcp://", "dask://")
 
 
+def without_clocks(document: RunDocument) -> list[bytes]:
+    """The same of a night with run times: those are taken on this machine, alone, whoever measures the values."""
+    by_clock = {series.key for series in document.series if series.kind == "time"}
+    assert by_clock, "a sweep takes run times"
+    kept = [replace(s, timing=None) for s in document.samples if s.series not in by_clock]
+    return [encode(part) for part in (document.series, tuple(kept), document.figures, document.maps)]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_night_at_the_command_line_gives_the_same_bits_on_dask(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(HERE))
+    nights = []
+    for name in ("process", dask(cluster)):
+        file = tmp_path / f"{len(nights)}.json"
+        done = tracker(
+            "nightly", "--executor", name, "--workers", "1", "--engine", "toy_engine", "--json", str(file),
+            "--catalogue", "toy_questions:CATALOGUE", "--db", f"{file}.db", "--out", f"{file}.public",
+        )  # fmt: skip
+        assert done.exit_code == 0, done.output
+        nights.append(decoded(file.read_bytes()))
+
+    processes, on_dask = nights
+    assert {"values", "sweep", "stability"} == set(processes.asked.families)
+    assert without_clocks(on_dask) == without_clocks(processes)
+
+
 def test_an_executor_of_ones_own_gives_the_same_bits(by_processes: RunDocument) -> None:
     document = run(Questions(), Request(tests=TESTS, executor=f"{__name__}:threads", **ASKED))
 
     assert answered(document) == answered(by_processes)
 
 
+@pytest.mark.timeout(PATIENCE)
 @pytest.mark.filterwarnings("ignore")  # Dask's own, of its own parts
 def test_two_workers_of_dask_give_the_same_bits(by_processes: RunDocument, cluster: Any) -> None:
     document = run(Questions(), Request(tests=TESTS, executor=dask(cluster), **ASKED))
