@@ -9,6 +9,7 @@ import pytest
 
 from spook_tracker.engine import PLAIN, Method
 from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests import loaded_rods, spinning_top
 from spook_tracker.scalar_tests.beam import stability as beam
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import StabilityStudy
@@ -141,3 +142,41 @@ def test_a_pushed_beam_rests_with_the_damping_that_the_map_of_a_row_needs() -> N
 
     assert rests(high) and not rests(low)
     assert all(rests(2.0, h) for h in (0.01, 0.1, 1.0, 10.0))  # why the largest time step has no band
+
+
+def test_ten_loaded_rods_break_where_an_explicit_step_of_their_angles_does() -> None:
+    """Stepped by symplectic Euler in the rods' angles, written from Lagrange's equations of the straight chain."""
+    low, high = band("loaded_rods", "heaviest-load-plain")
+    count, h = loaded_rods.RODS, loaded_rods.TIME_STEP
+
+    def growth(load: float) -> float:
+        """Spectral radius of one step; the energies are sums over rods and load of where they are."""
+        centres = np.tril(np.ones((count, count)), -1) + 0.5 * np.eye(count)  # sideways, per angle
+        mass = loaded_rods.ACROSS * np.eye(count) + centres.T @ centres + load * np.ones((count, count))
+        hung = 9.81 * (centres.sum(axis=0) + load)  # N m per angle
+        turn = -h * np.linalg.solve(mass, np.diag(hung))
+        step = np.block([[np.eye(count) + h * turn, h * np.eye(count)], [turn, np.eye(count)]])
+        return float(np.abs(np.linalg.eigvals(step)).max())
+
+    assert growth(low) < 1.0 + 1e-6 and growth(high) > 1.1
+
+
+def test_the_fastest_turn_of_a_step_is_where_its_equation_loses_its_root() -> None:
+    """x √(1 − x²/4) = h |ω| has a root while h |ω| ≤ 1: its left side is largest, 1, at x = √2."""
+    low, high = band("rotating_box", "highest-spin")
+    largest = max(x * math.sqrt(1.0 - 0.25 * x * x) for x in np.linspace(0.0, 2.0, 200_001))
+
+    assert low < largest <= high * (1.0 + 1e-15)
+
+
+def test_the_slowest_upright_top_sleeps_by_its_linear_equations() -> None:
+    """A z̈ − i C s ż − m g l z = 0 of the tilt z about the tip: it grows where the roots leave the imaginary axis."""
+    low, high = band("spinning_top", "slowest-spin")
+
+    def growing(spin: float) -> float:
+        across = spinning_top.ACROSS + spinning_top.MASS * spinning_top.ARM**2
+        turning = spinning_top.ALONG * spin
+        fall = spinning_top.MASS * spinning_top.GRAVITY * spinning_top.ARM
+        return float(np.roots([across, -1j * turning, -fall]).real.max())
+
+    assert growing(low) > 0.05 and growing(high) < 1e-9
