@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from spook_tracker.engine.check import Rotation, Vector
 
 MOST_CORNERS = 64
-MOST_ROUND_A_FACE = 8
+MOST_ROUND_A_FACE = 16
 FLAT = 1e-9  # of the size: points nearer to a plane than this lie in it
 
 Face = tuple[int, ...]

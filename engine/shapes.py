@@ -210,10 +210,10 @@ class PlacedHull(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ConvexHull(Shape):
-    """The smallest convex solid round some points, in body axes: at most 64 corners, at most 8 round a face.
+    """The smallest convex solid round some points, in body axes: at most 64 corners, at most 16 round a face.
 
-    The body's origin is its centre of mass and its axes are principal, so the points must be given there, unless the
-    body gets its inertia. `ConvexHull.placed(points)` finds them for points anywhere.
+    The body's origin is its centre of mass, so the points must be given there, unless the body gets its inertia.
+    `ConvexHull.placed(points)` finds it, and the principal axes, for points anywhere.
     """
 
     kind: ClassVar[str] = "hull"
@@ -249,17 +249,20 @@ class ConvexHull(Shape):
         """m³."""
         return polytope.moments(self.corners, self.faces)[0]
 
-    def inertia(self, mass: float) -> Vector:
+    def inertia(self, mass: float) -> Vector | polytope.Tensor:
+        """A tensor, unless the body axes are principal. Raises SceneError off the centre of mass."""
         volume, centre, second = polytope.moments(self.corners, self.faces)
         tensor = polytope.inertia_of(second)
         size = max(math.hypot(*corner) for corner in self.corners)
         least = min(tensor[i][i] for i in range(3))
         off = max(abs(tensor[0][1]), abs(tensor[0][2]), abs(tensor[1][2]))
-        if math.hypot(*centre) > 1e-9 * size or off > 1e-9 * least:
+        if math.hypot(*centre) > 1e-9 * size:
             raise SceneError(
-                "convex hull: its centre of mass is not the origin, or its axes are not principal; "
-                "ConvexHull.placed(points) finds both, or give the body its inertia"
+                "convex hull: its centre of mass is not the origin; ConvexHull.placed(points) finds it, or give the body "
+                "its inertia"
             )
+        if off > 1e-9 * least:
+            return tuple(tuple(mass / volume * entry for entry in row) for row in tensor)  # type: ignore[return-value]
         return tuple(mass / volume * tensor[i][i] for i in range(3))  # type: ignore[return-value]
 
     def measures(self) -> tuple[float, ...]:
@@ -338,12 +341,19 @@ class Compound(Shape):
         tensor = [[0.0] * 3 for _ in range(3)]
         for part in self.parts:
             share = mass * (part.shape.volume / whole)
-            own = part.shape.inertia(share)
+            given: Any = part.shape.inertia(share)
+            own = (
+                given
+                if isinstance(given[0], tuple)
+                else tuple(tuple(given[i] if i == j else 0.0 for j in range(3)) for i in range(3))
+            )
             turn, at = rotation_matrix(part.orientation), part.position
             for i in range(3):
                 for j in range(3):
                     square = math.fsum(x * x for x in at) if i == j else 0.0
-                    turned = math.fsum(turn[i][k] * own[k] * turn[j][k] for k in range(3))  # type: ignore[operator]
+                    turned = math.fsum(
+                        turn[i][k] * own[k][m] * turn[j][m] for k in range(3) for m in range(3)
+                    )
                     tensor[i][j] += turned + share * (square - at[i] * at[j])
         largest = max(tensor[i][i] for i in range(3))
         for i, j in ((0, 1), (0, 2), (1, 2)):

@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     Box,
     Capsule,
     Compound,
+    ConvexHull,
     Energy,
     Final,
     Hinge,
@@ -166,6 +167,20 @@ def test_a_compound_sums_its_parts_by_steiner() -> None:
     found = turn @ np.diag(made.inertia) @ turn.T
     # Cells of a twentieth of the smallest size: their edge is off by a share of it, and ten in a row are square.
     np.testing.assert_allclose(found, 2.0 / total * tensor, rtol=0.0, atol=0.02 * found.max())
+
+
+def test_a_hull_beside_its_principal_axes_has_their_inertia() -> None:
+    corners = np.array([(x, y, z) for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (-0.5, 0.5)])
+    tilted = ConvexHull(tuple(tuple(map(float, p)) for p in corners @ rotation(TURN).T))  # type: ignore[misc]
+    hull = RigidBody(name="b", mass=3.0, position=(0.0, 0.0, 0.0), shape=tilted)
+    turn = rotation(np.array(hull.inertia_axes))
+    wanted = rotation(TURN) @ np.diag(Box((0.6, 0.4, 1.0)).inertia(3.0)) @ rotation(TURN).T
+    assert hull.inertia is not None
+    np.testing.assert_allclose(turn @ np.diag(hull.inertia) @ turn.T, wanted, atol=1e-14)
+    both = Compound((Part(shape=tilted), Part(shape=Sphere(0.1))))  # one of its parts has a tensor
+    share = 3.0 * tilted.volume / both.volume
+    ball = np.eye(3) * Sphere(0.1).inertia(3.0 - share)[0]
+    np.testing.assert_allclose(np.array(both.inertia(3.0)), wanted * share / 3.0 + ball, atol=1e-14)
 
 
 TILTED = ((2.0, 0.5, 0.0), (0.5, 2.0, 0.0), (0.0, 0.0, 3.0))

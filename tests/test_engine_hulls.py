@@ -335,9 +335,9 @@ def test_a_hull_in_a_compound_and_in_water_is_the_box_it_looks_like() -> None:
         (tuple((math.cos(k), math.sin(k), k / 70) for k in range(70)), "at most 64"),
         (
             tuple(
-                (math.cos(k * math.pi / 6), math.sin(k * math.pi / 6), z) for k in range(12) for z in (0, 1)
+                (math.cos(k * math.pi / 9), math.sin(k * math.pi / 9), z) for k in range(18) for z in (0, 1)
             ),
-            "at most 8",
+            "at most 16",
         ),
         ((*CUBE, (0.5 + 3e-9, 0.1, 0.1)), ""),  # a hair out of a face: either a corner or none, never a crash
     ],

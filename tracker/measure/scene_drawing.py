@@ -92,10 +92,11 @@ def _of_inertia(body: RigidBody) -> DrawnSolid:
         return DrawnSolid(kind="particle", position=body.position, velocity=body.velocity)
     x, y, z = body.inertia
     edges = (y + z - x, z + x - y, x + y - z)
+    tilted = body.inertia_axes != UPRIGHT
     return DrawnSolid(
         kind="box",
         position=body.position,
-        orientation=body.orientation,
+        orientation=multiplied(body.orientation, body.inertia_axes) if tilted else body.orientation,
         size=tuple(math.sqrt(max(0.0, 6.0 * edge / body.mass)) for edge in edges),
         velocity=body.velocity,
     )

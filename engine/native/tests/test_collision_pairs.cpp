@@ -21,6 +21,19 @@ void expect_vector(Vec3 v, Vec3 reference, double tolerance, int line) {
                 reference.z);
     ++failures;
 }
+/// All that is written of two manifolds: behind the points there is nothing.
+bool same_bits(const Manifold& a, const Manifold& b) {
+    bool same = a.count == b.count;
+    for (std::size_t k = 0; same && k < static_cast<std::size_t>(a.count); ++k) {
+        const ContactPoint &p = a.points[k], &q = b.points[k];
+        const double one[] = {p.position.x, p.position.y, p.position.z, p.normal.x,
+                              p.normal.y,   p.normal.z,   p.gap};
+        const double two[] = {q.position.x, q.position.y, q.position.z, q.normal.x,
+                              q.normal.y,   q.normal.z,   q.gap};
+        same = std::memcmp(one, two, sizeof one) == 0 && p.feature == q.feature;
+    }
+    return same;
+}
 #define EXPECT_VECTOR(v, ...) expect_vector(v, __VA_ARGS__, __LINE__)
 
 void spheres() {
@@ -219,7 +232,7 @@ void random_boxes_keep_their_promises() {
                    pb = turned(vector(), vector(), 3.0 * unit(random));
         const Manifold m = collide(a, pa, b, pb, 0.0), again = collide(a, pa, b, pb, 0.0),
                        swapped = collide(b, pb, a, pa, 0.0);
-        EXPECT(std::memcmp(&m, &again, sizeof m) == 0);
+        EXPECT(same_bits(m, again));
         EXPECT((m.count > 0) == (swapped.count > 0));
         double best = -1e300;  // along sampled directions, faces included
         for (int i = 0; i < 3; ++i)

@@ -51,6 +51,15 @@ Patch facing(const Facets& facets, Vec3 n) noexcept {
 
 namespace {
 
+/// Numbers of a corner of the first (0) or second (1) patch, and of the first of two points on a side. Those beyond
+/// eight stand behind all others.
+constexpr std::uint32_t corner_feature(std::uint32_t whose, int k) noexcept {
+    return (k < 8 ? 8 * whose : 64 + 16 * whose) + static_cast<std::uint32_t>(k);
+}
+constexpr std::uint32_t side_feature(int k) noexcept {
+    return (k < 8 ? 16 : 96) + 2 * static_cast<std::uint32_t>(k);
+}
+
 class Overlay {
 public:
     Overlay(const Patch& first, const Patch& second, const PartingAxis& axis, double radius, double margin,
@@ -63,10 +72,10 @@ public:
           margin_(margin),
           slop_(slop) {
         own_corners(first_, second_, 1.0, 0);
-        own_corners(second_, first_, -1.0, 8);
+        own_corners(second_, first_, -1.0, 1);
         if (first_.kind == Patch::disc && second_.kind == Patch::disc) rims();
-        else if (first_.kind == Patch::disc) crossings(second_, first_, -1.0, 16);
-        else if (second_.kind == Patch::disc) crossings(first_, second_, 1.0, 16);
+        else if (first_.kind == Patch::disc) crossings(second_, first_, -1.0);
+        else if (second_.kind == Patch::disc) crossings(first_, second_, 1.0);
         else if (second_.kind == Patch::polygon) through(first_, second_, 1.0);
         else if (first_.kind == Patch::polygon) through(second_, first_, -1.0);
     }
@@ -106,24 +115,25 @@ private:
         }
         return true;
     }
-    void own_corners(const Patch& own, const Patch& other, double sign, std::uint32_t feature) noexcept {
+    void own_corners(const Patch& own, const Patch& other, double sign, std::uint32_t whose) noexcept {
         if (other.kind == Patch::line || std::abs(dot(other.normal, n_)) < 0.1) return;
         for (int k = 0; k < own.count; ++k) {
             if (own.hidden_corners >> k & 1u) continue;
             const Vec3 p = own.corners[static_cast<std::size_t>(k)];
-            if (before(p, other)) add(p, other, sign, feature + static_cast<std::uint32_t>(k));
+            if (before(p, other)) add(p, other, sign, corner_feature(whose, k));
         }
     }
     /// Where the sides of a polygon, or a line, cross the rim of a disc.
-    void crossings(const Patch& straight, const Patch& disc, double sign, std::uint32_t feature) noexcept {
+    void crossings(const Patch& straight, const Patch& disc, double sign) noexcept {
         const double turned = dot(disc.normal, n_);
         if (std::abs(turned) < 0.1) return;
         const auto onto = [&](Vec3 p) {
             return p + (dot(disc.normal, disc.centre - p) / turned) * n_ - disc.centre;
         };
         const int sides = straight.kind == Patch::line ? straight.count - 1 : straight.count;
-        for (int k = 0; k < sides; ++k, feature += 2) {
+        for (int k = 0; k < sides; ++k) {
             if (straight.hidden_sides >> k & 1u) continue;
+            const std::uint32_t feature = side_feature(k);
             const Vec3 from = straight.corners[static_cast<std::size_t>(k)],
                        to = straight.corners[static_cast<std::size_t>((k + 1) % straight.count)];
             const Vec3 p = onto(from), along = onto(to) - p;
@@ -171,7 +181,7 @@ private:
                     low = -start / speed, low_side = static_cast<unsigned>(k);
             }
             if (misses || !(low < high)) continue;
-            const std::uint32_t feature = 16 + 2 * static_cast<std::uint32_t>(side);
+            const std::uint32_t feature = side_feature(side);
             if (low > 0.0 && !(polygon.hidden_sides >> low_side & 1u))
                 add(from + low * way, polygon, sign, feature);
             if (high < 1.0 && !(polygon.hidden_sides >> high_side & 1u))

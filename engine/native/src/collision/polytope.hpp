@@ -8,7 +8,7 @@
 namespace spook {
 
 struct Polytope {
-    static constexpr int most_corners = 64, most_round_a_face = 8;
+    static constexpr int most_corners = 64, most_round_a_face = 16;
 
     struct Face {
         int begin, count;  // its corners in `loops`, anticlockwise seen from outside

@@ -89,8 +89,10 @@ struct Polygon {
     }
 };
 
-/// Keeps what lies at or below the plane through `on` with the outward normal `out`; `side` numbers the plane.
-Polygon clipped(const Polygon& in, Vec3 on, Vec3 out, double slop, std::uint32_t side) noexcept {
+/// Keeps what lies at or below the plane through `on` with the outward normal `out`; `side` numbers the plane, and new
+/// points count from `corners`.
+Polygon clipped(const Polygon& in, Vec3 on, Vec3 out, double slop, std::uint32_t side,
+                std::uint32_t corners) noexcept {
     Polygon kept;
     for (int k = 0; k < in.count; ++k) {
         const Vertex &from = in.vertices[k], &to = in.vertices[(k + 1) % in.count];
@@ -99,7 +101,7 @@ Polygon clipped(const Polygon& in, Vec3 on, Vec3 out, double slop, std::uint32_t
         if (in0) kept.add(from);
         if (in0 != in1)
             kept.add({from.place + clamped(d0 / (d0 - d1), 0.0, 1.0) * (to.place - from.place),
-                      Polytope::most_round_a_face + 2 * side + (in1 ? 1u : 0u)});
+                      corners + 2 * side + (in1 ? 1u : 0u)});
     }
     return kept;
 }
@@ -116,18 +118,23 @@ void add_faces(Manifold& manifold, const Solid& reference, int index, const Soli
         const double cosine = dot(n, incident.normal(k));
         if (cosine < against - 1e-9) against = cosine, opposite = k;
     }
+    // Eight corners and as many sides take five bits, twice as many six.
     Polygon polygon;
     const Polytope::Face& other = incident.face(opposite);
+    const bool many = std::max(face.count, other.count) > 8;
+    const std::uint32_t corners = many ? 16 : 8;
     for (int k = 0; k < other.count; ++k)
         polygon.add({incident.corner_of(other, k), static_cast<std::uint32_t>(k)});
     for (int k = 0; k < face.count; ++k) {
         const Vec3 from = reference.corner_of(face, k), along = reference.corner_of(face, k + 1) - from;
         const Vec3 out = cross(along, n);
-        polygon = clipped(polygon, from, (1.0 / norm(out)) * out, slop, static_cast<std::uint32_t>(k));
+        polygon =
+            clipped(polygon, from, (1.0 / norm(out)) * out, slop, static_cast<std::uint32_t>(k), corners);
     }
     const double plane = dot(n, reference.corner_of(face, 0));
     // Which faces: the same for all points of a manifold, so that it need not be unique.
     const std::uint32_t faces = static_cast<std::uint32_t>(37 * index + 5 * opposite + (flip > 0.0)) % 1024u;
+    const std::uint32_t tag = many ? (faces % 512u) << 6 : faces << 5;
     for (int k = 0; k < polygon.count; ++k) {
         const Vec3 p = polygon.vertices[k].place;
         const double height = dot(n, p) - plane;
@@ -135,7 +142,7 @@ void add_faces(Manifold& manifold, const Solid& reference, int index, const Soli
         bool repeated = false;
         for (int j = 0; j < k && !repeated; ++j) repeated = norm(p - polygon.vertices[j].place) <= slop;
         if (!repeated)
-            manifold.add(p - 0.5 * height * n, flip * n, height, (faces << 5) | polygon.vertices[k].feature);
+            manifold.add(p - 0.5 * height * n, flip * n, height, tag | polygon.vertices[k].feature);
     }
 }
 
