@@ -10,6 +10,7 @@ import pytest
 from spook_tracker.engine import (
     WORLD,
     Box,
+    Capsule,
     Final,
     KineticEnergy,
     Lock,
@@ -151,3 +152,26 @@ def test_a_ball_bounces_where_the_map_of_its_steps_says() -> None:
 
     assert np.count_nonzero(np.diff(np.sign(np.diff(expected))) > 0) >= 5
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
+@pytest.mark.parametrize("psi", [0.3, 0.6, 0.9])
+def test_a_blow_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, solver: str) -> None:
+    """Met with v² + 2 g d below the start of the step, given back ψ times as fast, and slower by 2 g d up there again."""
+    rubber = Material(restitution=psi)
+    capsule = RigidBody(
+        name="capsule", mass=1.0, shape=Capsule(0.1, 0.5), position=(0.0, 0.0, 1.0), material=rubber
+    )
+    result = simulate(
+        Scene(bodies=(ground(rubber), capsule), gravity=DOWN),
+        time_step=TIME_STEP,
+        steps=40,
+        method=Method(solver=solver),
+        observe={"v": Trace(quantity=Velocity("capsule")), "x": Trace(quantity=Position("capsule"))},
+    )
+    v, gap = result["v"][:, 2], result["x"][:, 2] - 0.35
+    (blow, *_) = np.nonzero((v[:-1] < 0.0) & (v[1:] > 0.0))[0]
+    back = math.sqrt(psi**2 * (v[blow] ** 2 + 2.0 * GRAVITY * gap[blow]) - 2.0 * GRAVITY * gap[blow])
+
+    assert gap[blow] > 1e-3
+    assert v[blow + 1] == pytest.approx(back - GRAVITY * TIME_STEP, rel=1e-12)
