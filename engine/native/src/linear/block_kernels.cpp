@@ -25,5 +25,6 @@ const Kernels* chosen = &fastest();
 
 const Kernels& kernels() noexcept { return *chosen; }
 void use_portable_kernels(bool portable) noexcept { chosen = portable ? &portable_kernels() : &fastest(); }
+void use_kernels(const Kernels& kernels) noexcept { chosen = &kernels; }
 
 }  // namespace spook::kernel

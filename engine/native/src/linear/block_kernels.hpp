@@ -66,5 +66,7 @@ const Kernels& avx2_kernels() noexcept;  // the portable ones where the compiler
 const Kernels& kernels() noexcept;
 /// For tests: from now on the portable ones everywhere, or the fastest again. Not for use between threads.
 void use_portable_kernels(bool portable) noexcept;
+/// For tests: from now on these everywhere; they outlive their use. Not for use between threads.
+void use_kernels(const Kernels& kernels) noexcept;
 
 }  // namespace spook::kernel
