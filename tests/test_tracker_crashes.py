@@ -119,7 +119,8 @@ class Desk:
         """The command after the kill: to its end, and with what it is for."""
         process = self.start(self.words(command))
         _, told = process.communicate()
-        assert process.returncode in (0, 1), (command, told.decode())
+        done = command == "copy" and b"already holds runs" in told  # it was killed behind its last word
+        assert process.returncode in (0, 1) or done, (command, told.decode())
         if command in ("publish", "nightly"):
             assert (self.out / "index.html").is_file()
         if command == "copy":
