@@ -338,6 +338,15 @@ MUTANTS = (
     ),
     wrong(
         "contacts",
+        "early-blows",
+        "a blow ahead in a step forgets what gravity adds until bodies meet and takes on the way back",
+        "tests/test_engine_restitution.py::test_a_blow_ahead_in_the_step_gives_back_what_it_meets_with",
+        "contacts/contact_detect.cpp",
+        "if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));",
+        "if (left > 0.0) point.bounce = psi;",
+    ),
+    wrong(
+        "contacts",
         "tight-for-ever",
         "contacts that contradict each other by rounding are searched at one tolerance, however often that stalls",
         "engine/native/tests/test_pivot_solver.cpp::a_contradiction_of_rounding_ends_the_search",
