@@ -24,7 +24,7 @@ TIME_STEP = 1.0 / 60.0  # s
 LINKS, SWING = 26, 22.0  # s, as long as the thesis lets its chain swing
 HINGES = 10
 FALL_STEPS = 30  # half a second
-STANDING, STAND = 0.3, 10.0  # slope, below the friction coefficient of 0.5; s
+STANDING, LANDED, STAND = 0.3, 1.0, 10.0  # slope, below the friction coefficient of 0.5; s
 FLIGHT, FLIGHT_STEPS = 10.0, 1000  # m, in one second
 
 
@@ -58,10 +58,12 @@ def sag(simulate: Simulate) -> dict[str, float]:
 
 
 def creep(simulate: Simulate) -> dict[str, float]:
-    """How far a box slides in ten seconds on a slope that its friction holds [m]."""
-    seen = {"place": Final(quantity=Position("box"), from_start=True)}
-    moved = simulate(slope(STANDING), time_step=TIME_STEP, duration=STAND, observe=seen)["place"]
-    return {"creep": float(np.hypot(moved[0], moved[1]))}
+    """How far a box slides in ten seconds on a slope that its friction holds [m], once it has had a second to come to
+    rest: an engine whose contacts begin a step late lets it fall g sin(slope) h², .8 mm, before it holds it."""
+    first, way = round(LANDED / TIME_STEP), round(STAND / TIME_STEP)
+    seen = {"place": Trace(quantity=Position("box"), first=first, every=way)}
+    begin, end = simulate(slope(STANDING), time_step=TIME_STEP, steps=first + way, observe=seen)["place"]
+    return {"creep": float(np.hypot(end[0] - begin[0], end[1] - begin[1]))}
 
 
 def lost_digits(simulate: Simulate) -> dict[str, float]:
@@ -142,7 +144,7 @@ FACTS = {
         "Does a box creep where friction holds it",
         "creep",
         "m",
-        "how far a box slides in 10 s at a slope of 0.3 with a friction coefficient of 0.5",
+        "how far a box slides in 10 s, from the second on, at a slope of 0.3 with a friction coefficient of 0.5",
         creep,
         lambda: Example(scene=slope(STANDING), time_step=TIME_STEP),
     ),

@@ -32,7 +32,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
-from spook_tracker.scalar_tests.sweep import line, told
+from spook_tracker.scalar_tests.sweep import apart, line, told
 from spook_tracker.scalar_tests.vehicle import (
     FRICTION,
     FRONT,
@@ -141,7 +141,8 @@ def draw(simulate: Simulate) -> Drawing:
         ),
         x_label="torque of each rear wheel [N m]",
         y_label="acceleration up the slope [m/s²]",
-        note=f"From {told(SLIPS, 4)} N m on the rear wheels slip, and more torque only spins them.",
+        note=f"Up to {told(SLIPS, 4)} N m, where the rear wheels must slip, the largest distance from the closed form is "
+        f"{apart(found[: len(held)], map(climbing, held))} m/s².",
     )
 
 
@@ -162,7 +163,7 @@ TEST = ScalarTest(
         ("gravity", "9.81 m/s²"),
     ),
     theory=(
-        "a = (Σ T/r − M g sin θ)/(M + 4 I/r²) while no wheel slips.",
+        "a = (Σ T/r − M g sin(θ))/(M + 4 I/r²) while no wheel slips.",
         "Moments about the rear footprints, with m (a + g sin θ) at each height and 4 I a/r, give the loads.",
         "Rear wheels slip when Σ T/r − 2 I a/r² is more than µ times what they carry.",
     ),

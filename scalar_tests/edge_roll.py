@@ -123,7 +123,7 @@ TEST = ScalarTest(
     theory=(
         "The edge lets go where m v²/r = m g cos θ: cos θ = (2 + v₀²/(g r))/3 sliding, (10 + 7 v₀²/(g r))/17 rolling.",
         "From v₀² = g r on it leaves at once, with speed and spin as they were.",
-        "The discrete ball hops along the edge; after its last hop no friction turns it: √(2 h v²/(r k)) early.",
+        "The discrete ball hops along the edge; no friction turns it after its last hop, t = √(2 h v²/(r k)) before the end.",
     ),
     reference="Energy and the end of the contact force (closed form).",
     conclusion="Green: the normal follows the edge and pushes only. Red: the edge holds, catches or throws.",

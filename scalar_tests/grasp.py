@@ -230,7 +230,7 @@ TEST = ScalarTest(
     ),
     theory=(
         "It is held if 2 µ F ≥ m g.",
-        "Below, both contacts slip: a = g − 2 µ F/m, a millimetre in √(2 mm/a).",
+        "Below, both contacts slip: a = g − 2 µ F/m, and t = √(2 s/a) for a millimetre s.",
         "Sweeps settle slowly where forces are nearly at their bounds: the iterative solver needs more than the least force.",
     ),
     reference="Statics and Coulomb's law (closed form).",

@@ -30,7 +30,8 @@ from spook_tracker.scalar_tests.floating_box import (
     metacentric_height,
     scene,
 )
-from spook_tracker.scalar_tests.sweep import line, sweep
+from spook_tracker.scalar_tests.sweep import line, sweep, told
+from spook_tracker.scalar_tests.swing import phase
 
 LIGHT, HEAVY = 0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0)  # density ratios, GM = 0
 ROLLED = (0.15, 0.2, 0.8, 0.85)  # ratios at which the roll is timed
@@ -42,13 +43,12 @@ def roll_rate(ratio: float) -> float:
 
 
 def swing(simulate: Simulate, ratio: float, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
-    """Frequency [rad/s] of a small roll: x₊ + x₋ = 2 x cos φ, by least squares."""
+    """Frequency [rad/s] of a small roll."""
     observe = {"q": Trace(quantity=Orientation("log"))}
     asked = scene(ratio, roll=NUDGE)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     x = 2.0 * result["q"][:, 1]
-    inner = x[1:-1]
-    return math.acos(0.5 * float(inner @ (x[2:] + x[:-2])) / float(inner @ inner)) / time_step
+    return phase(x) / time_step
 
 
 def swing_limit(ratio: float) -> float:
@@ -111,7 +111,8 @@ def draw(simulate: Simulate) -> Drawing:
         curves=tuple(curves),
         x_label="density of the log over that of the water",
         y_label="frequency of the roll [rad/s]",
-        note="Between .2113 and .7887 there is none: the metacentre lies below the centre of mass.",
+        note=f"The lightest log drawn rolls at {told(curves[0].y[0], 3)} rad/s, {told(roll_rate(curves[0].x[0]), 3)} rad/s by its "
+        "metacentre.",
     )
 
 

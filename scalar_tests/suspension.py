@@ -36,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import apart, line, told
+from spook_tracker.scalar_tests.swing import phase
 
 GRAVITY = 9.81  # m/s²
 MASS, PITCHING = 1000.0, 1500.0  # kg, kg m² about y
@@ -111,13 +112,6 @@ def longest(simulate: Simulate) -> BreakPoint:
     """The longest step that carries the springs."""
     fastest = 2.0 / ROLL
     return break_point(functools.partial(bounded, simulate), 0.4 * fastest, 2.0 * fastest, resolution=0.002)
-
-
-def phase(values: np.ndarray) -> float:
-    """Turn per sample [rad] of a swing about zero: x₊ + x₋ = 2 x cos φ, by least squares."""
-    inner = values[1:-1]
-    cosine = 0.5 * float(inner @ (values[2:] + values[:-2])) / float(inner @ inner)
-    return math.acos(cosine)
 
 
 def swings(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:

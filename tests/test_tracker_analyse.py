@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 from dataclasses import dataclass
@@ -329,3 +330,30 @@ def test_a_stability_map_that_was_not_asked_for_is_not_missed():
     runs[2] = msgspec.structs.replace(runs[2], maps=(), asked=asked)
 
     assert not [f for f in tonight(DocumentHistory(runs), runs[2]) if ":damping" in f.series]
+
+
+def test_maps_that_were_dropped_for_newer_ones_are_not_missed(tmp_path):
+    """Only the newest run keeps its maps; an older one set beside it has lost nothing."""
+    from spook_tracker.tracker.judge.tonight import tonight
+    from spook_tracker.tracker.website.comparisons import comparisons
+    from spook_tracker.tracker.website.nights import book
+    from tests.synthetic_history import DocumentHistory, document
+
+    runs = [document(n) for n in range(4)]
+    runs[:3] = [msgspec.structs.replace(run, maps=()) for run in runs[:3]]
+    told = DocumentHistory(runs)
+    assert not [f for f in tonight(told, runs[1]) if ":damping" in f.series]
+    assert '"missing"' not in json.dumps(comparisons(told, book(told), (), {}).pairs)
+
+
+def test_the_first_page_does_not_stay_green_where_a_map_is_gone():
+    from spook_tracker.tracker.website.nights import book
+    from spook_tracker.tracker.website.page_index import health
+    from tests.synthetic_history import DocumentHistory, document
+
+    runs = [document(n) for n in range(4)]
+    assert health(book(DocumentHistory(runs)))[0] != "fail"
+    runs[3] = msgspec.structs.replace(runs[3], maps=())
+    lost = book(DocumentHistory(runs))
+    assert health(lost)[0] == "fail"
+    assert "fail" in [test.state for test in lost.tests if test.lost_maps]

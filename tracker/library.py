@@ -109,6 +109,7 @@ def _earlier(history: History, before: str, after: str) -> Any:
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
     """What changed between two versions, each named as on the command line; `before` may be fork-point."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
+    from spook_tracker.tracker.judge.tonight import is_newest
     from spook_tracker.tracker.judge.work import with_work
 
     new = history.resolve(after)
@@ -118,6 +119,7 @@ def compare(history: History, before: str, after: str, accepted: Sequence[Accept
             side=side_of(run),
             samples=with_work(history.samples(run.id), run.engine),
             maps=history.maps(run.id),
+            newest=is_newest(history, run),
         )
         for run in (old, new)
     )

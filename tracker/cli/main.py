@@ -107,6 +107,7 @@ def run_command(
     database: str,
 ) -> None:
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
+    from spook_tracker.tracker.measure.questions import EngineUnavailable
     from spook_tracker.tracker.measure.run import Request
 
     refuse_unwritable(json_file, junit_file)
@@ -123,7 +124,14 @@ def run_command(
     names = engine.split(",")
     red, kept = False, True
     for name in names:
-        document = _measure(request, name, limit, catalogue, None if no_record else database)
+        try:
+            document = _measure(request, name, limit, catalogue, None if no_record else database)
+        except EngineUnavailable as reason:
+            if len(names) == 1:
+                raise
+            click.echo(f"left out: {reason}", err=True)
+            kept = False
+            continue
         _print_run(document, everything)
         if json_file:
             kept &= _write(_of_engine(json_file, name, names), _json(document))
@@ -185,6 +193,7 @@ def nightly(
     from spook_tracker.tracker.cli.history import accepted_levels
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.library import nightly as night
+    from spook_tracker.tracker.measure.questions import EngineUnavailable
     from spook_tracker.tracker.measure.run import Request
     from spook_tracker.tracker.website.folder import refuse_unusable
     from spook_tracker.tracker.website.page_mutants import read_mutants
@@ -199,7 +208,10 @@ def nightly(
             sweep=not quick, workers=workers, memory_limit=memory << 20, time_limit=time_limit, trigger="nightly",
             executor=executor,
         )  # fmt: skip
-        _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
+        try:
+            _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
+        except EngineUnavailable as reason:
+            click.echo(f"left out: {reason}", err=True)
 
     measured: list[Any] = []
     judged: list[Any] = []
@@ -457,6 +469,6 @@ def _write(file: Path, text: str) -> bool:
 
 
 def _end(red: bool, kept: bool) -> None:
-    """Red goes before a file that could not be written."""
+    """Red goes before what could not be done: a file written, an engine asked."""
     if red or not kept:
         click.get_current_context().exit(RED if red else UNUSABLE)

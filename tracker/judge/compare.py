@@ -55,6 +55,9 @@ class ComparedRun:
     maps: Sequence[MapData] = ()
     whole: bool = False  # the whole catalogue was asked: what is not there was removed
     asked: Mapping[str, set[str]] | None = None  # tests by family; None: those it measured
+    newest: bool = (
+        True  # of its engine; of older runs the maps may have been dropped (tracker.store.retention)
+    )
 
     @property
     def night(self) -> date:
@@ -293,7 +296,7 @@ def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
     changes = []
     for old in before.maps:
         key = map_key(old)
-        if key not in new and old.test not in asked:
+        if key not in new and (old.test not in asked or not after.newest):
             continue
         verdict = judge_map(old, new[key]) if key in new else NO_MAP
         stands: Class = "fail" if verdict.word == "missing" else "watch" if verdict.red else "pass"

@@ -23,6 +23,10 @@ class RunError(TrackerError):
     """The run cannot be started as asked; one sentence that names what to do."""
 
 
+class EngineUnavailable(RunError):
+    """The engine is not here; where others were asked, too, they can still answer."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Questions:
     """Where the questions and the engine are found, by name."""
@@ -56,7 +60,7 @@ class Questions:
         try:
             return find(self.engine)
         except EngineMissing as error:
-            raise RunError(str(error)) from None
+            raise EngineUnavailable(str(error)) from None
 
     def simulate(self) -> Simulate:
         module = self.module()

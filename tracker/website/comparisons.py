@@ -30,6 +30,7 @@ from spook_tracker.tracker.judge.comparison_document import Change, CompareDocum
 from spook_tracker.tracker.judge.known import judged_in, known_of
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.series_history import Judged, is_release
+from spook_tracker.tracker.judge.tonight import is_newest
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.folder import digest
@@ -91,12 +92,13 @@ def comparisons(
                 maps=history.maps(night.id),
                 whole=asked_whole(night),
                 asked=asked_for(night, samples),
+                newest=is_newest(history, night),
             )
         return sides[night.id]
 
     verdicts = judged_in(told, [night.id for night in nights])
     words = json.dumps([titles, descriptions])
-    content = {night.id: night.content.encode() for night in nights}
+    content = {night.id: night.content.encode() + b"+" * is_newest(history, night) for night in nights}
     facts = {run: digest(words.encode(), content[run], *_facts(found)) for run, found in verdicts.items()}
     pairs: dict[str, Any] = {}
     made_from: dict[str, str] = {}

@@ -126,8 +126,9 @@ class TestHistory:
 
     @property
     def state(self) -> Class:
-        """The worst of its series; none where no series was judged."""
-        return worst(t.state for t in self.trends)
+        """The worst of its series and of maps that are gone; none where nothing was judged."""
+        states: list[Class] = [t.state for t in self.trends]
+        return worst([*states, "fail"] if self.lost_maps else states)
 
 
 @dataclass

@@ -36,7 +36,10 @@ def counted(book: Book) -> Count:
 def health(book: Book) -> tuple[Class, Count]:
     """What the newest night stands for, and how many limits and set points hold."""
     found = counted(book)
-    state = worst(t.state for t in tonight(book))
+    states: list[Class] = [t.state for t in tonight(book)]
+    if any(test.lost_maps for test in book.tests):
+        states.append("fail")
+    state = worst(states)
     return "none" if state == "followed" and not found.expected else state, found
 
 
@@ -56,7 +59,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     step = steps.pop() if len(steps) == 1 else None
     context = {
         "state": state,
-        "headline": _headline(state, found, tonight(book)),
+        "headline": _headline(state, found, tonight(book), sum(len(test.lost_maps) for test in book.tests)),
         "summary": summary(book),
         "new": new,
         "old": old[:MOST_OLD],
@@ -104,7 +107,7 @@ def counts_by_night(book: Book, most: int) -> dict[int, Count]:
     return {night: count_points(found) for night, found in pairs.items()}
 
 
-def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:
+def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: int) -> str:
     if state == "none":
         return "No limit was tested tonight"
     if found.broken:
@@ -119,6 +122,10 @@ def _headline(state: Class, found: Count, fresh: Sequence[Trend]) -> str:
             "Every limit is kept; one value is missing"
             if lost == 1
             else f"Every limit is kept; {lost} values are missing"
+        )
+    if maps:
+        return "Every limit is kept; " + (
+            "one stability map is missing" if maps == 1 else f"{maps} stability maps are missing"
         )
     red = sum(t.state == "watch" for t in fresh)
     if red:
