@@ -53,8 +53,8 @@ def test_what_is_reported_is_what_is_judged(scene: Scene, sweeps: int) -> None:
     assert f"off by up to {low.residual:.3g} m/s" in low.failure
 
 
-@pytest.mark.parametrize("sweeps", [5, 10, 50, 200])
-def test_a_hundred_boxes_on_sweeps_are_no_answer(sweeps: int) -> None:
+@pytest.mark.parametrize(("sweeps", "sunk"), [(5, False), (10, False), (50, True), (200, True)])
+def test_a_hundred_boxes_on_sweeps_are_no_answer(sweeps: int, sunk: bool) -> None:
     """It names the first step and the body: a row is off by more than allowed, or boxes sank step after step."""
     size, deep = 1.0, Maximum(quantity=Penetration())
     result = simulate(
@@ -68,8 +68,7 @@ def test_a_hundred_boxes_on_sweeps_are_no_answer(sweeps: int) -> None:
     assert result.status == "unsettled"
     assert result.failed_step is not None and result.failed_step <= 60
     assert result.failed_body is not None and result.failed_body.startswith("box")
-    assert result.residual > 0.1 or float(np.max(result["deep"])) > 0.02 * size / 2
-    assert result.residual > 0.1 or sweeps > 10
+    assert result.residual > 0.1 if not sunk else float(result["deep"]) > 0.02 * size / 2
 
 
 def test_solves_that_settled_leave_no_residual_to_speak_of() -> None:

@@ -15,6 +15,9 @@ namespace {
 constexpr int late_rounds = 3;  // of sweeps for contacts found after the last one
 constexpr int cold = -2;        // before every sweep
 
+/// What is not a number stays.
+double larger(double a, double b) noexcept { return a >= b || std::isnan(a) ? a : b; }
+
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
 Mat3 symmetric_inverse(const Mat6& mass) noexcept {
@@ -74,8 +77,12 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     hot_.assign(bodies_ + 1, cold);
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
-        for (const Beyond& other : rows.beyond) join(std::max(rows.first, rows.second), other.body);
-        link(k, rows.first, rows.second);
+        int anchor = std::max(rows.first, rows.second);
+        for (const Beyond& other : rows.beyond) {
+            if (anchor < 0) anchor = other.body;
+            else if (other.body >= 0) join(anchor, other.body);
+        }
+        link(k, anchor, anchor == rows.first ? rows.second : rows.first);
     }
 }
 
@@ -147,7 +154,7 @@ void ContactSweeps::join(int first, int second) {
     if (a == b) return;
     if (a > b) std::swap(a, b);
     parent_[b] = a;
-    left_[a] = std::max(left_[a], left_[b]);
+    left_[a] = larger(left_[a], left_[b]);
     spent_[a] = spent_[a] || spent_[b];
     if (!chained_ || head_[b] < 0) return;
     if (head_[a] >= 0) {
@@ -253,7 +260,7 @@ double ContactSweeps::sweep_island(int island) noexcept {
         fetch(item);
         const double own = item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
                                                : update(contacts_[item - joint_count_]);
-        if (!(own <= change)) change = own;  // what is not a number stays
+        change = larger(change, own);
     }
     return change;
 }
@@ -272,7 +279,7 @@ double ContactSweeps::sweep_hot(int island, double focus) noexcept {
         if (!joint && hot_[bodies.first] < stamp_ - 1 && hot_[bodies.second] < stamp_ - 1) continue;
         const double own = joint ? joints_.update_joint(static_cast<std::size_t>(item))
                                  : update(contacts_[item - joint_count_]);
-        if (!(own <= change)) change = own;
+        change = larger(change, own);
         if (!(own <= focus)) heat(bodies);
     }
     return change;
@@ -296,7 +303,7 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
             if (!active_[island]) continue;
             const bool spent = spent_[island] != 0;
             const double change = spent ? sweep_hot(island, focus) : sweep_island(island);
-            left_[island] = spent ? std::max(left_[island], change) : change;
+            left_[island] = spent ? larger(left_[island], change) : change;
             ++report.sweeps;
             active_[island] = !(change <= (spent ? focus : tolerance));
             any = any || active_[island];
@@ -313,9 +320,11 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
         until = sweep + iterations;
         look = sweep + 2;
     }
-    for (const int island : roots_)
-        if (!(left_[island] <= report.residual)) report.residual = left_[island];
-    report.converged = report.residual <= tolerance;
+    for (const int island : roots_) {
+        report.residual = larger(report.residual, left_[island]);
+        report.converged = report.converged && !active_[island];
+    }
+    report.converged = report.converged && report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
     return report;
 }

@@ -31,6 +31,7 @@ Vec3 turn_of(const Mat3& inertia, Vec3 l, Vec3 along) noexcept {
     const double det = dot(r0, cross(r1, r2)), size = m[0] + m[4] + m[8];
     if (std::fabs(det) > IN_A_ROW * size * size * size)
         return (1.0 / det) * Vec3{dot(l, cross(r1, r2)), dot(r0, cross(l, r2)), dot(r0, cross(r1, l))};
+    if (!(size > 0.0)) return {};
     return (2.0 / size) * (l - (dot(l, along) / dot(along, along)) * along);
 }
 
@@ -92,8 +93,9 @@ void SaddleBlocks::find_islands(const Nodes& nodes, const DistanceRows& rows) {
     for (int node = 0; node < count; ++node)
         if (block_of_node_[node] >= 0) members[find(node)].push_back(node);
     const int held = find(count);
+    islands_.clear();
     for (int k = 0; k <= count; ++k)
-        if (k != held && !members[k].empty()) islands_.push_back(std::move(members[k]));
+        if (k != held && members[k].size() > 1) islands_.push_back(std::move(members[k]));
 }
 
 /// Σ x × m dv of what floats is 0 but for the forces across the rows, which leave a couple.

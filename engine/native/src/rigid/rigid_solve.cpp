@@ -195,8 +195,14 @@ bool RigidSystem::factor_and_solve() {
         matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
         [this](std::span<const double> left) { return settled(left); });
     if (redundant_.finite() && doubtful) find_contradiction();
-    if (redundant_.parted() && method_.corrections == 0 && !composed_)
-        find_repeated() ? note_locked() : void(live_.locked = body_of(busiest_block()));
+    if (redundant_.parted() && method_.corrections == 0 && !composed_) {
+        if (find_repeated()) {
+            note_locked();
+        } else {
+            live_.named.assign(1, joints_.blocks()[busiest_block()].joint);
+            live_.locked = body_of(busiest_block());
+        }
+    }
     return redundant_.finite();
 }
 

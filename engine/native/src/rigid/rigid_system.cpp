@@ -165,8 +165,8 @@ void RigidSystem::reset(StageClock* clock) {
     live_.bodies = start_;
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
     redundant_.reset(matrix_);
-    may_lock_ = may_lock();
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
+    may_lock_ = may_lock();
     joints_.breaks.clear();
     clock_ = clock;
     rounds_ = sweeps_ = 0;
