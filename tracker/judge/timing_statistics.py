@@ -67,7 +67,7 @@ def compare_times(
     floor = max(FLOOR, 2.0 * spread)
     if own and often >= FEWEST and len(rungs) >= FEWEST_RUNGS:
         scatter = median(abs(log - median(logs)) for log in logs)
-        floor = max(LEAST, CLEAR * max(spread, scatter))
+        floor = max(LEAST, min(floor, CLEAR * max(spread, scatter)))  # better evidence never asks for more
     work = [b.instructions / a.instructions for a, b in rungs if a.instructions and b.instructions]
     if work and len(work) == len(rungs) and abs(median(work) - 1.0) < SAME_WORK:
         floor = max(floor, SAME_WORK_FLOOR)
