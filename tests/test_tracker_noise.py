@@ -254,7 +254,9 @@ def test_the_floor_of_two_sessions_follows_what_repeats_and_rungs_show() -> None
     assert (quiet.floor, quiet.slower) == (0.01, True)
     assert noisy.floor > 0.08
     assert not noisy.slower
-    assert compare_times(by_the_processor(1, noise=0.03), by_the_processor(2, 1.2, noise=0.03)).slower
+    loud = compare_times(by_the_processor(5, noise=0.08), by_the_processor(55, 1.2, noise=0.08))
+    assert loud.floor < 0.15  # rungs and repeats may ask for less, never for more
+    assert loud.slower
     assert compare_times(ladder(1), ladder(2, 1.08)).floor >= 0.1  # by the clock alone
     assert compare_times(by_the_processor(1)[:2], by_the_processor(2)[:2]).floor >= 0.1  # of few rungs
 
