@@ -98,7 +98,7 @@ def comparisons(
 
     verdicts = judged_in(told, [night.id for night in nights])
     words = json.dumps([titles, descriptions])
-    content = {night.id: night.content.encode() + b"+" * is_newest(history, night) for night in nights}
+    content = {night.id: night.content.encode() for night in nights}
     facts = {run: digest(words.encode(), content[run], *_facts(found)) for run, found in verdicts.items()}
     pairs: dict[str, Any] = {}
     made_from: dict[str, str] = {}
