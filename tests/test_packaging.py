@@ -23,7 +23,7 @@ from pathlib import Path
 import pytest
 
 from spook_tracker.engine import _core
-from tests.installed_wheel import ask, lay_out, run
+from tests.installed_wheel import ASKS, THEIRS, ask, lay_out, run
 
 backend = pytest.importorskip("scikit_build_core.build", reason="the build backend is not installed here")
 
@@ -34,7 +34,6 @@ SLIM, EVERYTHING = 150, 350  # MB installed, as `du -m` counts: without an extra
 OURS = (
     "standard,data,dask,postgresql"  # the other extras are other people's engines, and tools of development
 )
-real = pytest.mark.skipif(not REAL, reason="builds, installs and weighs: make package")
 elsewhere = pytest.mark.skipif(sys.platform == "win32", reason="environments look different there")
 
 
@@ -162,6 +161,40 @@ def test_the_wheel_is_complete_under_one_name(wheel: Path) -> None:
     assert {name.split("/")[0].partition("-")[0] for name in names} == {"spook_tracker"}
 
 
+@elsewhere
+def test_it_works_beside_a_teams_own_engine_tracker_and_scalar_tests(installed: Path, tmp_path: Path) -> None:
+    """Theirs are installed beside it and lie in the folder they work in; the questions are ours."""
+    site = next(installed.glob("lib/python3*/site-packages"))
+    for name in THEIRS:
+        for place in (site, tmp_path):
+            (place / name).mkdir(exist_ok=True)
+            (place / name / "__init__.py").write_text('OWNER = "the team"\n')
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "TRACKER"))
+    }
+
+    def said(*command: str) -> str:
+        done = subprocess.run(
+            [str(installed / "bin" / command[0]), *command[1:]],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, (command, done.stdout, done.stderr)
+        return done.stdout
+
+    try:
+        assert said("python", "-c", ASKS).startswith(str(installed))
+        assert said("python", "-m", "spook_tracker", "--version") == said("tracker", "--version")
+        if not REAL:  # what is installed as pip makes it has no SciPy, which our own questions want
+            said("tracker", "run", "falling_object", "--workers", "2")  # spawned workers import by name
+            assert "falling_object" in said("tracker", "trend", "falling_object")
+            said("tracker", "publish", "--out", "public")
+            assert (tmp_path / "public" / "index.html").is_file()
+            said("tracker", "db", "check")
+    finally:
+        for name in THEIRS:
+            shutil.rmtree(site / name)
+
+
 HIDDEN = """
 import sys
 
@@ -204,7 +237,7 @@ def megabytes(folder: Path) -> float:
     return sum(path.lstat().st_blocks * 512 for path in folder.rglob("*")) / 2**20
 
 
-@real
+@pytest.mark.package
 def test_a_slim_installation_is_small(installed: Path, tmp_path: Path) -> None:
     """As pip leaves it, byte code of everything included, and after a night."""
     lay_out(tmp_path)
@@ -215,7 +248,7 @@ def test_a_slim_installation_is_small(installed: Path, tmp_path: Path) -> None:
     assert found <= SLIM
 
 
-@real
+@pytest.mark.package
 def test_everything_installed_is_small(wheel: Path, tmp_path: Path) -> None:
     """Without the byte code of what is never imported (`--no-compile`), but with that of a night, a table, a website."""
     python, site = environment(tmp_path / "environment")
@@ -238,7 +271,7 @@ def test_everything_installed_is_small(wheel: Path, tmp_path: Path) -> None:
     assert after <= EVERYTHING
 
 
-@real
+@pytest.mark.package
 def test_the_commit_travels_from_the_archive_into_the_wheel(
     installed: Path, sources: Path, tmp_path: Path
 ) -> None:
@@ -254,7 +287,7 @@ def test_the_commit_travels_from_the_archive_into_the_wheel(
     assert version != "0+unknown"
 
 
-@real
+@pytest.mark.package
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="manylinux is Linux")
 def test_the_wheel_needs_nothing_that_linux_distributions_lack(wheel: Path) -> None:
     """auditwheel names a manylinux policy for it: nothing but what every distribution has is linked. abi3audit sees the
@@ -274,7 +307,7 @@ def test_the_wheel_needs_nothing_that_linux_distributions_lack(wheel: Path) -> N
     said("abi3audit", "--strict", str(wheel))
 
 
-@real
+@pytest.mark.package
 def test_the_release_builds_one_wheel_a_machine() -> None:
     """cibuildwheel reads our settings; to build by them it wants containers, which not every machine has."""
     programs = Path(sys.executable).parent
@@ -307,7 +340,7 @@ def test_there_is_a_manual_page_for_every_command(tmp_path: Path) -> None:
     assert "1.2.3" in page
 
 
-@real
+@pytest.mark.package
 @elsewhere
 def test_the_manual_pages_are_installed(installed: Path) -> None:
     page = installed / "share" / "man" / "man1" / "tracker-run.1"
