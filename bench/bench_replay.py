@@ -29,7 +29,7 @@ BODIES = 10_000
 MOST = 8.0  # ms of script a frame
 PATIENCE = 300.0  # s
 FRAMES, WARM = 30, 5  # without a graphics card a picture of this many takes a good part of a second to draw
-SCRIPTS = ("site.js", "three-scene.min.js", "scene-view.js", "player.js")
+SCRIPTS = ("site.js", "three-scene.min.js", "scene-poses.js", "scene-marks.js", "scene-view.js", "player.js")
 PAGE = '<!DOCTYPE html><meta charset="utf-8"><title>frames</title><figure style="width:480px"></figure>'
 MOVIE = """
   const n = arguments[0], count = 60, position = new Float32Array(3 * n * count), orientation = new Float32Array(4 * n * count);

@@ -154,6 +154,12 @@ def test_no_file_is_longer_than_contributing_says() -> None:
         for path in (ROOT / room).rglob("*")
         if path.suffix in (".py", ".cpp", ".hpp", ".inl")
     ]
+    files += [
+        path
+        for path in (ROOT / "site").rglob("*")
+        if path.suffix in (".js", ".css", ".html") and ".min." not in path.name
+    ]
 
     assert len(files) > 500
+    assert {".js", ".css", ".html"} <= {path.suffix for path in files}
     assert {path.name: n for path in files if (n := len(path.read_text().splitlines())) > most} == {}

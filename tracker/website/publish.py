@@ -57,6 +57,8 @@ ASSETS = {  # name in templates: file under site/static
     "compare": "compare.js",
     "plotly": "plotly-cartesian.min.js",
     "three": "three-scene.min.js",
+    "poses": "scene-poses.js",
+    "marks": "scene-marks.js",
     "view": "scene-view.js",
     "player": "player.js",
     "replay": "replay.js",
