@@ -8,8 +8,12 @@ A picture of any page, such as those that `make pictures` puts into docs/ (bench
 from __future__ import annotations
 
 import argparse
+import ctypes
 import os
 import shutil
+import signal
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,20 +35,39 @@ def programs() -> tuple[str, str] | None:
     return (chrome, driver) if chrome and driver else None
 
 
+def _with_its_parent() -> None:
+    """In a driver before it begins: ends with the process that started it, however that ends."""
+    die_with_parent = 1  # PR_SET_PDEATHSIG
+    ctypes.CDLL(None).prctl(die_with_parent, int(signal.SIGKILL))
+
+
 @contextmanager
 def browser(chrome: str, driver: str) -> Iterator[Any]:
-    """A driver of a browser that cannot reach anything but files, and dies with the test."""
+    """A driver of a browser that cannot reach anything but files, and dies with the test.
+
+    Also with one that is killed, on Linux: the driver by the system's word, and the browser because what it is
+    told comes through the driver's pipe, which closes then.
+    """
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
     options = webdriver.ChromeOptions()
     options.binary_location = chrome
-    for argument in ("--headless=new", "--disable-gpu", "--hide-scrollbars", "--disable-dev-shm-usage"):
+    for argument in (
+        "--headless=new",
+        "--disable-gpu",
+        "--hide-scrollbars",
+        "--disable-dev-shm-usage",
+        "--remote-debugging-pipe",
+    ):
         options.add_argument(argument)
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         options.add_argument("--no-sandbox")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    opened = webdriver.Chrome(options=options, service=Service(driver))
+    # The word is given when the starting thread ends: of others than the first that may be long before the process.
+    leashed = sys.platform == "linux" and threading.current_thread() is threading.main_thread()
+    started = {"preexec_fn": _with_its_parent} if leashed else {}
+    opened = webdriver.Chrome(options=options, service=Service(driver, popen_kw=started))
     try:
         opened.execute_cdp_cmd("Network.enable", {})
         nothing = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
