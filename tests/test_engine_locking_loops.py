@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Callable
@@ -13,14 +14,18 @@ from scipy.integrate import solve_ivp
 from spook_tracker.engine import (
     PLAIN,
     WORLD,
+    Distance,
     Final,
     Hinge,
+    JointSpring,
     Method,
+    Motor,
     Orientation,
     Position,
     Result,
     RigidBody,
     Scene,
+    Sinusoid,
     Trace,
     simulate,
 )
@@ -29,6 +34,7 @@ from spook_tracker.scalar_tests.multibody.library import turned
 
 G = 9.81  # m/s²
 H = 1 / 240  # s
+EAST = np.array([1.0, 0.0, 0.0])
 CURVED = Method(half_step_velocities=True, corrections=1)
 
 
@@ -251,3 +257,81 @@ def test_a_structure_at_rest_is_not_called_locked() -> None:
 
     assert simulate(hung, time_step=1 / 60, duration=5.0).status == "completed"
     assert simulate(rope, time_step=1 / 240, duration=2.0).status == "completed"
+
+
+def beside(scene: Scene, other: str) -> Scene:
+    """The same, and something that no joint ties to it."""
+    heavy = other == "a heavy pendulum"
+    count, mass, length = (1, 1e4, 1.0) if heavy else (200, 1.0, 0.1)
+    arms = [np.array([5.0 + k, 5.0, 5.0]) for k in range(count)]
+    rods = tuple(link(f"arm {k}", a, a + length * EAST, mass) for k, a in enumerate(arms))
+    hinges = tuple(
+        Hinge(name=f"axle {k}", between=(WORLD, f"arm {k}"), at=tuple(a), axis=(0.0, 1.0, 1.0))
+        for k, a in enumerate(arms)
+    )
+    return dataclasses.replace(scene, bodies=scene.bodies + rods, constraints=scene.constraints + hinges)
+
+
+@pytest.mark.parametrize("other", ["a heavy pendulum", "many hinges"])
+@pytest.mark.parametrize("compliance", [0.0, 1e-12])
+@pytest.mark.parametrize("tilt", [1e-4, 1e-2])
+def test_what_is_not_tied_to_a_loop_does_not_hide_that_it_locks(
+    other: str, compliance: float, tilt: float
+) -> None:
+    """Neither by the energy it moves with nor by the number of its joints."""
+    alone = simulate(four_bar(compliance, tilt), time_step=H, duration=1.0)
+    result = simulate(beside(four_bar(compliance, tilt), other), time_step=H, duration=1.0)
+
+    assert "locked by redundant joints" in result.failure and "axle" not in result.failure
+    assert result.failure == alone.failure and result.failed_step == alone.failed_step
+
+
+@pytest.mark.parametrize("other", ["a heavy pendulum", "many hinges"])
+def test_bricards_lock_is_seen_beside_others(other: str) -> None:
+    result = simulate(beside(bricard.scene(H, 1e-14), other), time_step=H, duration=1.0)
+
+    assert all(f"'P{k}'" in result.failure for k in range(6)) and "axle" not in result.failure
+
+
+def test_a_truss_is_not_called_a_mechanism_for_what_swings_beside_it() -> None:
+    """A four-bar between two walls and a fifth rod across stand; a pendulum beside them is all that moves."""
+    truss = four_bar(1e-9)
+    brace = Distance(name="brace", between=((0.0, 0.0, 0.0), "coupler"), compliance=1e-9)
+    stands = dataclasses.replace(truss, constraints=(*truss.constraints, brace))
+
+    for scene in (stands, beside(stands, "a heavy pendulum")):
+        assert simulate(scene, time_step=H, duration=2.0).status == "completed"
+
+
+@pytest.mark.parametrize("gravity", [0.0, 1e-9, 1e-3])
+@pytest.mark.parametrize("compliance", [0.0, 1e-12, 1e-9])
+@pytest.mark.parametrize("pace", [0.5, 20.0])
+def test_a_loop_that_is_driven_is_not_called_locked(gravity: float, compliance: float, pace: float) -> None:
+    """What motors and springs push is a load: next to gravity alone the little that rows repeat looked large."""
+    driven = four_bar(compliance)
+    drives = (
+        {"motor": Motor(speed=pace)},
+        {"spring": JointSpring(stiffness=pace**2, rest=0.3)},
+        {"spring": JointSpring(stiffness=1e6, rest=Sinusoid(amplitude=0.2, frequency=pace / 5.0))},
+    )
+    for drive in drives:
+        crank = dataclasses.replace(driven.constraints[0], **drive)
+        scene = dataclasses.replace(
+            driven, constraints=(crank, *driven.constraints[1:]), gravity=(0.0, -gravity, 0.0)
+        )
+        h = H if pace < 1.0 else H / 8
+        run = simulate(scene, time_step=h, duration=0.25)
+        assert run.status == "completed", run.failure
+
+
+@pytest.mark.parametrize("compliance", [0.0, 1e-12])
+@pytest.mark.parametrize("stiffness", [1.0, 1e4])
+def test_a_spring_on_a_joint_does_not_hide_that_its_loop_locks(stiffness: float, compliance: float) -> None:
+    """A spring holds no coordinate: the loop has as much to move as without it."""
+    tilted = four_bar(compliance, 1e-3)
+    sprung = dataclasses.replace(tilted.constraints[0], spring=JointSpring(stiffness=stiffness, rest=0.5))
+    scene = dataclasses.replace(
+        tilted, constraints=(sprung, *tilted.constraints[1:]), gravity=(0.0, 0.0, 0.0)
+    )
+
+    assert "locked by redundant joints" in simulate(scene, time_step=H, duration=1.0).failure

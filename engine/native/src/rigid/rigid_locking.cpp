@@ -25,130 +25,199 @@ constexpr double TOLD = 1e-3;      // of the largest share: a joint that is name
 
 }  // namespace
 
-/// Whether joints close a loop in which some rows repeat others, and something is left to move.
-bool RigidSystem::may_lock() {
-    if (solver_ != RigidSolver::block || composed_ || !locked_.empty()) return false;
-    std::vector<int> root(tied_.size() + 1);  // the last one is all that does not move by itself
+/// The loops that joints close, each with all that joints hang on it: what else moves in the scene says nothing of it.
+/// Motors, limits and springs tie nothing here; they are loads.
+void RigidSystem::find_loops() {
+    if (composed_) return;
+    const auto blocks = joints_.blocks();
+    const int world = static_cast<int>(tied_.size());  // all that does not move by itself
+    std::vector<int> closing(tied_.size() + 1), root(tied_.size());
+    std::iota(closing.begin(), closing.end(), 0);
     std::iota(root.begin(), root.end(), 0);
-    const auto find = [&root](int i) {
-        while (root[i] != i) i = root[i] = root[root[i]];
+    const auto find = [](std::vector<int>& up, int i) {
+        while (up[i] != i) i = up[i] = up[up[i]];
         return i;
     };
-    const auto place = [this](int body) {
-        return body < 0 || slot_[body] < 0 ? static_cast<int>(tied_.size()) : slot_[body];
-    };
-    bool loops = false;
-    for (const JointBlock& block : joints_.blocks()) {
-        if (block.axial) continue;
-        const int a = find(place(block.first)), b = find(place(block.second));
-        loops = loops || a == b;
-        root[a] = b;
+    const auto place = [&](int body) { return body < 0 || slot_[body] < 0 ? world : slot_[body]; };
+    std::vector<int> anchor(blocks.size(), -1),
+        closes;  // per block: one of its members; some member of a loop
+    for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
+        const int one = place(blocks[k].first), two = place(blocks[k].second);
+        const auto tie = [&](int member) {
+            if (member == world) return;
+            if (anchor[k] >= 0) root[find(root, member)] = find(root, anchor[k]);
+            else anchor[k] = member;
+        };
+        if (blocks[k].axial) continue;
+        tie(one), tie(two);
+        for (int body : joints_.others(k)) tie(place(body));
+        const int a = find(closing, one), b = find(closing, two);
+        if (a == b && anchor[k] >= 0) closes.push_back(anchor[k]);
+        closing[a] = b;
     }
-    if (!loops) return false;
+    std::vector<int> loop_of(tied_.size(), -1), at(tied_.size());
+    for (int member : closes) {
+        int& loop = loop_of[find(root, member)];
+        if (loop >= 0) continue;
+        loop = static_cast<int>(loops_.size());
+        loops_.emplace_back();
+    }
+    const auto loop_at = [&](int member) { return loop_of[find(root, member)]; };
+    for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
+        if (anchor[k] >= 0 && loop_at(anchor[k]) >= 0) loops_[loop_at(anchor[k])].blocks.push_back(k);
+        if (!blocks[k].axial) continue;
+        const int one = place(blocks[k].first), two = place(blocks[k].second);
+        const int first = one == world ? -1 : loop_at(one), second = two == world ? -1 : loop_at(two);
+        if (first >= 0) loops_[first].drives.push_back(k);
+        if (second >= 0 && second != first) loops_[second].drives.push_back(k);
+    }
+    for (int member = 0; member < world; ++member) {
+        if (loop_at(member) < 0) continue;
+        Loop& loop = loops_[loop_at(member)];
+        at[member] = static_cast<int>(loop.members.size());
+        loop.members.push_back(member);
+    }
+    std::vector<int> row_at(blocks.size());
+    std::vector<std::vector<BlockEdge>> edges(loops_.size());
+    for (const Loop& loop : loops_)
+        for (std::size_t k = 0; k < loop.blocks.size(); ++k) row_at[loop.blocks[k]] = static_cast<int>(k);
+    for (int edge = 0; edge < static_cast<int>(matrix_.edges().size()); ++edge) {
+        const BlockEdge& e = matrix_.edges()[edge];
+        if (anchor[e.first] < 0 || loop_at(anchor[e.first]) < 0) continue;
+        const int index = loop_at(anchor[e.first]);
+        Loop& loop = loops_[index];
+        const int member = e.second - static_cast<int>(blocks.size());
+        edges[index].push_back({row_at[e.first], static_cast<int>(loop.blocks.size()) + at[member]});
+        loop.edges.push_back(edge);
+    }
+    for (std::size_t index = 0; index < loops_.size(); ++index) {
+        Loop& loop = loops_[index];
+        std::vector<int> sizes;
+        for (int k : loop.blocks) sizes.push_back(blocks[k].size);
+        for (int member : loop.members) sizes.push_back(constants_[tied_[member]].particle ? 3 : 6);
+        std::vector<std::uint8_t> is_row(sizes.size(), 0);
+        std::fill_n(is_row.begin(), loop.blocks.size(), std::uint8_t{1});
+        loop.probe.analyse(sizes, edges[index], is_row, true);
+    }
+}
+
+/// In which loops some rows repeat others, and something is left to move.
+void RigidSystem::judge_loops() {
+    live_.watched.assign(loops_.size(), {});
+    if (loops_.empty()) return;
     assemble_blocks();
-    if (stiff_) stiffness_.assign(tied_.size(), Mat3{});
-    fill_inertias();
-    take_probe(0.0);
-    probe_.clear_counters();
-    if (!probe_.factor(NEARLY)) return false;
-    const auto redundant = static_cast<std::int64_t>(probe_.counters().floored_pivots);
-    return redundant > 0 && probe_.unknowns() - 2 * static_cast<std::int64_t>(rows_) + redundant > 0;
-}
-
-/// The matrix with rigid rows, but for a softness of that part of what each moves; and with every body as heavy as any
-/// other, as far across as its joints lie: whether rows repeat each other does not depend on masses.
-void RigidSystem::take_probe(double part) {
-    const auto blocks = joints_.blocks();
-    const int row_blocks = static_cast<int>(blocks.size());
-    probe_ = matrix_;
-    probe_.shift_constraints(0.0);
-    find_extents();
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const int n = probe_.size(row_blocks + static_cast<int>(k));
-        double* diagonal = probe_.diagonal(row_blocks + static_cast<int>(k));
-        for (int i = 0; i < n; ++i)
-            for (int j = 0; j < n; ++j) diagonal[n * i + j] = i != j ? 0.0 : i < 3 ? 1.0 : square_[k];
+    for (Loop& loop : loops_) {
+        take_probe(loop, 0.0);
+        loop.probe.clear_counters();
+        loop.may_lock = false;
+        if (!loop.probe.factor(NEARLY)) continue;
+        const auto redundant = static_cast<std::int64_t>(loop.probe.counters().floored_pivots);
+        const auto rows = static_cast<std::int64_t>(loop.weakness.size());
+        loop.may_lock = redundant > 0 && loop.probe.unknowns() - 2 * rows + redundant > 0;
     }
-    weakness_.assign(rows_, 0.0);
-    std::size_t row = 0;
-    for (int k = 0; k < row_blocks; ++k)
-        for (int i = 0; i < blocks[k].size; ++i, ++row) {
-            double moved = 0.0;
-            for (const bool second : {false, true}) {
-                const int body = second ? blocks[k].second : blocks[k].first;
-                if (body < 0 || slot_[body] < 0) continue;
-                const double* j = jacobian(k, second) + 6 * i;
-                moved += j[0] * j[0] + j[1] * j[1] + j[2] * j[2];
-                if (!constants_[body].particle)
-                    moved += (j[3] * j[3] + j[4] * j[4] + j[5] * j[5]) / square_[slot_[body]];
-            }
-            weakness_[row] = part * moved;
-            probe_.diagonal(k)[i] = blocks[k].axial ? matrix_.diagonal(k)[i] : -weakness_[row];
-        }
 }
 
-/// The mean square of every tied body's arms to its joints [m²].
-void RigidSystem::find_extents() {
-    square_.assign(tied_.size(), 0.0);
-    std::vector<int>& ends = ends_;
-    ends.assign(tied_.size(), 0);
+/// The matrix of a loop with rigid rows, but for a softness of that part of what each moves; and with every body as
+/// heavy as any other, as far across as its joints lie: whether rows repeat each other does not depend on masses.
+void RigidSystem::take_probe(Loop& loop, double part) {
+    const int rows = static_cast<int>(loop.blocks.size());
+    BlockLdlt& probe = loop.probe;
+    find_extents(loop);
+    for (std::size_t k = 0; k < loop.members.size(); ++k) {
+        const int block = rows + static_cast<int>(k), n = probe.size(block);
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j)
+                probe.diagonal(block)[n * i + j] = i != j ? 0.0 : i < 3 ? 1.0 : loop.square[k];
+    }
+    loop.weakness.assign(static_cast<std::size_t>(probe.offset(rows)), 0.0);
+    for (std::size_t e = 0; e < loop.edges.size(); ++e) {
+        const BlockEdge& edge = probe.edges()[e];
+        const int n = probe.size(edge.second), size = probe.size(edge.first);
+        const double* j = matrix_.coupling(loop.edges[e]);
+        std::copy_n(j, size * n, probe.coupling(static_cast<int>(e)));
+        double* moved = loop.weakness.data() + probe.offset(edge.first);
+        for (int i = 0; i < size; ++i, j += n) {
+            moved[i] += part * (j[0] * j[0] + j[1] * j[1] + j[2] * j[2]);
+            if (n == 6)
+                moved[i] +=
+                    part * (j[3] * j[3] + j[4] * j[4] + j[5] * j[5]) / loop.square[edge.second - rows];
+        }
+    }
+    for (int k = 0; k < rows; ++k)
+        for (int i = 0; i < probe.size(k); ++i) probe.diagonal(k)[i] = -loop.weakness[probe.offset(k) + i];
+}
+
+/// The mean square of every member's arms to its joints [m²].
+void RigidSystem::find_extents(Loop& loop) {
+    loop.square.assign(loop.members.size(), 0.0);
+    std::vector<int> ends(loop.members.size(), 0);
     double sum = 0.0;
     int count = 0;
-    for (const JointBlock& block : joints_.blocks()) {
-        if (block.axial) continue;
+    const int rows = static_cast<int>(loop.blocks.size());
+    for (const BlockEdge& edge : loop.probe.edges()) {
+        const JointBlock& block = joints_.blocks()[loop.blocks[edge.first]];
+        const int k = edge.second - rows, body = tied_[loop.members[k]];
+        if (body != block.first && body != block.second) continue;
         const JointSet::State& state = joints_.states[block.joint];
-        for (const bool second : {false, true}) {
-            const int body = second ? block.second : block.first;
-            if (body < 0 || slot_[body] < 0) continue;
-            const Vec3 arm = second ? state.second_reach : state.first_reach;
-            square_[slot_[body]] += dot(arm, arm), sum += dot(arm, arm);
-            ++ends[slot_[body]], ++count;
-        }
+        const Vec3 arm = body == block.second ? state.second_reach : state.first_reach;
+        loop.square[k] += dot(arm, arm), sum += dot(arm, arm);
+        ++ends[k], ++count;
     }
     const double mean = sum > 0.0 ? sum / count : 1.0;
-    for (std::size_t k = 0; k < square_.size(); ++k)
-        square_[k] = square_[k] > 0.0 ? square_[k] / ends[k] : mean;
+    for (std::size_t k = 0; k < loop.square.size(); ++k)
+        loop.square[k] = loop.square[k] > 0.0 ? loop.square[k] / ends[k] : mean;
 }
 
 /// After a solve, before its velocities are taken.
 void RigidSystem::watch_redundancy() {
-    Live::Watched& seen = live_.watched;
+    for (std::size_t k = 0; k < loops_.size(); ++k)
+        if (loops_[k].may_lock && live_.locked < 0) watch(loops_[k], live_.watched[k]);
+}
+
+double RigidSystem::motion_of(const Loop& loop) const {
     double motion = 0.0;  // J
-    const double* x = solution_.data() + rows_;
-    for (int i : tied_) {
+    const int row_blocks = static_cast<int>(joints_.blocks().size());
+    for (int member : loop.members) {
+        const int i = tied_[member];
+        const double* x = solution_.data() + matrix_.offset(row_blocks + member);
         const Vec3 v{x[0], x[1], x[2]};
         motion += 0.5 * constants_[i].mass * dot(v, v);
-        x += 3;
         if (constants_[i].particle) continue;
-        const Vec3 w{x[0], x[1], x[2]};
+        const Vec3 w{x[3], x[4], x[5]};
         motion += 0.5 * dot(w, live_.bodies[i].inertia * w);
-        x += 3;
     }
+    return motion;
+}
+
+void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
+    const double motion = motion_of(loop);
     const bool stopped = motion < 0.5 * seen.last;
     const bool due = live_.step >= seen.next;
     seen.last = motion;
     seen.motion = std::max(seen.motion, motion);
-    if (live_.locked >= 0 || !(due || stopped) || !find_repeated()) return;
+    if (!(due || stopped) || !find_repeated(loop)) return;
 
-    double work = 0.0, held = 0.0, load = 0.0;
-    x = solution_.data() + rows_;
-    const double* y = repeated_.data() + rows_;  // of the probe's bodies: minus the change of velocity
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const int i = tied_[k];
+    double work = 0.0, held = 0.0, load = driven(loop);
+    const int row_blocks = static_cast<int>(joints_.blocks().size());
+    const double* y =
+        loop.repeated.data() + loop.weakness.size();  // minus the change of the probe's velocities
+    for (std::size_t k = 0; k < loop.members.size(); ++k) {
+        const int i = tied_[loop.members[k]];
+        const double* x = solution_.data() + matrix_.offset(row_blocks + loop.members[k]);
         const BodyConstants& body = constants_[i];
         const BodyState& s = live_.bodies[i];
         const Vec3 v{x[0], x[1], x[2]}, impulse{-y[0], -y[1], -y[2]}, given = kick(i);
         work += 0.5 * dot(impulse, v + s.velocity);
         held += dot(impulse, impulse) / body.mass;
         load += body.mass * dot(given, given);
-        x += 3, y += 3;
+        y += 3;
         if (body.particle) continue;
-        const Vec3 w{x[0], x[1], x[2]}, twist = -square_[k] * Vec3{y[0], y[1], y[2]},
+        const Vec3 w{x[3], x[4], x[5]}, twist = -loop.square[k] * Vec3{y[0], y[1], y[2]},
                                         given_twist = h_ * body.torque;
         work += 0.5 * dot(twist, w + s.angular_velocity);
         held += dot(twist, turned_by(body, s, twist));
         load += dot(given_twist, turned_by(body, s, given_twist));
-        x += 3, y += 3;
+        y += 3;
     }
     const double most = TAKEN * seen.motion, before = seen.work;
     seen.work += (stopped ? 1.0 : static_cast<double>(seen.wait)) * work;
@@ -158,36 +227,82 @@ void RigidSystem::watch_redundancy() {
     seen.wait = little ? std::min(2 * seen.wait, LATE) : SOON;
     seen.next = live_.step + seen.wait;
     const bool took = std::abs(seen.work) > most && seen.motion > 1e-6 * load;
-    if (took || (seen.load > 0.0 && seen.held > HELD * seen.load)) note_locked();
+    if (took || (seen.load > 0.0 && seen.held > HELD * seen.load)) note_locked(loop);
+}
+
+/// 2 J of what motors and springs alone would set in motion.
+double RigidSystem::driven(const Loop& loop) {
+    if (loop.drives.empty()) return 0.0;
+    push_.assign(tied_.size(), {});
+    for (int k : loop.drives) {
+        const JointBlock& block = joints_.blocks()[k];
+        for (const bool second : {false, true}) {
+            const int body = second ? block.second : block.first;
+            if (body < 0 || slot_[body] < 0) continue;
+            const double* j = jacobian(k, second);
+            for (int i = 0; i < block.size; ++i)
+                for (int axis = 0; axis < 6; ++axis, ++j)
+                    push_[slot_[body]][axis] += *j * solution_[matrix_.offset(k) + i];
+        }
+    }
+    double sum = 0.0;
+    for (int member : loop.members) {
+        const int i = tied_[member];
+        const Vec6& p = push_[member];
+        const Vec3 linear{p[0], p[1], p[2]}, twist{p[3], p[4], p[5]};
+        sum += dot(linear, linear) / constants_[i].mass;
+        if (!constants_[i].particle) sum += dot(twist, turned_by(constants_[i], live_.bodies[i], twist));
+    }
+    return sum;
 }
 
 /// λ' of the last solve, with the sign of the solution, and what it changes of the velocities.
-bool RigidSystem::find_repeated() {
-    const double loop = static_cast<double>(joints_.blocks().size());
-    take_probe(NEARLY / (loop * loop));  // the rows of a long chain move each other but little
-    if (!probe_.factor(0.0)) return false;
-    repeated_.assign(static_cast<std::size_t>(probe_.unknowns()), 0.0);
-    for (std::size_t row = 0; row < rows_; ++row) repeated_[row] = weakness_[row] * solution_[row];
-    probe_.solve(repeated_.data());
+bool RigidSystem::find_repeated(Loop& loop) {
+    const double size = static_cast<double>(loop.blocks.size());
+    take_probe(loop, NEARLY / (size * size));  // the rows of a long chain move each other but little
+    if (!loop.probe.factor(0.0)) return false;
+    loop.repeated.assign(static_cast<std::size_t>(loop.probe.unknowns()), 0.0);
+    std::size_t row = 0;
+    for (int k : loop.blocks)
+        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row)
+            loop.repeated[row] = loop.weakness[row] * solution_[matrix_.offset(k) + i];
+    loop.probe.solve(loop.repeated.data());
     return true;
 }
 
-/// The joints whose rows repeat each other by what repeated_ says, each by its largest share.
-void RigidSystem::note_locked() {
-    const auto blocks = joints_.blocks();
-    std::vector<double> share(blocks.size(), 0.0);
-    std::size_t row = 0;
-    double largest = 0.0;
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-        for (int i = 0; i < blocks[k].size; ++i, ++row)
-            share[k] = std::max(share[k], std::sqrt(weakness_[row]) * std::abs(repeated_[row]));
-        largest = std::max(largest, share[k]);
-    }
-    live_.named.clear();
-    for (std::size_t k = 0; k < blocks.size(); ++k)
-        if (share[k] > TOLD * largest) live_.named.push_back(blocks[k].joint);
+/// The joints whose rows repeat each other by what was found, each by its largest share.
+void RigidSystem::note_locked(const Loop& loop) {
+    const std::vector<double> share = shares(loop);
     const auto most = std::max_element(share.begin(), share.end());
-    live_.locked = body_of(static_cast<int>(most - share.begin()));
+    live_.named.clear();
+    for (std::size_t k = 0; k < share.size(); ++k)
+        if (share[k] > TOLD * *most) live_.named.push_back(joints_.blocks()[loop.blocks[k]].joint);
+    live_.locked = body_of(loop.blocks[most - share.begin()]);
+}
+
+/// Per block of the loop: what its rows repeat of others.
+std::vector<double> RigidSystem::shares(const Loop& loop) const {
+    std::vector<double> share(loop.blocks.size(), 0.0);
+    std::size_t row = 0;
+    for (std::size_t k = 0; k < loop.blocks.size(); ++k)
+        for (int i = 0; i < joints_.blocks()[loop.blocks[k]].size; ++i, ++row)
+            share[k] = std::max(share[k], std::sqrt(loop.weakness[row]) * std::abs(loop.repeated[row]));
+    return share;
+}
+
+/// Redundant rows had to be told apart, which those that agree need not: of which loop?
+void RigidSystem::note_parted() {
+    const Loop* worst = nullptr;
+    double largest = 0.0;
+    for (Loop& loop : loops_) {
+        if (!find_repeated(loop)) continue;
+        const std::vector<double> share = shares(loop);
+        const double most = *std::max_element(share.begin(), share.end());
+        if (most > largest) largest = most, worst = &loop;
+    }
+    if (worst) return note_locked(*worst);
+    live_.named.assign(1, joints_.blocks()[busiest_block()].joint);
+    live_.locked = body_of(busiest_block());
 }
 
 }  // namespace spook

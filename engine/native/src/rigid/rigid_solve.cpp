@@ -163,7 +163,7 @@ void RigidSystem::solve_block() {
     }
     if (method_.corrections > 0) correct_curvature();
     if (stiff_) keep_angular_momentum();
-    if (may_lock_) watch_redundancy();
+    watch_redundancy();
     take_block_solution();
     if (clock_) clock_->mark(Stage::solve_block);
 }
@@ -195,14 +195,7 @@ bool RigidSystem::factor_and_solve() {
         matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
         [this](std::span<const double> left) { return settled(left); });
     if (redundant_.finite() && doubtful) find_contradiction();
-    if (redundant_.parted() && method_.corrections == 0 && !composed_) {
-        if (find_repeated()) {
-            note_locked();
-        } else {
-            live_.named.assign(1, joints_.blocks()[busiest_block()].joint);
-            live_.locked = body_of(busiest_block());
-        }
-    }
+    if (redundant_.parted() && method_.corrections == 0 && !composed_) note_parted();
     return redundant_.finite();
 }
 

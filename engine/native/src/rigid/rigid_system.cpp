@@ -95,7 +95,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0)
         locked_.analyse(constants_, joints_, tied_);
-    if (solver_ == RigidSolver::block && locked_.empty()) analyse_block();
+    if (solver_ == RigidSolver::block && locked_.empty()) analyse_block(), find_loops();
     const bool tilted =  // joint coordinates see inertias along the bodies' own axes
         std::any_of(constants_.begin(), constants_.end(),
                     [](const BodyConstants& body) { return body.tilted; });
@@ -166,7 +166,7 @@ void RigidSystem::reset(StageClock* clock) {
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
     redundant_.reset(matrix_);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
-    may_lock_ = may_lock();
+    judge_loops();
     joints_.breaks.clear();
     clock_ = clock;
     rounds_ = sweeps_ = 0;

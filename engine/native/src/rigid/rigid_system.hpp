@@ -135,11 +135,12 @@ private:
         double pending = 0.0;  // s: half a stage still to be kicked
         int locked = -1;       // a body of redundant rows that contradict each other by now
         int lost = -1;         // a body of rows that no motion satisfies
-        struct Watched {       // of redundant rows, see rigid_locking.cpp
+        struct Watched {       // of the redundant rows of a loop, see rigid_locking.cpp
             double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
             double held = 0.0, load = 0.0;    // √(2 J): what they held back, and what the loads gave
             std::int64_t next = 0, wait = 1;  // steps: of the next look, and to it
-        } watched;
+        };
+        std::vector<Watched> watched;
         std::vector<int> named;  // joints that health() tells of
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         // Stages × differences × unknowns: of the rows' forces [N], or of the paces of joint coordinates, from step
@@ -181,12 +182,19 @@ private:
         Mat3 inertia;
     };
     IslandFrame island_frame(const std::vector<int>& members) const;
-    bool may_lock();
-    void take_probe(double part);
-    void find_extents();
+    struct Loop;
+    void find_loops();
+    void judge_loops();
+    void take_probe(Loop& loop, double part);
     void watch_redundancy();
-    bool find_repeated();
-    void note_locked();
+    void watch(Loop& loop, Live::Watched& seen);
+    double motion_of(const Loop& loop) const;
+    double driven(const Loop& loop);
+    bool find_repeated(Loop& loop);
+    void note_locked(const Loop& loop);
+    void note_parted();
+    std::vector<double> shares(const Loop& loop) const;
+    void find_extents(Loop& loop);
     void take_stages(const RigidScene& scene);
     void step();
     void velocity_stage();
@@ -325,10 +333,16 @@ private:
     std::vector<int> slot_;  // per body: its place among the tied bodies, −1
     BlockLdlt matrix_;
     RedundantRows redundant_;
-    bool may_lock_ = false;                             // whether redundant rows are watched
-    BlockLdlt probe_;                                   // matrix_ with rigid rows
-    std::vector<double> weakness_, repeated_, square_;  // per row; per unknown; per tied body, m²
-    std::vector<int> ends_;                             // per tied body: joints
+    struct Loop {  // joints that close one, and all that hangs on them; see rigid_locking.cpp
+        std::vector<int> blocks, members;                // of joints; places among the tied bodies
+        std::vector<int> drives;                         // blocks of motors, limits and springs
+        std::vector<int> edges;                          // of matrix_, in the probe's order
+        BlockLdlt probe;                                 // matrix_ of these with rigid rows
+        bool may_lock = false;                           // whether its redundant rows are watched
+        std::vector<double> weakness, repeated, square;  // per row; per unknown; per member, m²
+    };
+    std::vector<Loop> loops_;
+    std::vector<Vec6> push_;  // per tied body: of drives
     LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
