@@ -20,6 +20,7 @@ from spook_tracker.engine import (
     Sphere,
     simulate,
 )
+from spook_tracker.scalar_tests.beam.scene import scene as beam
 from tests.contact_scenes import DOWN, TIME_STEP, cube, ground
 from tests.test_engine_symmetries import heap
 
@@ -69,6 +70,15 @@ def test_a_hundred_boxes_on_sweeps_are_no_answer(sweeps: int, sunk: bool) -> Non
     assert result.failed_step is not None and result.failed_step <= 60
     assert result.failed_body is not None and result.failed_body.startswith("box")
     assert result.residual > 0.1 if not sunk else float(result["deep"]) > 0.02 * size / 2
+
+
+def test_joints_that_sweeps_do_not_settle_are_given_up_after_four_times_as_many() -> None:
+    """Eighty locked boxes held at one end: more sweeps do not help, and all joints would be swept each time."""
+    method = Method(solver="iterative", iterations=50)
+    result = simulate(beam(time_step=TIME_STEP), time_step=TIME_STEP, steps=20, method=method)
+
+    assert result.status == "unsettled"
+    assert result.counters["sweeps"] < 5 * 50 * 20  # parting sweeps, too
 
 
 def test_solves_that_settled_leave_no_residual_to_speak_of() -> None:

@@ -10,6 +10,7 @@ namespace spook {
 namespace {
 
 constexpr int most_turns = 16;  // times `iterations` sweeps, where a step would be unsettled otherwise
+constexpr int joint_turns = 4;  // the same where a joint is furthest off: all of them are swept each time
 constexpr double focus = 0.5;   // of the residual allowed: contacts that change less are left alone then
 
 }  // namespace
@@ -80,6 +81,7 @@ bool ContactStage::is_settled(MixedSystem& system) {
     const RowsResidual contact = sweeps_.worst(focus * options_.unsettled_residual),
                        joint = rows_residual(system, {}, options_.friction);
     residual_ = std::max(contact.residual, joint.residual);
+    joint_is_worst_ = joint.residual > contact.residual;
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points_[contact.row].contact;
         blame(contact.residual, std::max(unknown_[pair.first], unknown_[pair.second]));
@@ -103,6 +105,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
                              focus * options_.unsettled_residual, [this] { return find_more(); });
         counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
         if (!report.finite || is_settled(system) || report.converged) break;
+        if (turn + 1 >= joint_turns && joint_is_worst_) break;
     }
     counters_.unsettled += !report.converged;
 

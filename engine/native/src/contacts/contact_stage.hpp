@@ -346,6 +346,7 @@ private:
     bool impact_needed_ = false;
     int impact_rounds_ = 0;
     double residual_ = 0.0, unsettled_by_ = 0.0;
+    bool joint_is_worst_ = false;  // of what the last sweeps have left
     int unsettled_body_ = -1;
     ContactCounters counters_;
 };
