@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.series_history import commit_of
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import arrive, look, wait_for
+from tests.browser import SEEN, arrive, look, wait_for
 from tests.synthetic_history import SEVEN, history
 
 PAGES = (
@@ -265,6 +266,34 @@ def test_error_and_run_time_can_be_seen_against_work(driver: Any, site: Path) ->
     )
     assert len(labels) == len(SEVEN)
     assert set(labels) == {"work [operations counted]"}
+
+
+def test_charts_of_an_overview_are_loaded_as_they_are_seen(driver: Any, site: Path) -> None:
+    visit(driver, site, "error-time.html", height=500)
+    wait_for(driver, SEEN)
+    counts = """const boxes = [...document.querySelectorAll('figure.chart')].filter((b) => b.checkVisibility());
+      return [boxes.length, boxes.filter((b) => chartData.has(b.dataset.key)).length]"""
+
+    whole, first = driver.execute_script(counts)
+    assert 0 < first < whole
+
+    drawn = driver.execute_async_script(DRAWN)
+    assert len(drawn) == whole
+    assert all(drawn)
+    assert driver.execute_script(counts) == [whole, whole]
+
+
+def test_a_chart_whose_file_is_gone_keeps_its_picture(driver: Any, site: Path, tmp_path: Path) -> None:
+    whole = shutil.copytree(site, tmp_path / "public")
+    shutil.rmtree(whole / "charts")
+    visit(driver, whole, "stability.html")
+    wait_for(driver, "scripts.size === 0 && document.querySelectorAll('script[src*=\"charts/\"]').length > 0")
+
+    shown = driver.execute_script(
+        "return ['.static', '.plot'].map((s) => document.querySelector('figure.chart ' + s).checkVisibility())"
+    )
+    assert shown == [True, False]
+    driver.get_log("browser")  # says that files are missing
 
 
 def test_the_reader_chooses_light_or_dark_and_keeps_it(driver: Any, site: Path) -> None:

@@ -1,10 +1,14 @@
 """What a page may weigh, on a history with more nights, tests and faults than a reader is likely to have."""
 
+import gzip
+import random
+import re
+
 import msgspec
 import pytest
 
 from spook_tracker.tracker.website.publish import publish
-from tests.page_weights import FIRST, OTHERS, too_heavy
+from tests.page_weights import FIRST, OTHERS, SENT, WHOLE_HISTORY, too_heavy
 from tests.synthetic_history import SEVEN, DocumentHistory, document
 
 COPIES = 4  # of the seven tests: 28 in all, with 16 series each
@@ -54,13 +58,38 @@ def test_every_page_is_within_its_budget(site):
     assert too_heavy(site) == []
 
 
+CHART = re.compile(r'<figure class="chart card"[^>]*data-key="(\w+)" data-file="([^"]+)"')
+
+
+def test_the_data_of_charts_are_in_files(site):
+    """Each chart names a file that is there; the pictures stay for whoever runs no scripts, and no file is of no chart."""
+    named = {}
+    for page in site.rglob("*.html"):
+        if page.name in WHOLE_HISTORY:
+            continue
+        text = page.read_text()
+        charts = CHART.findall(text)
+        assert len(charts) == text.count('<figure class="chart') == text.count('<div class="static">')
+        for key, address in charts:
+            file = (page.parent / address).resolve()
+            assert file.read_text().startswith(f'charted("{key}",{{')
+            named[file] = page
+
+    assert set(named) == set(site.glob("charts/*.js"))
+    assert {page.name for page in named.values()} > {"error-time.html", "stability.html"}
+
+
 def test_a_page_above_its_budget_is_named(tmp_path):
     (tmp_path / "index.html").write_text("x" * (FIRST + 1))
     chart = '<figure class="chart card">' + "x" * OTHERS + "</figure>"
     (tmp_path / "light.html").write_text(chart + "x" * OTHERS)
     (tmp_path / "heavy.html").write_text(chart + "x" * (OTHERS + 1))
+    noise = random.Random(1).randbytes(SENT).hex()
+    (tmp_path / "noise.html").write_text(f'<figure class="chart card">{noise}</figure>')
+    sent = len(gzip.compress((tmp_path / "noise.html").read_bytes(), mtime=0))
 
     assert too_heavy(tmp_path) == [
         f"heavy.html: {OTHERS + 1} bytes of {OTHERS}",
         f"index.html: {FIRST + 1} bytes of {FIRST}",
+        f"noise.html: {sent} bytes of {SENT} compressed",
     ]

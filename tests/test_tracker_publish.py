@@ -188,22 +188,20 @@ def test_feed_and_badge_tell_the_regressions(site: Path) -> None:
 
 def test_plotly_accepts_every_figure(site: Path) -> None:
     """The figures are plain data made without Plotly; its own validators must take them."""
-    drawn = 0
-    for page in html_pages(site):
-        for told in (json.loads(data) for data in Reader(page.read_text()).data if data.strip()):
-            if "layout" not in told:
-                continue
-            layout = {k: v for k, v in told["layout"].items() if k not in ("shapes", "annotations")}
-            go.Figure(data=told["data"], layout=layout)
-            drawn += 1
-            last = told
+    texts = [page.read_text() for page in html_pages(site)]
+    inside = [json.loads(data) for text in texts for data in Reader(text).data if data.strip()]
+    files = [path.read_text() for path in site.glob("charts/*.js")]
+    loaded = [json.loads(re.fullmatch(r'charted\("\w+",(.*)\);\n', text)[1]) for text in files]
+    drawn = [told for told in inside + loaded if "layout" in told]
+    for told in drawn:
+        layout = {k: v for k, v in told["layout"].items() if k not in ("shapes", "annotations")}
+        go.Figure(data=told["data"], layout=layout)
 
-    assert drawn > 50
-    assert drawn == sum(page.read_text().count('"layout":') for page in html_pages(site)), (
-        "none is passed over"
-    )
+    assert len(drawn) > 50
+    assert loaded
+    assert len(drawn) == sum(text.count('"layout":') for text in texts + files), "none is passed over"
     with pytest.raises(ValueError, match="Did you mean"):  # they would see a misspelt property
-        go.Figure(data=[{**last["data"][0], "nmae": "x"}])
+        go.Figure(data=[{**drawn[-1]["data"][0], "nmae": "x"}])
 
 
 def test_the_bundle_is_the_version_plotly_for_python_expects() -> None:

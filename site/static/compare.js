@@ -50,21 +50,6 @@
     return make("div", { class: "card scroll", tabindex: "0", role: "group", "aria-label": "Table" }, make("table", { class: "cards" }, make("caption", {}, caption), make("thead", {}, row), body));
   }
 
-  // A script of this site, once; a page opened from a file may not fetch.
-  const asked = new Map();
-  function script(address) {
-    if (!asked.has(address)) {
-      asked.set(address, new Promise((done, failed) => {
-        const tag = document.createElement("script");
-        tag.src = address;
-        tag.onload = () => done();
-        tag.onerror = () => failed(new Error(`${address} could not be loaded`));
-        document.head.append(tag);
-      }));
-    }
-    return asked.get(address);
-  }
-
   // Nights stand engine by engine, ours first: which of them one is of, and its place there.
   function engineOf(place) {
     let left = place;

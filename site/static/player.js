@@ -4,17 +4,6 @@
 const LIBRARY = "three-scene.min.js";  // its address stands in the page, under data-three
 let libraryAsked = null;
 
-// A script of this site, once; a page opened from a file may not fetch.
-function script(address) {
-  return new Promise((done, failed) => {
-    const tag = document.createElement("script");
-    tag.src = address;
-    tag.onload = () => done();
-    tag.onerror = () => failed(new Error(`${address} could not be loaded`));
-    document.head.append(tag);
-  });
-}
-
 function threeFrom(address) {
   libraryAsked = libraryAsked || script(address);
   return libraryAsked;

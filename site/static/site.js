@@ -19,7 +19,27 @@ const state = {
 
 function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
+// A script of this site, once unless it fails; a page opened from a file may not fetch.
+const scripts = new Map();
+function script(address) {
+  if (!scripts.has(address)) {
+    scripts.set(address, new Promise((done, failed) => {
+      const tag = document.createElement("script");
+      tag.src = address;
+      tag.onload = () => done();
+      tag.onerror = () => { scripts.delete(address); failed(new Error(`${address} could not be loaded`)); };
+      document.head.append(tag);
+    }));
+  }
+  return scripts.get(address);
+}
+
 // --- charts ---
+const chartData = new Map();  // by key, as the files of charts/ hand them over
+
+// Called by each file of charts/.
+function charted(key, data) { chartData.set(key, data); }
+
 const CONFIG = {
   responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", displayModeBar: "hover",
   modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], scrollZoom: false,
@@ -100,7 +120,7 @@ function rangesOf(name) {
 
 function drawChart(box) {
   const plot = box.querySelector(".plot");
-  const data = JSON.parse(box.querySelector(".chart-data").textContent);
+  const data = chartData.get(box.dataset.key);
   const layout = dressLayout(data.layout);
   const zoom = rangesOf(box.id);
   if (zoom) {
@@ -128,7 +148,11 @@ function charts() {
   const boxes = document.querySelectorAll("figure.chart");
   if (!boxes.length || typeof Plotly === "undefined") { return; }
   const seen = new Set();
-  const show = (box) => { if (!seen.has(box)) { seen.add(box); drawChart(box); } };
+  const show = async (box) => {
+    try { await script(box.dataset.file); } catch { return; }  // its still picture stays
+    seen.add(box);
+    drawChart(box);
+  };
   const watch = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       if (entry.isIntersecting) { watch.unobserve(entry.target); show(entry.target); }

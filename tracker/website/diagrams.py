@@ -56,6 +56,12 @@ class View:
     rows: list[tuple[str, ...]]
     left_out: int = 0
     tall: bool = False  # many names in the legend
+    key: str = ""  # of its file, once that is known
+
+    @property
+    def file(self) -> str:
+        """Address of the script with its data, below the root."""
+        return f"charts/{self.key}.js"
 
 
 def view(chart: Chart, *, table: bool = True) -> View:

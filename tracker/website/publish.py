@@ -26,6 +26,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website import data_files, feed, judged_nights
 from spook_tracker.tracker.website.causes import causes_of
+from spook_tracker.tracker.website.chart_files import chart_files
 from spook_tracker.tracker.website.colours import accent
 from spook_tracker.tracker.website.comparisons import (
     FILE,
@@ -156,14 +157,21 @@ def publish(
             return source, made.get_template(page.template).render(context).encode("utf-8", "replace")
 
         for planned in pages(told, events, causes, compared, module, mutants):
+            charts: dict[str, bytes] = {}
             try:
-                source, text = render(planned.make())
+                made_page = planned.make()
+                drawn = chart_files(made_page.context)
+                source, text = render(made_page)
+                charts = drawn
             except Exception as error:  # whatever it is, the other pages are worth publishing
                 reason = f"{type(error).__name__}: {clean(str(error))[:300]}"
                 failed.append(f"{planned.path}: {reason}")
                 context = {"what": planned.title, "reason": reason}
                 source, text = render(Page(planned.path, "failed.html", planned.title, "", context))
             folder.add(planned.path, source, partial(bytes, text))
+            for address, content in charts.items():
+                if address not in folder.made:  # the overviews have charts of the tests again
+                    folder.add(address, digest(content), partial(bytes, content))
         files = _data(told, events, causes, str(whose["site_title"]))
         if told.nights:
             files = chain(
