@@ -14,9 +14,10 @@ from msgspec.structs import replace
 
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.tracker.document.json_form import encode
-from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.document.run_document import Machine, RunDocument
 from spook_tracker.tracker.measure import executors
 from spook_tracker.tracker.measure.executors import ExecutorError, Place
+from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.run import Questions, Request, run
 from spook_tracker.tracker.measure.workers import Lost
 from spook_tracker.tracker.store.border import decoded
@@ -112,6 +113,8 @@ def test_two_workers_of_dask_give_the_same_bits(by_processes: RunDocument, clust
     document = run(Questions(), Request(tests=TESTS, executor=dask(cluster), **ASKED))
 
     assert answered(document) == answered(by_processes)
+    assert [worker.fingerprint for worker in document.workers] == [machine().fingerprint]
+    assert not by_processes.workers
     assert len(cluster.scheduler_info["workers"]) == 2
 
 
@@ -134,22 +137,64 @@ def dies_of_two(piece: int) -> int:
     return 10 * piece
 
 
+def computer(floats: str, name: str = "one") -> Machine:
+    return Machine(
+        fingerprint=name, processor="toy", cores=1, operating_system="none", float_environment=floats
+    )
+
+
 def here() -> Place:
-    return Place("toy 1", "same")
+    return Place("toy 1", computer("same"))
 
 
 def test_a_worker_that_rounds_otherwise_is_refused() -> None:
-    places = iter([Place("toy 1", "same"), Place("toy 1", "another")])
+    places = iter([Place("toy 1", computer("same")), Place("toy 1", computer("another"))])
 
     with pytest.raises(ExecutorError, match="not like this machine"):
         list(executors.answers(f"{__name__}:threads", str, [1], lambda: next(places)))
 
 
 def test_a_worker_with_another_build_is_refused() -> None:
-    places = iter([Place("toy 1", "same"), Place("toy 2", "same")])
+    places = iter([Place("toy 1", computer("same")), Place("toy 2", computer("same"))])
 
     with pytest.raises(ExecutorError, match="toy 2"):
         list(executors.answers(f"{__name__}:threads", str, [1], lambda: next(places)))
+
+
+def test_a_run_names_the_machines_that_measured_it(tmp_path: Path) -> None:
+    places = iter([Place("toy 1", computer("same", name)) for name in ("here", "ash", "oak", "ash")])
+    told: list[str] = []
+
+    pieces = executors.answers(
+        f"{__name__}:threads",
+        str,
+        [1, 2, 3],
+        lambda: next(places),
+        lambda found: told.append(found.fingerprint),
+    )
+
+    assert sorted(answer for _, answer in pieces) == ["1", "2", "3"]
+    assert sorted(told) == ["ash", "ash", "oak"]
+
+
+def test_the_machines_that_measured_are_stored_and_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(HERE))
+    asked = (
+        "--engine", "toy_engine", "--catalogue", "toy_questions:CATALOGUE", "--executor", f"{__name__}:threads"
+    )  # fmt: skip
+
+    done = tracker("run", *asked, "--json", "run.json")
+
+    assert done.exit_code == 0, done.output
+    (worker,) = decoded(Path("run.json").read_bytes()).workers
+    assert worker.fingerprint == machine().fingerprint and worker.pieces > 1
+    assert f"{worker.pieces} pieces measured on {worker.processor}" in done.output
+    assert tracker("export", "latest", "--out", "again").exit_code == 0
+    (again,) = Path("again").glob("*.json")
+    assert decoded(again.read_bytes()).workers == (worker,)
 
 
 def fails(piece: int) -> int:

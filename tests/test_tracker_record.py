@@ -109,6 +109,16 @@ def test_a_document_that_makes_no_sense_is_refused_and_nothing_is_stored(session
     assert History(session).runs() == ()
 
 
+def test_the_machines_that_measured_come_back(session):
+    ash = document.Worker(fingerprint="ash", processor="a", operating_system="Linux", pieces=3)
+    oak = document.Worker(fingerprint="oak", processor="b", operating_system="Linux", pieces=1)
+    given = run(workers=(ash, oak))
+
+    record(session, given)
+
+    assert History(session).document(given.id).workers == (ash, oak)
+
+
 def test_storage_knows_every_field_of_the_document():
     """A field added to the document needs a column: without one it would silently be dropped."""
     assert document.Sample.__struct_fields__ == (
@@ -127,5 +137,5 @@ def test_storage_knows_every_field_of_the_document():
     assert document.RunDocument.__struct_fields__ == (
         "schema_version", "id", "idempotency_key", "started", "finished", "trigger", "tracker_version",
         "ci_address", "engine", "machine", "tests", "series", "samples", "figures", "maps",
-        "trajectories", "partial", "asked",
+        "trajectories", "partial", "asked", "workers",
     )  # fmt: skip

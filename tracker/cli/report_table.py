@@ -145,7 +145,10 @@ def title(run: RunDocument) -> str:
     engine = run.engine
     commit = engine.git_hash[:10] + (" with local changes" if engine.dirty else "")
     facts = (f"{engine.name} {engine.version}", commit, run.machine.processor, f"{clock(run.started)} UTC")
-    return click.style(clean(" · ".join(filter(None, facts))), bold=True)
+    return click.style(clean(" · ".join(filter(None, facts))), bold=True) + "".join(
+        "\n" + clean(f"{found.pieces} pieces measured on {found.processor}, {found.fingerprint}")
+        for found in run.workers
+    )
 
 
 def _scalars(shown: Sequence[Pair], room: int) -> list[str]:

@@ -60,6 +60,15 @@ class Machine(Struct, frozen=True, kw_only=True):
     float_environment: Text  # hash of a few library functions' bits: values may differ where this does
 
 
+class Worker(Struct, frozen=True, kw_only=True):
+    """A machine beside this one, of the same float environment, and how many pieces of the work it did."""
+
+    fingerprint: Name
+    processor: Text
+    operating_system: Text
+    pieces: int
+
+
 class SeriesDefinition(Struct, frozen=True, kw_only=True):
     """What is followed over versions: one metric of one test in one configuration."""
 
@@ -295,6 +304,7 @@ class RunDocument(Struct, frozen=True, kw_only=True):
     trajectories: tuple[Trajectory, ...] = ()
     partial: bool = False  # interrupted: only what was finished by then
     asked: Asked | None = None  # None: not known, and told from what is answered
+    workers: tuple[Worker, ...] = ()  # of an executor that measured the values; none: `machine` did
 
 
 class Run(Protocol):

@@ -6,7 +6,7 @@
 
 A value depends on the engine and on how this kind of processor rounds, not on who computes it: each piece comes
 back with the version and the float environment it was computed in, and one that differs from this machine's is
-refused. Wall time and memory of a piece are bounded by "process" only; elsewhere they are the cluster's affair.
+refused. It also says on which machine: a run names its workers. Wall time and memory of a piece are bounded by "process" only; elsewhere they are the cluster's affair.
 Run times are never taken there: they need a machine of which is known that it is quiet, which is this one.
 """
 
@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.run_document import Machine
 from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.workers import Lost
 
@@ -37,18 +38,32 @@ class ExecutorError(TrackerError):
 
 @dataclass(frozen=True)
 class Place:
-    """In what a piece was computed: equal places give equal bits."""
+    """In what a piece was computed: places that are alike give equal bits."""
 
     engine: str  # version and commit
-    float_environment: str
+    machine: Machine
+
+    def like(self, other: Place) -> bool:
+        return self._decisive() == other._decisive()
+
+    def __str__(self) -> str:
+        return " and floats ".join(self._decisive())
+
+    def _decisive(self) -> tuple[str, str]:
+        return self.engine, self.machine.float_environment
 
 
 def answers(
-    name: str, perform: Callable[[Any], Any], pieces: Sequence[Any], place: Callable[[], Place]
+    name: str,
+    perform: Callable[[Any], Any],
+    pieces: Sequence[Any],
+    place: Callable[[], Place],
+    told: Callable[[Machine], None] = lambda machine: None,
 ) -> Iterator[tuple[Any, Any]]:
     """Every piece with what `perform` made of it, or Lost, as they come; what is left is cancelled at the end.
 
-    `place` is called beside every piece. ExecutorError if a worker's differs from what it is here.
+    `place` is called beside every piece, `told` with the machine of every answer. ExecutorError if a worker's place is
+    not like this one.
     """
     here = place()
     with _executor(name) as executor:
@@ -58,11 +73,13 @@ def answers(
         try:
             for future in _completed(waiting):
                 answer, there = _answer(future)
-                if there is not None and there != here:
-                    raise ExecutorError(
-                        f"a worker of {name} is not like this machine ({there} there, {here} here): its values could "
-                        "not be compared; install the same build there, or use machines of the same kind"
-                    )
+                if there is not None:
+                    if not there.like(here):
+                        raise ExecutorError(
+                            f"a worker of {name} is not like this machine ({there} there, {here} here): its values "
+                            "could not be compared; install the same build there, or use machines of the same kind"
+                        )
+                    told(there.machine)
                 yield waiting[future], answer
         finally:
             for future in waiting:
@@ -90,7 +107,7 @@ def _answer(future: Future[Any]) -> tuple[Any, Place | None]:
 def place_of(engine: Any) -> Place:
     """Where this process computes, with this engine."""
     info = engine.build_info
-    return Place(f"{info.name} {info.version} {info.git_hash[:10]}".strip(), machine().float_environment)
+    return Place(f"{info.name} {info.version} {info.git_hash[:10]}".strip(), machine())
 
 
 @contextmanager

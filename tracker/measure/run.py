@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import os
 import uuid
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -27,11 +28,13 @@ from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Family,
     FigureData,
+    Machine,
     MapData,
     RunDocument,
     Sample,
     SeriesDefinition,
     Trajectory,
+    Worker,
 )
 from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.cards import engine_version, test_card
@@ -134,9 +137,10 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
     version = engine_version(source.module())
     tasks = list(_tasks(tests, request))
     parts: dict[int, tuple[Any, ...]] = {}
+    workers: Counter[Machine] = Counter()
     timed: Timed = ([], {})
     try:
-        for task, part in _perform_all(source, tasks, tests, request, watch):
+        for task, part in _perform_all(source, tasks, tests, request, watch, workers):
             parts[task.position] = part
         if request.sweep:
             timed = timings(source, request, tests, _errors(tasks, parts), watch)
@@ -146,9 +150,9 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
         if not finished:
             raise
         tasks = [task for task in tasks if task.test in finished]
-        document = _document(source, request, started, version, finished, tasks, parts, timed)
+        document = _document(source, request, started, version, finished, tasks, parts, workers, timed)
         raise Interrupted(msgspec.structs.replace(document, partial=True), len(tests)) from None
-    return _document(source, request, started, version, tests, tasks, parts, timed)
+    return _document(source, request, started, version, tests, tasks, parts, workers, timed)
 
 
 def _errors(tasks: Iterable[Task], parts: Mapping[int, tuple[Any, ...]]) -> Errors:
@@ -167,6 +171,7 @@ def _document(
     tests: Mapping[str, ScalarTest],
     tasks: Iterable[Task],
     parts: Mapping[int, tuple[Any, ...]],
+    workers: Mapping[Machine, int],
     timed: Timed,
 ) -> RunDocument:
     """The answers in the order of the questions, whatever order they came in."""
@@ -204,6 +209,15 @@ def _document(
         maps=tuple(maps),
         trajectories=tuple(trajectories),
         asked=_asked(source, request),
+        workers=tuple(
+            Worker(
+                fingerprint=worker.fingerprint,
+                processor=worker.processor,
+                operating_system=worker.operating_system,
+                pieces=pieces,
+            )
+            for worker, pieces in sorted(workers.items(), key=lambda item: str(item[0]))
+        ),
     )
 
 
@@ -256,13 +270,27 @@ def perform(source: Questions, task: Task) -> tuple[Any, ...]:
 
 
 def _perform_all(
-    source: Questions, tasks: Sequence[Task], tests: Mapping[str, ScalarTest], request: Request, watch: Watch
+    source: Questions,
+    tasks: Sequence[Task],
+    tests: Mapping[str, ScalarTest],
+    request: Request,
+    watch: Watch,
+    workers: Counter[Machine],
 ) -> Iterator[tuple[Task, tuple[Any, ...]]]:
-    """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer."""
+    """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer.
+
+    `workers` counts the answers of each machine of an executor.
+    """
     left = {name: sum(task.test == name for task in tasks) for name in tests}
     found: Iterator[tuple[Task, Any]] = ((task, perform(source, task)) for task in tasks)
     if request.executor != executors.PROCESS:
-        found = executors.answers(request.executor, partial(perform, source), tasks, partial(_place, source))
+        at_work = (
+            partial(perform, source),
+            tasks,
+            partial(_place, source),
+            lambda machine: workers.update([machine]),
+        )
+        found = executors.answers(request.executor, *at_work)
     elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
         found = crew.answers(partial(perform, source), tasks, request.workers, limits)

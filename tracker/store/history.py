@@ -186,8 +186,8 @@ class History:
     def document(self, run_id: str) -> RunDocument:
         """The run as one document, equal to the one that was recorded."""
         run = self.run(run_id)
-        ((key, schema_version, list_id, partial),) = self._reader.rows(
-            "SELECT idempotency_key, schema_version, series_list_id, partial FROM run WHERE key = :run",
+        ((key, schema_version, list_id, partial, workers),) = self._reader.rows(
+            "SELECT idempotency_key, schema_version, series_list_id, partial, workers FROM run WHERE key = :run",
             run=run.key,
         )
         items = "SELECT definition_id FROM series_list_item WHERE list_id = :list ORDER BY position"
@@ -213,6 +213,7 @@ class History:
             trajectories=self.trajectories(run_id),
             partial=bool(partial),
             asked=run.asked,
+            workers=rows.workers_of(workers),
         )
 
     def to_dataframe(self, names: Iterable[str] = ()) -> pandas.DataFrame:

@@ -233,6 +233,7 @@ class Run(Base):
     gates_passed: Mapped[int] = mapped_column(
         BigInteger, comment="gate samples inside their limit that night"
     )
+    workers: Mapped[str] = _text("JSON list: machines of an executor and their pieces; empty: this one's own")
     content: Mapped[str] = _text(
         "hash of all samples and their definitions; empty for runs recorded before there was one"
     )

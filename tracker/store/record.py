@@ -100,6 +100,7 @@ def _store(session: Session, run: RunDocument, there: Present) -> bool:
             "schema_version": run.schema_version,
             "partial": run.partial,
             "asked": rows.asked_text(run.asked),
+            "workers": rows.workers_text(run.workers),
             "engine_version_id": engine["id"],
             "machine_id": machine["id"],
             "test_cards_id": cards["id"],

@@ -178,6 +178,14 @@ def asked_of(text: str) -> document.Asked | None:
     return decode(text, document.Asked) if text else None
 
 
+def workers_text(workers: tuple[document.Worker, ...]) -> str:
+    return json_of(workers) if workers else ""
+
+
+def workers_of(text: str) -> tuple[document.Worker, ...]:
+    return decode(text, tuple[document.Worker, ...]) if text else ()
+
+
 def sample_row(sample: document.Sample) -> Row:
     value, special = split(sample.value)
     return {
