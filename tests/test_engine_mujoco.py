@@ -27,7 +27,7 @@ from spook_tracker.engine import (
     Violation,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.scalar_tests import falling_object
+from spook_tracker.scalar_tests import falling_object, resting_stack
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
 from tests import rigid_scenes
 
@@ -54,6 +54,24 @@ def test_a_fall_has_the_error_of_its_integrator() -> None:
 
     assert error("defaults") == pytest.approx(falling_object.EXPECTED, abs=1e-9)
     assert abs(error("rk4")) < 1e-9
+
+
+def test_boxes_at_rest_are_sunk_into_each_other_by_as_much_as_soft_contacts_let_them() -> None:
+    """By springs: deep in the defaults, little in stiff contacts, and less than the whole stack has sunk."""
+    (measure,) = (
+        m.measure
+        for m in resting_stack.TEST.measurements
+        if "overlap" in {metric.name for metric in m.metrics}
+    )
+
+    def told(configuration: str) -> dict[str, float]:
+        def bound(scene: Scene, **options: Any) -> Any:
+            return simulate(scene, configuration, **options)
+
+        return dict(measure(bound))  # type: ignore[arg-type]
+
+    stiff, soft = told("rk4"), told("defaults")
+    assert 0.0 < stiff["overlap"] < soft["overlap"] < soft["drift"]
 
 
 def test_a_rod_is_a_hinge_in_joint_coordinates_and_soft_as_an_equality() -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from spook_tracker.engine import PLAIN, Load, RigidBody, Scene, simulate
 from spook_tracker.engine.joints import Joint
+from spook_tracker.scalar_tests import resting_stack
 from spook_tracker.scalar_tests.beam import scene as beam_scene
 from spook_tracker.scalar_tests.cantilever import scene as cantilever
 from spook_tracker.scalar_tests.cantilever import statics
@@ -32,6 +34,7 @@ KNOWN = (
     ("cantilever", "dynamic", "tip_against_statics", 0.0, 1e-7),
     ("cantilever", "self-weight", "self_weight_ratio", 0.9925, 1e-4),
     ("resting_stack", "direct", "load_error", 0.0, 1e-9),
+    ("resting_stack", "direct", "overlap", 0.0, 1e-9),
 )
 
 
@@ -54,6 +57,16 @@ def test_the_ringing_of_the_printed_door_is_the_known_one() -> None:
     printed = next(m for m in CATALOGUE["door"].measurements if m.configuration == "printed")
 
     assert abs(abs(printed.measure(simulate)["weight_error_to_65_s"]) - 0.0193) < 5e-5
+
+
+def test_the_overlap_of_a_stack_is_that_of_its_boxes_and_none_where_they_have_fallen() -> None:
+    """Floor, three boxes: the first sinks 3 mm into the floor, the second 1 mm into it, the third 2 mm into that."""
+    moved = np.zeros((4, 3))
+    moved[1:, 2] = -0.003, -0.004, -0.006
+    assert resting_stack.deepest(moved) == pytest.approx(0.002, abs=1e-15)
+
+    moved[3] = 0.9, 0.0, -2.0
+    assert np.isnan(resting_stack.deepest(moved)), "beside the stack and on the floor"
 
 
 # --- a broken engine ------------------------------------------------------------------------------------
