@@ -15,9 +15,6 @@ namespace {
 constexpr int late_rounds = 3;  // of sweeps for contacts found after the last one
 constexpr int cold = -2;        // before every sweep
 
-/// What is not a number stays.
-double larger(double a, double b) noexcept { return a >= b || std::isnan(a) ? a : b; }
-
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
 Mat3 symmetric_inverse(const Mat6& mass) noexcept {
@@ -206,7 +203,8 @@ double ContactSweeps::update(Contact& c) noexcept {
     const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
                    add_turn(joints_.velocity()[c.second], c.second_arm);
     const double old = c.impulse[0];
-    const double nu = std::max(0.0, old - (dot(c.normal, u) + c.softness * old - c.right[0]) * c.own_inverse);
+    const double asked = old - (dot(c.normal, u) + c.softness * old - c.right[0]) * c.own_inverse;
+    const double nu = asked <= 0.0 ? 0.0 : asked;  // what is not a number stays
     const double dn = nu - old;
     c.impulse[0] = nu;
     double change = std::abs(dn) * c.own, d1 = 0.0, d2 = 0.0;
@@ -221,11 +219,11 @@ double ContactSweeps::update(Contact& c) noexcept {
             if (c.stretched) least_on_disc(c.slip, b1, b2, s1, s2, bound, z1, z2);
             else if (reach > bound) z1 *= bound / reach, z2 *= bound / reach;
             d1 = z1 - b1, d2 = z2 - b2;
-            change = std::max(change, length(d1, d2) / c.step);
+            change = larger(change, length(d1, d2) / c.step);
         } else {
             d1 = std::clamp(b1 - s1 / c.slip[0], -bound, bound) - b1;
             d2 = std::clamp(b2 - (s2 + c.slip[1] * d1) / c.slip[2], -bound, bound) - b2;
-            change = std::max({change, std::abs(d1) * c.slip[0], std::abs(d2) * c.slip[2]});
+            change = larger(change, larger(std::abs(d1) * c.slip[0], std::abs(d2) * c.slip[2]));
         }
         c.impulse[1] = b1 + d1;
         c.impulse[2] = b2 + d2;
@@ -359,7 +357,8 @@ RowsResidual ContactSweeps::worst(double focus) {
         if (c.friction > 0.0)
             residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
         if (!(residual <= focus)) heat({c.first, c.second});
-        if (!(residual <= worst.residual)) worst = {residual, static_cast<int>(k)};
+        const bool worse = !(residual <= worst.residual) && !std::isnan(worst.residual);
+        if (worse) worst = {residual, static_cast<int>(k)};
     }
     return worst;
 }

@@ -12,6 +12,9 @@
 
 namespace spook {
 
+/// The larger of two changes; what is not a number stays.
+inline double larger(double a, double b) noexcept { return a >= b || std::isnan(a) ? a : b; }
+
 /// One row as a sweep reads it: Jacobian of both ends, M⁻¹ Gᵀ, own inertia. An end that does not move is zero and
 /// belongs to a spare body behind the others, so that no row needs a branch.
 struct SweepRow {
@@ -74,11 +77,11 @@ public:
         double change = 0.0;
         for (const SweepBlock& block : blocks_) {
             if (block.kind == SweepBlock::Kind::contact) {
-                if (!friction_only) change = std::max(change, update_row(block, rows_[block.row]));
+                if (!friction_only) change = larger(change, update_row(block, rows_[block.row]));
                 for (int k = block.point; k < block.end; ++k)
-                    change = std::max(change, update_rubbing(block, points[k], block.step[k - block.point]));
+                    change = larger(change, update_rubbing(block, points[k], block.step[k - block.point]));
             } else if (!friction_only) {
-                change = std::max(change, update_joint(block));
+                change = larger(change, update_joint(block));
             }
         }
         return change;
@@ -179,7 +182,7 @@ private:
     }
 
     double update_row(const SweepBlock& block, SweepRow& row) noexcept {
-        if (!(row.own > 0.0)) return 0.0;
+        if (!(row.own > 0.0)) return std::isnan(row.own) ? row.own : 0.0;
         const double old = row.multiplier;
         row.multiplier = std::clamp(old - residual(block, row) / row.own, row.lower, row.upper);
         const double change = row.multiplier - old;
@@ -191,8 +194,7 @@ private:
     double update_joint(const SweepBlock& block) noexcept {
         if (block.kind == SweepBlock::Kind::bilateral) return update_block(block);
         double change = 0.0;
-        for (int i = 0; i < block.size; ++i)
-            change = std::max(change, update_row(block, rows_[block.row + i]));
+        for (int i = 0; i < block.size; ++i) change = larger(change, update_row(block, rows_[block.row + i]));
         return change;
     }
 
@@ -201,7 +203,7 @@ private:
         double largest = 0.0;
         for (int i = 0; i < block.size; ++i) {
             change[i] = -residual(block, rows_[block.row + i]);
-            largest = std::max(largest, std::abs(change[i]));
+            largest = larger(largest, std::abs(change[i]));
         }
         solve_six(factors_[block.factor], change);
         for (int i = 0; i < block.size; ++i) {
@@ -219,7 +221,7 @@ private:
             one.lower = two.lower = -bound;
             one.upper = two.upper = bound;
             const double change = update_row(block, one);
-            return point.size != 2 ? change : std::max(change, update_row(block, two));
+            return point.size != 2 ? change : larger(change, update_row(block, two));
         }
         const double b1 = one.multiplier, b2 = two.multiplier;
         double d1 = b1 - step * residual(block, one);
