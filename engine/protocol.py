@@ -67,6 +67,8 @@ class Capabilities:
     shows_force_of: frozenset[type[Constraint]] | None = None  # None: of every joint, if of any
     compliance: bool = False  # rows of a stated stiffness
     friction: bool = False
+    rolling_friction: bool = False  # of rolling, and of turning on the spot
+    joint_friction: bool = False  # constant; none has any that grows with a joint's load
     restitution: bool = False
     motors: bool = False
     limits: bool = False
@@ -75,8 +77,6 @@ class Capabilities:
     kinematic: bool = False
     particles: bool = True
     rigid_bodies: bool = True
-    reversible: bool = False  # a run with the velocities turned round comes back
-    deterministic: bool = True  # equal input, equal bits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,7 +178,8 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "restitution"
     if (body.material.compliance > RIGID or body.material.slip_compliance) and not can.compliance:
         yield "compliance of a surface"
-    if body.material.rolling_friction or body.material.torsional_friction:
+    rolls = body.material.rolling_friction or body.material.torsional_friction
+    if rolls and not can.rolling_friction:
         yield "friction of rolling or turning"
     if body.material.oriented:
         yield "friction that differs with the direction"
@@ -204,8 +205,11 @@ def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
             yield "a spring of bounded force in a joint"
         if constraint.motor is not None and constraint.motor.force is not None:
             yield "a motor of given force in a joint"
-    if any(any(part) for part in frictions(constraint)):
+    constant, by_load = frictions(constraint)
+    if any(constant) and not can.joint_friction:
         yield "friction in a joint"
+    if any(by_load):
+        yield "friction in a joint that grows with its load"
 
 
 def _has_loop(scene: Scene) -> bool:

@@ -13,21 +13,26 @@ from spook_tracker.engine import (
     Box,
     ConstraintForce,
     ContactForce,
+    Cylinder,
     Distance,
     Energy,
     Final,
     Hinge,
+    JointCoordinate,
     Lock,
     MaximumAbsolute,
     Particle,
+    Plane,
     Position,
+    Prismatic,
     RigidBody,
     Scene,
     Trace,
     Violation,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.scalar_tests import falling_object, resting_stack
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.scalar_tests import falling_object, resting_stack, rolling_friction
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
 from tests import rigid_scenes
 
@@ -209,6 +214,58 @@ def test_default_friction_creeps_where_the_box_should_stand() -> None:
 
     assert 0.01 < crept("defaults") < 0.04
     assert crept("rk4") < 1e-6
+
+
+def test_friction_of_rolling_and_turning_brakes_a_ball_as_it_should() -> None:
+    """Elliptic cones hold sliding and rolling friction in one: slower by (f/µN)²/2, f = (2/7) ρ N/r, a few 1e-4."""
+
+    def told(of: Any, configuration: str = "rk4") -> dict[str, float]:
+        return dict(of(lambda scene, **o: simulate(scene, configuration, **o)))
+
+    lost = (
+        0.5
+        * (2.0 / 7.0 * rolling_friction.ROLLING / rolling_friction.RADIUS / rolling_friction.FRICTION) ** 2
+    )
+    step = rolling_friction.BRAKE * rolling_friction.TIME_STEP
+    assert told(rolling_friction.roll)["speed_error"] < 2.0 * lost * rolling_friction.SPEED + step
+    spinning = told(rolling_friction.turn)
+    assert spinning["spin_error"] < 2.0 * rolling_friction.SLOWING * rolling_friction.TIME_STEP
+    assert spinning["walked"] < 1e-3
+
+
+@pytest.mark.parametrize("kind", [Hinge, Prismatic])
+def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(kind: Any) -> None:
+    """From a speed of 1 a friction of 0.5 on a mass, or a moment of inertia, of 2 needs four seconds and a way of 2."""
+    turns = kind is Hinge
+    moving = {"angular_velocity": (0.0, 0.0, 1.0)} if turns else {"velocity": (0.0, 0.0, 1.0)}
+    body = RigidBody(name="b", mass=2.0, inertia=(2.0, 2.0, 2.0), position=(0.0, 0.0, 0.0), **moving)  # type: ignore[arg-type]
+    joint = kind(
+        name="j",
+        between=("world", "b"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, 0.0, 1.0),
+        friction=0.5,
+        compliance=0.0,
+    )
+    scene = Scene(bodies=(body,), constraints=(joint,))
+    observe = {"way": Trace(quantity=JointCoordinate("j"), every=1000)}
+
+    way = simulate(scene, "rk4", time_step=1e-3, duration=6.0, observe=observe)["way"]
+    assert np.ravel(way)[[2, 4, 6]] == pytest.approx([1.5, 2.0, 2.0], abs=5e-3)
+
+    with pytest.raises(NotSupported, match="friction in a joint"):
+        simulate(scene, "equalities", time_step=1e-3, duration=1.0)
+
+
+def test_a_coin_on_its_face_rests_and_stands_on_half_its_length() -> None:
+    coin = RigidBody(name="coin", mass=1.0, shape=Cylinder(0.3, 0.1), position=(0.0, 0.0, 0.05))
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    scene = Scene(bodies=(ground, coin), gravity=GRAVITY)
+    place = simulate(
+        scene, "rk4", time_step=1e-3, duration=1.0, observe={"x": Final(quantity=Position("coin"))}
+    )["x"]
+
+    assert place == pytest.approx([0.0, 0.0, 0.05], abs=1e-4)
 
 
 def test_welds_as_equalities_let_a_long_beam_fall_and_merged_bodies_do_not() -> None:

@@ -26,7 +26,7 @@ from spook_tracker.engine.protocol import Capabilities, Configuration, NotSuppor
 from spook_tracker.engine.recorded_joints import cross, joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 STIFF = 'solref="{h2!r} 1" solimp=".9999 .9999 .001 .5 2"'
@@ -38,12 +38,14 @@ class MuJoCo:
 
     name = "mujoco"
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Plane}),
+        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),
         forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
         shows_force_of=frozenset({Distance, Ball, Hinge}),
         friction=True,
+        rolling_friction=True,
+        joint_friction=True,
     )
     configurations = (
         Configuration(
@@ -64,6 +66,9 @@ class MuJoCo:
             reason="free bodies held by equality constraints, as an engine of constraints has them; reference 2 h",
             expected_order=1.0,
             options={"joints": False, "option": f'integrator="Euler" {CAREFUL}', "stiff": True},
+            lacks=(
+                "joint_friction",
+            ),  # which it has of degrees of freedom, and here those of joints are none
         ),
     )
 
@@ -102,8 +107,7 @@ class _Run:
             task.scene,
             joint_coordinates=options["joints"],
             option=f'timestep="{task.time_step!r}" {options["option"]}',
-            geom=stiff,
-            equality=stiff,
+            row=stiff,
         )
         try:
             self.model = mujoco.MjModel.from_xml_string(self.made.xml)

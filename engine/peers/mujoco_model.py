@@ -11,9 +11,19 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.bodies import WORLD, Material, Particle, RigidBody
 from spook_tracker.engine.forces import Spring
-from spook_tracker.engine.joints import Ball, Constraint, Distance, Hinge, Joint, Lock, Prismatic, Universal
+from spook_tracker.engine.joints import (
+    Ball,
+    Constraint,
+    Distance,
+    Hinge,
+    Joint,
+    Lock,
+    Prismatic,
+    Universal,
+    frictions,
+)
 from spook_tracker.engine.peers.joint_tree import (
     UPRIGHT,
     Node,
@@ -28,7 +38,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-12  # kg m²: MuJoCo wants one of every moving body; a point mass has none
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it as equalities
@@ -49,15 +59,15 @@ def numbers(values: Iterable[float]) -> str:
     return '"' + " ".join(repr(float(value)) for value in values) + '"'
 
 
-def model(scene: Scene, *, joint_coordinates: bool, option: str, geom: str, equality: str) -> Model:
-    """The whole model; `option`, `geom` and `equality` are XML attributes of the configuration."""
+def model(scene: Scene, *, joint_coordinates: bool, option: str, row: str) -> Model:
+    """The whole model; `option` and `row`, how stiff what holds and touches is, are XML attributes of the configuration."""
     nodes = grown(scene) if joint_coordinates else alone(scene)
-    return _Writer(scene, nodes, geom, equality).write(option)
+    return _Writer(scene, nodes, row).write(option)
 
 
 class _Writer:
-    def __init__(self, scene: Scene, nodes: dict[str, Node], geom: str, equality: str) -> None:
-        self.scene, self.nodes, self.geom, self.equality = scene, nodes, geom, equality
+    def __init__(self, scene: Scene, nodes: dict[str, Node], row: str) -> None:
+        self.scene, self.nodes, self.row = scene, nodes, row
         self.normal = plane_of_motion(scene)
         self.tree = {node.tie.name: name for name, node in nodes.items() if node.tie is not None}
         self.equalities: dict[str, tuple[int, ...]] = {}
@@ -161,16 +171,22 @@ class _Writer:
                 axes = [np.array(tie.axis)]
         where = numbers(turned_back(turn, at - place))
         return "".join(
-            f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))}/>' for axis in axes
+            f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} {self._loss(tie)}/>'
+            for axis in axes
         )
+
+    def _loss(self, tie: Constraint) -> str:
+        """Dry friction of a slide [N] or a hinge [N m], as stiff as everything else."""
+        size = max(frictions(tie)[0])
+        row = self.row.replace("solref", "solreffriction").replace("solimp", "solimpfriction")
+        return f'frictionloss="{size!r}" {row}' if size else ""
 
     def _geom(self, body: RigidBody) -> str:
         assert body.shape is not None
         kind, size, q = _surface(body.shape)
-        friction = body.material.friction
         return (
             f'<geom name={quoteattr(body.name)} type="{kind}" size={numbers(size)} quat={numbers(q)} mass="0" '
-            f'condim="{3 if friction else 1}" friction="{friction!r} 0 0" {self.geom}/>'
+            f"{_friction(body.material.friction, body.material)} {self.row}/>"
         )
 
     def _site(self, end: str | None, point: Array, name: str) -> str:
@@ -204,10 +220,14 @@ class _Writer:
             longer = 0.0
             if constraint.rest_length is not None:
                 longer = constraint.rest_length - math.dist(*points)
-            line = f'<tendon tendon1={quoteattr(constraint.name)} polycoef="{longer!r} 0 0 0 0" {self.equality}/>'
+            line = f'<tendon tendon1={quoteattr(constraint.name)} polycoef="{longer!r} 0 0 0 0" {self.row}/>'
             self._add(constraint, [line])
             return
         assert isinstance(constraint, Joint)
+        if any(frictions(constraint)[0]):
+            raise NotSupported(
+                f"mujoco has no friction in an equality constraint, as {constraint.name!r} would be"
+            )
         at = joint_point(self.scene, constraint)
         if isinstance(constraint, Lock):
             self._add(constraint, [self._weld(constraint, at)])
@@ -237,12 +257,12 @@ class _Writer:
     def _connect(self, joint: Joint, at: Array) -> str:
         bodies, one, _ = self._ends(joint)
         place, turn = self._frame(one)
-        return f"<connect {bodies} anchor={numbers(turned_back(turn, at - place))} {self.equality}/>"
+        return f"<connect {bodies} anchor={numbers(turned_back(turn, at - place))} {self.row}/>"
 
     def _weld(self, joint: Joint, at: Array) -> str:
         bodies, _, two = self._ends(joint)
         place, turn = self._frame(two)
-        return f"<weld {bodies} anchor={numbers(turned_back(turn, at - place))} {self.equality}/>"
+        return f"<weld {bodies} anchor={numbers(turned_back(turn, at - place))} {self.row}/>"
 
     def _contacts(self) -> str:
         """Pairs that must not touch, and pairs whose friction is not the larger of two."""
@@ -260,10 +280,18 @@ class _Writer:
                 continue
             mu = math.sqrt(one.material.friction * two.material.friction)
             text += (
-                f'<pair geom1={quoteattr(a)} geom2={quoteattr(b)} condim="{3 if mu else 1}" '
-                f'friction="{mu!r} {mu!r} 0 0 0" {self.geom}/>'
+                f"<pair geom1={quoteattr(a)} geom2={quoteattr(b)} "
+                f"{_friction(mu, one.material, two.material, pair=True)} {self.row}/>"
             )
         return text
+
+
+def _friction(sliding: float, *materials: Material, pair: bool = False) -> str:
+    """Kinds of friction as MuJoCo has them: of two surfaces the larger, of sliding what is given."""
+    spin, roll = (max(getattr(m, f"{kind}_friction") for m in materials) for kind in ("torsional", "rolling"))
+    dimensions = 6 if roll else 4 if spin else 3 if sliding else 1
+    sizes = (sliding, sliding, spin, roll, roll) if pair else (sliding, spin, roll)
+    return f'condim="{dimensions}" friction={numbers(sizes)}'
 
 
 def _surface(shape: Shape) -> tuple[str, tuple[float, ...], Any]:
@@ -272,8 +300,8 @@ def _surface(shape: Shape) -> tuple[str, tuple[float, ...], Any]:
         return "sphere", (shape.radius,), UPRIGHT
     if isinstance(shape, Box):
         return "box", tuple(0.5 * edge for edge in shape.size), UPRIGHT
-    if isinstance(shape, Capsule):
-        return "capsule", (shape.radius, 0.5 * shape.length), UPRIGHT
+    if isinstance(shape, Capsule | Cylinder):
+        return shape.kind, (shape.radius, 0.5 * shape.length), UPRIGHT
     assert isinstance(shape, Plane)
     x, y, z = shape.normal
     q = np.array([1.0 + z, -y, x, 0.0]) if z > -1.0 + 1e-12 else np.array([0.0, 1.0, 0.0, 0.0])
