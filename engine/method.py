@@ -9,7 +9,11 @@ from typing import Literal
 
 from spook_tracker.engine.errors import MethodError
 
-STAGES_THAT_CAN_BE_FORCED = ("collision", "solve_block", "rotation")
+STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
+    "collision": "collision",
+    "solve_block": "solve_block",
+    "rotation": "integrate_rotations",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

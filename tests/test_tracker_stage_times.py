@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
+from spook_tracker import engine
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.measure.cards import explained
+from spook_tracker.tracker.measure.ladder import SAVED_RUNS, saved_by_leaving_out
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.stage_times import stage_times
 from tests.synthetic_history import history
@@ -29,3 +35,30 @@ def test_without_clocks_there_are_no_bars() -> None:
     test.trends = test.gates()
 
     assert stage_times(test) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "stages"),
+    [
+        ("pendulum", {"collision", "solve_block", "integrate_rotations"}),
+        ("falling_object", {"collision", "integrate_rotations"}),  # without rows there is nothing to solve
+        ("squeezer", {"collision"}),  # turns and is solved in blocks already
+        ("falling_chain", set()),  # has all three, and is heavy: nothing is timed
+    ],
+)
+def test_only_what_is_left_out_is_forced_in_and_timed(name: str, stages: set[str]) -> None:
+    """Under the name by which `explain` calls the stage; each round times the scene as it is once."""
+    test, asked = CATALOGUE[name], []
+
+    def simulate(scene: Any, **options: Any) -> Any:
+        asked.append(options["steps"])
+        return engine.simulate(scene, **options)
+
+    saved = saved_by_leaving_out({name: test}, simulate).get(name, {})
+    left_out = {choice.stage for choice in explained(test, engine) if not choice.kept}
+
+    assert set(saved) == stages
+    assert stages <= left_out
+    assert all(seconds >= 0.0 for seconds in saved.values())
+    assert sum(steps > 1 for steps in asked) == SAVED_RUNS * (1 + len(stages)) * bool(stages)
+    assert sum(steps == 1 for steps in asked) <= 4

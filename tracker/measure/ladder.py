@@ -9,7 +9,7 @@ its error and fails while it is timed has the class of that failure: a crash is 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -349,7 +349,10 @@ def _scalar(
 
 
 def saved_by_leaving_out(tests: Mapping[str, ScalarTest], simulate: Simulate) -> dict[str, dict[str, float]]:
-    """Seconds per step each stage left out would cost, by forcing it into the test's example scene."""
+    """Seconds per step each stage left out would cost, by forcing it into the test's example scene.
+
+    Timed are only stages that the scene does without and that forcing brings in, which one step tells.
+    """
     saved: dict[str, dict[str, float]] = {}
     for name, test in tests.items():
         answer = ask(test.example)
@@ -357,17 +360,33 @@ def saved_by_leaving_out(tests: Mapping[str, ScalarTest], simulate: Simulate) ->
             continue
         example = answer.value
         steps = max(1, min(2000, round(1.0 / example.time_step)))
-
-        for stage in STAGES_THAT_CAN_BE_FORCED:
-            plain, with_stage = _example_run(example, steps, ()), _example_run(example, steps, (stage,))
-            without, forced = [], []
-            for _ in range(SAVED_RUNS):
-                without.append(once(plain, simulate, LADDER_TIME_LIMIT))
-                forced.append(once(with_stage, simulate, LADDER_TIME_LIMIT))
-            if all(s is not None for s in (*without, *forced)):
-                cost = min(s for s in forced if s is not None) - min(s for s in without if s is not None)
-                saved.setdefault(name, {})[stage] = max(0.0, cost) / steps
+        kept = _stages_of(example, (), simulate)
+        added = {
+            option: stage
+            for option, stage in STAGES_THAT_CAN_BE_FORCED.items()
+            if kept and stage not in kept and stage in _stages_of(example, (option,), simulate)
+        }
+        if not added:
+            continue
+        runs = [_example_run(example, steps, forced) for forced in ((), *((option,) for option in added))]
+        rounds = [[once(run, simulate, LADDER_TIME_LIMIT) for run in runs] for _ in range(SAVED_RUNS)]
+        plain, *forced = (_least(taken) for taken in zip(*rounds, strict=True))
+        for stage, seconds in zip(added.values(), forced, strict=True):
+            if seconds is not None and plain is not None:
+                saved.setdefault(name, {})[stage] = max(0.0, seconds - plain) / steps
     return saved
+
+
+def _least(taken: Sequence[float | None]) -> float | None:
+    """None if a run of them failed."""
+    seconds = [one for one in taken if one is not None]
+    return min(seconds) if len(seconds) == len(taken) else None
+
+
+def _stages_of(example: Example, forced: tuple[str, ...], simulate: Simulate) -> tuple[str, ...]:
+    """What a step of it goes through; nothing where it fails."""
+    answer = ask(lambda: tuple(_example_run(example, 1, forced)(simulate).stages))
+    return answer.value or ()
 
 
 def stage_costs(test: ScalarTest, simulate: Simulate) -> dict[str, float]:
