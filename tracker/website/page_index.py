@@ -18,6 +18,7 @@ from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, Row, address, row
 
 HEAT_NIGHTS = 60
+MOST_RED = 30  # tests beyond the thesis with a row of their own there
 MOST_OLD = 6  # causes of earlier nights on the first page; the page of regressions has all
 MOST_TESTS = 14  # of one cause
 
@@ -74,7 +75,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         "seven": seven,
         "others": others,
         "common_step": _step_words(step),
-        "heat": heat(book),
+        "heat": heat(book, folded=True),
         "signs": [(name, said, meaning) for name, (_, said, meaning) in CLASSES.items()],
     }
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
@@ -184,14 +185,28 @@ def said(state: Class) -> str:
     return CLASSES[state][1]
 
 
-def heat(book: Book) -> dict[str, Any]:
-    """Tests against nights: cells of equal verdict beside each other are one bar."""
+QUIET: tuple[Class, ...] = ("pass", "followed", "none")  # the best first
+
+
+def heat(book: Book, *, folded: bool = False) -> dict[str, Any]:
+    """Tests against nights: cells of equal verdict beside each other are one bar.
+
+    Folded, only the tests of the thesis and those that were red have a row, the others share one.
+    """
     shown = book.nights[-HEAT_NIGHTS:]
     first = shown[0].index if shown else 0
     left, step = 168.0, min(30.0, 700.0 / max(1, len(shown)))
+    lines = [(test, [night_state(test, night.index) for night in shown]) for test in book.tests]
+    apart = _told_apart(lines) if folded else {test.name for test in book.tests}
+    named = [(clean(test.card.title), address(test), states) for test, states in lines if test.name in apart]
+    rest = [states for test, states in lines if test.name not in apart]
+    for red, words in ((False, "none red"), (True, "red before")):
+        if alike := [states for states in rest if _ever_red(states) == red]:
+            night = zip(*alike, strict=True)
+            together = [worst(states) if red else min(states, key=QUIET.index) for states in night]
+            named.append((f"{len(alike)} {'others' if named else 'tests'}, {words}", "#others", together))
     rows: list[dict[str, Any]] = []
-    for i, test in enumerate(book.tests):
-        states = [night_state(test, night.index) for night in shown]
+    for i, (title, where, states) in enumerate(named):
         runs: list[dict[str, Any]] = []
         for state, group in groupby(range(len(states)), key=states.__getitem__):
             places = list(group)
@@ -202,13 +217,10 @@ def heat(book: Book) -> dict[str, Any]:
                 told = f"{told} {short_hash(shown[places[0]].engine)}".rstrip()
             marks = [round(left + place * step + (step - 2.0) / 2.0, 1) for place in places]
             runs.append(
-                {"state": state, "x": round(x, 1), "width": round(width, 1), "told": told, "places": marks}
+                {"state": state, "x": _short(x), "width": _short(width), "told": told, "places": marks}
             )
-        title = clean(test.card.title)
-        rows.append(
-            {"title": title if len(title) < 25 else title[:23] + "…", "address": address(test), "y": 22 + 22 * i,
-             "runs": runs}
-        )  # fmt: skip
+        title = title if len(title) < 25 else title[:23] + "…"
+        rows.append({"title": title, "address": where, "y": 22 + 22 * i, "runs": runs})
     every = max(1, math.ceil(46.0 / step))
     ticks = [
         (round(left + j * step + step / 2.0 - 1.0, 2), day(night.started)[5:])
@@ -223,9 +235,29 @@ def heat(book: Book) -> dict[str, Any]:
         "height": 26 + 22 * len(rows),
         "left": round(left),
         "first": first,
-        "description": f"{len(rows)} tests over {len(shown)} nights; "
+        "description": f"{len(book.tests)} tests over {len(shown)} nights; "
         f"{sum(len(r['places']) for x in rows for r in x['runs'] if r['state'] == 'fail')} red.",
     }
+
+
+def _ever_red(states: Sequence[Class]) -> bool:
+    return not set(states) <= set(QUIET)
+
+
+def _told_apart(lines: Sequence[tuple[TestHistory, list[Class]]]) -> set[str]:
+    """The tests of the thesis and those that were red, the most recent if there are many."""
+    red = [(test.name, states) for test, states in lines if not test.card.seven and _ever_red(states)]
+
+    def since(line: tuple[str, list[Class]]) -> int:
+        return next(place for place, state in enumerate(reversed(line[1])) if state not in QUIET)
+
+    recent = {name for name, _ in sorted(red, key=since)[:MOST_RED]}
+    return recent | {test.name for test, _ in lines if test.card.seven}
+
+
+def _short(value: float) -> str:
+    """A coordinate with one decimal, if it has any."""
+    return f"{value:.1f}".removesuffix(".0")
 
 
 def night_state(test: TestHistory, night: int) -> Class:
