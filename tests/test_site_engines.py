@@ -12,7 +12,9 @@ import msgspec
 import pytest
 
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
+from spook_tracker.tracker.judge.rank import answers
 from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.website.page_engines import _value
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import arrive, wait_for
 from tests.synthetic_history import (
@@ -173,7 +175,32 @@ def test_two_versions_of_another_engine_can_be_compared_in_the_page(driver: Any,
     assert "Pendulum" not in changed
 
 
-def test_two_engines_are_not_held_to_each_other_s_values(driver: Any, site: Path) -> None:
-    arrive(driver, f"{(site / 'compare.html').as_uri()}#after=run-rival-3.3&before=run-spook-0001")
+def test_two_engines_stand_beside_each_other_gate_by_gate(driver: Any, site: Path) -> None:
+    """What the page says of each is what `tracker rank` says; first who breaks what the other keeps."""
+    runs = {"before": history(3).runs()[1].id, "after": "run-rival-3.2"}
+    documents = with_rival(history(3))
+    samples = {side: documents.samples(run) for side, run in runs.items()}
+    gates = [d for d, _ in samples["before"].values() if d.role == "gate"]
+    arrive(driver, f"{(site / 'compare.html').as_uri()}#after={runs['after']}&before={runs['before']}")
+    wait_for(driver, "document.getElementById('told').dataset.shown === '1,4'")
+    shown = driver.execute_script(
+        "return [...document.querySelectorAll('#told tbody tr')].map((r) => [Number(r.dataset.group),"
+        " ...[...r.querySelectorAll('[data-stands]')].map((c) => [c.dataset.stands, c.querySelector('.value').textContent]),"
+        " r.lastElementChild.textContent])"
+    )
 
-    wait_for(driver, "document.querySelector('#told a[href=\"engines.html\"]')")
+    told = [
+        tuple((answer.stands, _value(answer.definition, answer.sample)) for answer in of_gate)
+        for _, of_gate in answers(gates, samples)
+    ]
+    assert sorted(told) == sorted((tuple(before), tuple(after)) for _, before, after, _ in shown)
+    groups = [group for group, *_ in shown]
+    assert groups == sorted(groups)
+    assert (groups[0], shown[0][1][0], shown[0][2][0]) == (0, "pass", "fail")  # the door
+    assert shown[0][3].startswith("only spook 0.1.1 keeps it")
+    assert [words for group, *_, words in shown if group == 2] == ["only spook 0.1.1 answers"]  # friction
+    text = driver.execute_script("return document.getElementById('told').innerText")
+    kept = [sum(stands == "pass" for stands, _ in side) for side in zip(*told, strict=True)]
+    assert f"spook 0.1.1 keeps {kept[0]} of" in text
+    assert f"rival 3.2 keeps {kept[1]} of" in text
+    assert "REGRESSED" not in text.upper()

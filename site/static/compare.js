@@ -89,6 +89,64 @@
     };
   }
 
+  // Two engines: what each says to every gate, and who keeps its limit. Nothing is red, somebody is nearer.
+  const APART = 0, NEITHER = 1, UNANSWERED = 2, BOTH = 3;  // worst first
+
+  function answer(sample) {
+    if (!sample) { return { stands: "none", text: "not asked" }; }
+    const text = Number.isFinite(sample.value) ? quantityOf(sample.value, sample.definition.unit, 3) : spaced(sample.outcome);
+    return { stands: againstLimit(sample.definition, sample), text };
+  }
+
+  async function enginesOf(i, j) {
+    await script("compare/newest.js");
+    const nights = [await nightAt(i), await nightAt(j)], which = [i, j].map((place) => engineOf(place).which);
+    const names = [i, j].map((place) => (place < own ? choices.engines[0][2] + " " : "") + versions[place].label.split(" · ")[0]), kept = [0, 0], answered = [0, 0], lines = [];
+    for (const [title, what, page, limit, keys] of newest.gates) {
+      const samples = nights.map((night, side) => night.samples.get(keys[which[side]])), said = samples.map(answer);
+      if (!samples[0] && !samples[1]) { continue; }
+      const stands = said.map((one) => one.stands), far = samples.map((s) => (s && Number.isFinite(s.value) ? badness(s.definition, s.value) : NaN));
+      stands.forEach((one, side) => { kept[side] += one === "pass" ? 1 : 0; answered[side] += one === "none" ? 0 : 1; });
+      const decades = far[0] > 0 && far[1] > 0 ? Math.log10(far[1]) - Math.log10(far[0]) : null;
+      let group = BOTH, words = "both keep it";
+      if (stands.includes("none")) { group = UNANSWERED; words = `only ${names[stands[0] === "none" ? 1 : 0]} answers`; } else if (stands[0] !== stands[1]) {
+        group = APART;
+        words = `only ${names[stands[0] === "fail" ? 1 : 0]} keeps it`;
+      } else if (stands[0] === "fail") { group = NEITHER; words = "neither keeps it"; }
+      if (stands[0] === "none" && stands[1] === "none") { words = "neither answers"; }
+      if (decades !== null && Math.abs(decades) >= 0.05) { words += `; ${names[decades > 0 ? 0 : 1]} is ${fixed(Math.abs(decades), 1)} decades nearer`; }
+      lines.push({ group, size: decades === null ? 0 : Math.abs(decades), title, what, page, limit, said, words });
+    }
+    lines.sort((a, b) => a.group - b.group || b.size - a.size);
+    return { names, kept, answered, lines };
+  }
+
+  function showEngines({ names, kept, answered, lines }, i, j) {
+    const shown = what.value === "red" ? lines.filter(({ group }) => group <= NEITHER) : lines;
+    const cell = ({ stands, text }, name) => make("td", { class: "num", "data-name": name, "data-stands": stands }, make("div", { class: "value" }, text), verdict(stands, { pass: "PASS", fail: "FAIL", followed: "FOLLOWED" }[stands] || "NONE"));
+    const row = (one) => make("tr", { "data-group": one.group },
+      make("th", { scope: "row" }, make("a", { href: one.page }, one.title), make("span", { class: "sub" }, `${one.what}; limit ${one.limit}`)),
+      cell(one.said[0], "Before"), cell(one.said[1], "After"), make("td", { "data-name": "Who" }, one.words));
+    told.replaceChildren(
+      make("p", { class: "sub" }, versions[i].label + " → " + versions[j].label),
+      make("div", { class: "title-row" }, make("h2", {}, "Two engines on the same questions")),
+      make("p", {}, [0, 1].map((side) => `${names[side]} keeps ${kept[side]} of ${answered[side]} limits it has an answer to`).join("; ") + "."),
+      make("p", { class: "small soft" }, "Engines are not held to each other’s values: nothing here is red. Who is ahead at equal error stands on the page ", make("a", { href: "engines.html" }, "Engines"), "."),
+      ...listed("Every gate that one of them was asked; first those that one of them breaks.", [["Gate"], [names[0], "num"], [names[1], "num"], ["Who keeps the limit"]], shown, row));
+  }
+
+  // A table of as many lines as one reads, and the rest on request.
+  function listed(caption, heads, shown, row) {
+    if (!shown.length) { return []; }
+    const parts = [table(caption, heads, shown.slice(0, MOST).map(row))];
+    if (shown.length > MOST) {
+      const body = parts[0].querySelector("tbody"), more = make("button", { class: "button", type: "button" }, "Show all " + shown.length);
+      more.addEventListener("click", () => { body.append(...shown.slice(MOST).map(row)); more.remove(); });
+      parts.push(make("p", { class: "buttons" }, more));
+    }
+    return parts;
+  }
+
   async function pairOf(i, j) {
     await script("compare/newest.js");
     const stored = newest.pairs[i + "," + j], plain = (lines) => lines.map((line) => line.map((place) => newest.texts[place]));
@@ -103,17 +161,18 @@
       told.replaceChildren(make("div", { class: "card pad" }, verdict("pass", "IDENTICAL"), make("p", {}, "The same run on both sides.")));
       return;
     }
-    if (engineOf(i).which !== engineOf(j).which) {
-      const link = make("a", { href: "engines.html" }, "Engines");
-      told.replaceChildren(make("div", { class: "card pad" }, make("p", {}, "Two engines are not held to each other's values; who is ahead at equal error stands on the page ", link, ".")));
-      return;
-    }
+    const engines = engineOf(i).which !== engineOf(j).which;
     let pair;
-    try { pair = await pairOf(i, j); } catch (error) {
+    try { pair = await (engines ? enginesOf : pairOf)(i, j); } catch (error) {
       told.replaceChildren(make("div", { class: "card pad" }, make("p", { class: "is-fail" }, `These two cannot be compared: ${error.message}.`)));
       return;
     }
     if (mine !== turn) { return; }
+    if (engines) {
+      showEngines(pair, i, j);
+      told.dataset.shown = `${i},${j}`;
+      return;
+    }
     const [state, word] = HEADLINES[pair.verdict];
     const counts = Object.entries(pair.counts).map(([name, n]) => n + " " + name.replace(/_/g, " ")).join(", ");
     const parts = [
@@ -123,16 +182,7 @@
     ];
     pair.notes.forEach((note) => parts.push(make("p", { class: "small soft" }, note)));
     const shown = pair.changes.filter((c) => !what.value || (what.value === "red" ? c[1] : c[1] === what.value));
-    if (shown.length) {
-      parts.push(table("What is not the same, the worst first.",
-        [["Series"], ["Before", "num"], ["After", "num"], ["Verdict"]], shown.slice(0, MOST).map(line)));
-    }
-    if (shown.length > MOST) {
-      const body = parts[parts.length - 1].querySelector("tbody");
-      const more = make("button", { class: "button", type: "button" }, "Show all " + shown.length);
-      more.addEventListener("click", () => { body.append(...shown.slice(MOST).map(line)); more.remove(); });
-      parts.push(make("p", { class: "buttons" }, more));
-    }
+    parts.push(...listed("What is not the same, the worst first.", [["Series"], ["Before", "num"], ["After", "num"], ["Verdict"]], shown, line));
     if (pair.frontiers.length) {
       const lines = pair.frontiers.map(([test, configuration, ladder, time, error, work]) =>
         make("tr", {}, make("th", { scope: "row" }, test, make("span", { class: "sub" }, ladder)), make("td", { "data-name": "Configuration" }, configuration),

@@ -71,6 +71,13 @@ function standing(definition, sample) {
   return told.held || definition.set_point === null ? "pass" : "watch";
 }
 
+// For its limit alone, whoever's value it is.
+function againstLimit(definition, sample) {
+  if (sample.outcome === "not_supported") { return "none"; }
+  if (!honest(sample).passed) { return "fail"; }
+  return definition.limit === null ? "followed" : "pass";
+}
+
 function stands(definition, after, red) {
   if (!after) { return red ? "fail" : "none"; }
   const own = standing(definition, after);

@@ -34,7 +34,7 @@ from spook_tracker.tracker.judge.tonight import is_newest
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.folder import digest
-from spook_tracker.tracker.website.judged_nights import accepted_fields, described
+from spook_tracker.tracker.website.judged_nights import accepted_fields, described, gates_of_engines
 from spook_tracker.tracker.website.nights import Book, Night, Records
 
 NEWEST = 10  # versions to choose from
@@ -167,7 +167,8 @@ def page_files(told: Comparisons, book: Book, accepted: Sequence[Accepted]) -> b
         }
     series = described(book)
     levels = accepted_fields(accepted, list(series))
-    whole = {"pairs": pairs, "texts": list(texts), "series": series, "accepted": levels}
+    gates = gates_of_engines(book)
+    whole = {"pairs": pairs, "texts": list(texts), "series": series, "accepted": levels, "gates": gates}
     return f"comparedNewest({json.dumps(whole, separators=(',', ':'), allow_nan=False)});\n".encode()
 
 

@@ -16,9 +16,10 @@ from typing import Any
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import boxed
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
-from spook_tracker.tracker.document.wording import clean, conditions, named, slug
+from spook_tracker.tracker.document.wording import clean, conditions, limit, named, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
+from spook_tracker.tracker.judge.rank import question
 from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off
 from spook_tracker.tracker.judge.work import Samples, with_work
 from spook_tracker.tracker.website.folder import digest
@@ -221,6 +222,27 @@ def described(book: Book) -> dict[str, list[str]]:
         for test in chapter.tests
         for t in test.trends
     }
+
+
+def gates_of_engines(book: Book) -> list[list[Any]]:
+    """Every gate of ours where there are other engines: title, words, page, limit, and the series that each engine
+    answers it with (the configuration that it names first), engine by engine as the nights stand; "" for none."""
+    if len(book.engines) < 2:
+        return []
+    first: list[dict[tuple[object, ...], str]] = []
+    for chapter in book.engines:
+        asked: dict[tuple[object, ...], str] = {}
+        for trend in sorted((t for test in chapter.tests for t in test.trends), key=lambda t: t.order):
+            asked.setdefault(question(trend.definition), trend.definition.key)
+        first.append(asked)
+    return [
+        [
+            clean(test.card.title), clean(named(gate.definition)[0]), page_of(test.name), limit(gate.definition),
+            [gate.definition.key, *(asked.get(question(gate.definition), "") for asked in first[1:])],
+        ]
+        for test in book.tests
+        for gate in test.gates()
+    ]  # fmt: skip
 
 
 def _json(value: Any) -> str:

@@ -124,7 +124,9 @@ def compare(told: Comparisons, book: Book) -> Page:
         for night in chapter.nights:
             made = choice(night)
             choices.append([night.id, name + made["label"], made["hash"]])
-    engines = [[file_stem(chapter, book), len(chapter.nights)] for chapter in book.engines]
+    engines = [
+        [file_stem(chapter, book), len(chapter.nights), clean(chapter.name)] for chapter in book.engines
+    ]
     context = {
         "versions": choices,
         "first": first,
