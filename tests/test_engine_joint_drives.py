@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -16,15 +17,20 @@ from spook_tracker.engine import (
     JointCoordinate,
     JointSpring,
     Limit,
+    Load,
     Maximum,
+    Method,
     Minimum,
     Motor,
+    PotentialEnergy,
     Prismatic,
     RigidBody,
     Scene,
+    Sinusoid,
     Trace,
     Velocity,
     simulate,
+    start,
 )
 from tests.oracle import Array
 
@@ -184,3 +190,36 @@ def test_equal_limits_hold_a_joint_still() -> None:
     )
 
     assert np.abs(angle).max() < 1e-6
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_the_energy_of_a_spring_is_that_about_its_rest_of_the_moment(half: bool) -> None:
+    """Where the rest moves: not about that of the step before; and after going back it is what it was."""
+    h, stiffness, rest = 0.01, 40.0, Sinusoid(amplitude=0.3, frequency=0.5)
+    scene = wheel(1.0, spring=JointSpring(stiffness=stiffness, rest=rest))
+    energy, method = {"u": PotentialEnergy()}, Method(half_step_velocities=half)
+    observe = {"u": Trace(quantity=PotentialEnergy()), "s": Trace(quantity=JointCoordinate("joint"))}
+    run = simulate(scene, time_step=h, steps=100, method=method, observe=observe)
+    rests = np.array([rest(h * k) for k in range(101)])
+
+    np.testing.assert_allclose(run["u"], 0.5 * stiffness * (run["s"] - rests) ** 2, rtol=1e-12, atol=1e-15)
+    with start(scene, time_step=h, method=method, observe=energy) as held:
+        held.step(30)
+        kept, before = held.save(), float(held["u"])
+        held.step(20)
+        held.restore(kept)
+        assert float(held["u"]) == before == run["u"][30]
+
+
+def test_a_broken_spring_holds_no_energy() -> None:
+    """A load of 20 N on a rail that bears 10 N across: it breaks in the first step, and takes its spring along."""
+    scene = lift(spring=JointSpring(stiffness=100.0, rest=0.2))
+    (rail,) = scene.constraints
+    push = Load(name="push", body="body", force=(20.0, 0.0, 0.0))
+    weak = dataclasses.replace(rail, strength=10.0)
+    scene = dataclasses.replace(scene, constraints=(weak,), forces=(push,), gravity=(0.0, 0.0, 0.0))
+    run = simulate(scene, time_step=0.01, steps=3, observe={"u": Trace(quantity=PotentialEnergy())})
+
+    assert [joint.step for joint in run.broken] == [1]
+    assert run["u"][0] == pytest.approx(0.5 * 100.0 * 0.2**2)
+    assert not run["u"][1:].any()

@@ -318,13 +318,18 @@ void JointSet::break_overloaded(int index, std::int64_t step) {
     if (state.broken) breaks.push_back({index, step, force / time_step_, torque / time_step_});
 }
 
+double JointSet::spring_energy(int joint, double rest, std::span<const BodyState> bodies) const noexcept {
+    if (states[joint].broken) return 0.0;
+    const double turned = coordinate(joint, bodies) - rest;
+    return 0.5 * axials_[joints_[joint].axial].spring_stiffness * turned * turned;
+}
+
 double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept {
     double sum = 0.0;
     for (int joint = 0; joint < count(); ++joint) {
         const int axial = joints_[joint].axial;
-        if (axial < 0 || !axials_[axial].has_spring) continue;
-        const double turned = coordinate(joint, bodies) - axials_[axial].spring_rest;
-        sum += 0.5 * axials_[axial].spring_stiffness * turned * turned;
+        if (axial < 0 || !axials_[axial].has_spring || axials_[axial].rest_moves) continue;
+        sum += spring_energy(joint, axials_[axial].spring_rest, bodies);
     }
     return sum;
 }

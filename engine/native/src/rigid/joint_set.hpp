@@ -143,7 +143,9 @@ public:
     }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);
-    /// Energy of the springs of free coordinates [J].
+    /// Energy of the spring of a joint's free coordinate about `rest` [J]; of a broken joint none.
+    double spring_energy(int joint, double rest, std::span<const BodyState> bodies) const noexcept;
+    /// That of all of them whose rest does not move with the time.
     double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
     void set_speed(int joint, double speed) noexcept { axials_[joints_[joint].axial].speed = speed; }
@@ -157,6 +159,7 @@ public:
     /// A new rest of a spring of a free coordinate; the second: one that moves with the time, with its speeds over
     /// the step before and the coming one.
     void set_rest(int joint, double rest);
+    void let_rest_move(int joint) noexcept { axials_[joints_[joint].axial].rest_moves = true; }
     void set_moving_rest(int joint, double rest, double before, double ahead);
 
     /// Rows whose bounds follow from what other rows carry; the grip of an eye is that of the last assemble().

@@ -18,8 +18,10 @@ void RigidSystem::take_loads(const RigidScene& scene) {
         for (const Collider& floater : scene.floaters) floaters_[floater.body].push_back(floater);
     }
     std::vector<char> follows(constants_.size(), 0);
-    for (const TimeDrive& drive : drives_)
+    for (const TimeDrive& drive : drives_) {
         if (drive.kind == DriveKind::load) follows[drive.index] = 1;
+        if (drive.kind == DriveKind::rest) joints_.let_rest_move(drive.index);
+    }
     for (std::size_t i = 0; i < floaters_.size(); ++i)
         if (!floaters_[i].empty()) follows[i] = 1;
     for (const SpringForce& spring : turning_springs_)

@@ -293,7 +293,12 @@ double RigidSystem::potential_energy() const noexcept {
         sum += energy(spring, place(spring.ends[1]) - place(spring.ends[0]));
     for (const SpringForce& spring : turning_springs_)
         sum += energy(spring, spring_end(spring.ends[1]).place - spring_end(spring.ends[0]).place);
-    return sum + joints_.spring_energy(live_.bodies);
+    sum += joints_.spring_energy(live_.bodies);
+    const double now = static_cast<double>(live_.moved) * h_;
+    for (const TimeDrive& drive : drives_)
+        if (drive.kind == DriveKind::rest)
+            sum += joints_.spring_energy(drive.index, drive.function.at(now), live_.bodies);
+    return sum;
 }
 
 std::vector<double> RigidSystem::final_state() {
