@@ -330,6 +330,9 @@ class DocumentHistory:
     def maps(self, run_id: str) -> tuple[MapData, ...]:
         return self.documents[run_id].maps
 
+    def with_maps(self) -> set[str]:
+        return {run_id for run_id, document in self.documents.items() if document.maps}
+
     def trajectories(self, run_id: str) -> tuple[Trajectory, ...]:
         return self.documents[run_id].trajectories
 

@@ -23,8 +23,10 @@ from spook_tracker.tracker.document.run_document import (
 from spook_tracker.tracker.judge import series_history
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import run_times
+from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.series_history import judge_all, judge_history
-from spook_tracker.tracker.judge.tonight import judge_maps, of_run
+from spook_tracker.tracker.judge.tonight import of_run
+from spook_tracker.tracker.judge.verdict import judge_map
 
 SERIES = SeriesDefinition(
     key="t/c/m",
@@ -289,10 +291,9 @@ def test_maps_are_judged_cell_by_cell():
         **facts, x_label="x", y_label="y", x=(1.0,), y=(1.0,), cells=(("settled",),), prediction=None
     )
     after = msgspec.structs.replace(before, cells=(("growing",),))
-    (found,) = judge_maps([before], [after])
 
-    assert found.red
-    assert found.series == "t/c/map:n"
+    assert judge_map(before, after).red
+    assert map_key(after) == "t/c/map:n"
 
 
 def test_a_stability_map_that_is_not_there_any_more_is_missing_until_it_is_back_or_given_up():
@@ -309,7 +310,8 @@ def test_a_stability_map_that_is_not_there_any_more_is_missing_until_it_is_back_
         told = DocumentHistory(runs[:last])
         (found,) = [f for f in tonight(told, runs[last - 1]) if f.series == key]
         assert (found.red, found.verdict.word) == (True, "missing")
-        assert (found.good.id, found.bad.id) == (runs[2].id, runs[last - 1].id)
+        assert (found.good.id, found.bad.id) == (runs[2].id, runs[3].id)
+        assert found.news == (last == 4)
         assert [h.sentence for c in causes_of(book(told)) for h in c.hits if h.series == key]
 
     given_up = [Accepted(series=key, low=math.inf, high=math.inf, who="A", why="w", removed=True)]

@@ -18,6 +18,7 @@ from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
+from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.tonight import Finding, to_be_timed_again
 from spook_tracker.tracker.store.history import History
@@ -109,17 +110,18 @@ def _earlier(history: History, before: str, after: str) -> Any:
 def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
     """What changed between two versions, each named as on the command line; `before` may be fork-point."""
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
-    from spook_tracker.tracker.judge.tonight import is_newest
+    from spook_tracker.tracker.judge.maps import may_be_dropped
     from spook_tracker.tracker.judge.work import with_work
 
     new = history.resolve(after)
     old = _earlier(history, before, after)
+    dropped = may_be_dropped(history, (old, new))
     earlier, later = (
         ComparedRun(
             side=side_of(run),
             samples=with_work(history.samples(run.id), run.engine),
             maps=history.maps(run.id),
-            newest=is_newest(history, run),
+            dropped=dropped[run.id],
         )
         for run in (old, new)
     )
@@ -191,6 +193,22 @@ def trend(
         if not found:
             raise UnknownName(f"{test} has no metric {metric!r}; it has {', '.join(known)}")
     return list(judge_all(found, accepted).values())
+
+
+def trend_of_maps(
+    history: History, test: str, accepted: Sequence[Accepted] = (), engine: str | None = None
+) -> list[ToldMap]:
+    """What became of the stability maps of a test (or of one map, by its key), of `engine` or the first that has such."""
+    from spook_tracker.tracker.judge.lane import lines
+    from spook_tracker.tracker.judge.maps import told_maps
+
+    for line in lines(history.runs(engine)):
+        told = [
+            found for found in told_maps(history, line, accepted) if test in (found.newest.test, found.key)
+        ]
+        if told:
+            return told
+    return []
 
 
 def publish(

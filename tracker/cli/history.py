@@ -234,18 +234,24 @@ def trend(
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import trend as told_of
+    from spook_tracker.tracker.library import trend_of_maps
 
-    levels = accepted_levels(accepted)
+    levels, choice = accepted_levels(accepted), Choice(kinds=kinds, roles=roles)
     with history_of(database) as history:
-        trends = Choice(kinds=kinds, roles=roles).of_trends(told_of(history, test, metric, levels, engine))
+        every = told_of(history, test, metric, levels, engine)
+        of_engine = every[0].nights[-1].night.run.engine.name
+        maps = [] if metric else choice.of_maps(trend_of_maps(history, test, levels, of_engine))
+    trends = [] if maps and kinds == ("map",) else choice.of_trends(every)
     if as_json:
         from spook_tracker.tracker.cli.report_json import trend_json
 
-        click.echo(trend_json(trends))
+        click.echo(trend_json(trends, maps))
         return
-    from spook_tracker.tracker.cli.report_trend import summary, trend_lines
+    from spook_tracker.tracker.cli.report_trend import map_lines, summary, trend_lines
 
-    say(summary(trends))
+    say(summary(trends, maps))
+    if maps:
+        say("\n".join(map_lines(maps)))
     for told in trends:
         say()
         say("\n".join(trend_lines(told, last)))

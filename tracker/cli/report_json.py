@@ -7,17 +7,35 @@ from typing import Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.json_form import Number, readable
+from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Judged, Told
 
 
-def trend_json(trends: Iterable[Told]) -> str:
-    """A list with an object for each series: its definition, and every night with its verdict, oldest first."""
-    return readable(
-        [
-            {"series": told.key, "definition": told.definition, "nights": [_night(j) for j in told.nights]}
-            for told in trends
-        ]
-    )
+def trend_json(trends: Iterable[Told], maps: Iterable[ToldMap] = ()) -> str:
+    """A list with an object for each series: its definition, and every night with its verdict, oldest first.
+
+    Stability maps stand after them, with what became of them in place of nights.
+    """
+    told: list[dict[str, Any]] = [
+        {"series": told.key, "definition": told.definition, "nights": [_night(j) for j in told.nights]}
+        for told in trends
+    ]
+    return readable(told + [_map(told) for told in maps])
+
+
+def _map(told: ToldMap) -> dict[str, Any]:
+    red = told.verdict.red
+    return {
+        "series": told.key,
+        "definition": None,
+        "nights": [],
+        "word": told.verdict.word,
+        "sentence": told.verdict.sentence,
+        "stands": told.stands,
+        "news": red and told.news,
+        "first_bad": told.bad.engine.git_hash if red else "",
+        "last_good": told.good.engine.git_hash if red else "",
+    }
 
 
 def _night(judged: Judged) -> dict[str, Any]:

@@ -11,18 +11,43 @@ from spook_tracker.tracker.cli.report_table import limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of, is_noisy
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, STATES, spaced
+from spook_tracker.tracker.judge.maps import ToldMap
+from spook_tracker.tracker.judge.series_history import Judged, Told, blame, commit_of, is_noisy
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, spaced
 
 
-def summary(trends: Sequence[Told]) -> str:
+def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
     """One sentence over all: how many series are red in their newest night, and which is the worst."""
     reds = [told for told in trends if told.nights and told.nights[-1].red]
-    if not reds:
-        return click.style(f"✓ {len(trends)} series, none of them red tonight", fg="green")
-    worst = min(reds, key=lambda told: (CLASS_RANK[told.nights[-1].stands], told.definition.role != "gate"))
-    words = f"✗ {len(reds)} of {len(trends)} series red; the worst: {clean(worst.key)}, {name_of(worst.nights[-1])}"
+    named = [
+        (
+            CLASS_RANK[told.nights[-1].stands],
+            told.definition.role != "gate",
+            told.key,
+            name_of(told.nights[-1]),
+        )
+        for told in reds
+    ]
+    named += [
+        (CLASS_RANK[told.stands], True, told.key, told.verdict.name) for told in maps if told.verdict.red
+    ]
+    every = len(trends) + len(maps)
+    if not named:
+        return click.style(f"✓ {every} series, none of them red tonight", fg="green")
+    _, _, key, name = min(named, key=lambda one: one[:2])
+    words = f"✗ {len(named)} of {every} series red; the worst: {clean(key)}, {name}"
     return click.style(words, fg="red", bold=True)
+
+
+def map_lines(maps: Sequence[ToldMap]) -> list[str]:
+    """What became of each stability map, a line each."""
+    return [
+        clean(
+            f"{CLASSES[told.stands][0]} {told.key}: {told.verdict.name or spaced(told.verdict.word)}; "
+            f"{told.verdict.sentence}" + (f"; {blame(told.bad, told.good)}" if told.verdict.red else "")
+        )
+        for told in maps
+    ]
 
 
 def trend_lines(told: Told, last: int = 10) -> list[str]:

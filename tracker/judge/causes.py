@@ -138,7 +138,7 @@ def causes_tonight(findings: Sequence[Finding]) -> list[Cause]:
         else:
             hit = Hit(
                 series=finding.series, test=finding.test, definition=None, name=finding.name,
-                sentence=finding.verdict.sentence, stands="watch", before=math.nan, value=math.nan,
+                sentence=finding.verdict.sentence, stands=finding.stands, before=math.nan, value=math.nan,
                 good=finding.good, bad=finding.bad, standing="detected",
             )  # fmt: skip
         hits.append(hit)

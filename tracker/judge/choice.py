@@ -13,9 +13,12 @@ import msgspec
 from spook_tracker.tracker.document.errors import UnknownName
 from spook_tracker.tracker.judge.compare import exit_code, overall
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
+
+OF_MAP = ("map", "companion")  # kind and role of a stability map
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +52,7 @@ class Choice:
             for finding in findings
             if self.takes(
                 finding.test,
-                finding.definition.kind if finding.definition else "map",
-                finding.definition.role if finding.definition else "companion",
+                *((finding.definition.kind, finding.definition.role) if finding.definition else OF_MAP),
             )
         ]
         self._some(chosen, findings)
@@ -61,6 +63,10 @@ class Choice:
         chosen = [t for t in told if self.takes(t.definition.test, t.definition.kind, t.definition.role)]
         self._some(chosen, told)
         return chosen
+
+    def of_maps(self, told: Sequence[ToldMap]) -> list[ToldMap]:
+        """Those of some maps; there may be none."""
+        return [t for t in told if self.takes(t.newest.test, *OF_MAP)]
 
     def of_comparison(self, document: CompareDocument) -> CompareDocument:
         """The comparison of those alone, with a verdict of its own."""

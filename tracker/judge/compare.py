@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from typing import Any, Literal
@@ -28,6 +28,7 @@ from spook_tracker.tracker.judge.lane import (
     line_of,
     run_time_histories,
 )
+from spook_tracker.tracker.judge.maps import NO_MAP, map_key, stands_of
 from spook_tracker.tracker.judge.series_history import (
     Told,
     is_read_off,
@@ -36,7 +37,7 @@ from spook_tracker.tracker.judge.series_history import (
 )
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
-from spook_tracker.tracker.judge.tonight import NO_MAP, map_key, not_compared
+from spook_tracker.tracker.judge.tonight import not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import OVERALL, RED, WORD_RANK, Class, Overall, Word
 from spook_tracker.tracker.judge.work import FAMILIES
@@ -55,9 +56,7 @@ class ComparedRun:
     maps: Sequence[MapData] = ()
     whole: bool = False  # the whole catalogue was asked: what is not there was removed
     asked: Mapping[str, set[str]] | None = None  # tests by family; None: those it measured
-    newest: bool = (
-        True  # of its engine; of older runs the maps may have been dropped (tracker.store.retention)
-    )
+    dropped: Collection[str] = ()  # keys of maps it may have had (tracker.judge.maps.may_be_dropped)
 
     @property
     def night(self) -> date:
@@ -296,10 +295,9 @@ def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
     changes = []
     for old in before.maps:
         key = map_key(old)
-        if key not in new and (old.test not in asked or not after.newest):
+        if key not in new and (old.test not in asked or key in after.dropped):
             continue
         verdict = judge_map(old, new[key]) if key in new else NO_MAP
-        stands: Class = "fail" if verdict.word == "missing" else "watch" if verdict.red else "pass"
         changes.append(
             Change(
                 series=key,
@@ -311,7 +309,7 @@ def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
                 unit="",
                 word=verdict.word,
                 red=verdict.red,
-                stands=stands,
+                stands=stands_of(verdict),
                 name=verdict.name,
                 sentence=verdict.sentence,
                 before=None,

@@ -6,7 +6,7 @@ are made here and nowhere else, so that whoever judges a history judges them, to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, Protocol
 
@@ -39,6 +39,7 @@ class Records(Protocol):
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
     ) -> Mapping[str, Samples]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
+    def with_maps(self) -> Collection[str]: ...
 
 
 def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
@@ -49,8 +50,8 @@ def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
     """
     of_engine = [other for other in runs if other.engine.name == run.engine.name]
     place = next(i for i, other in enumerate(of_engine) if other.id == run.id)
-    versioned = any(_placed(other) for other in of_engine)
-    before = [other for other in of_engine[:place] if _placed(other) or not versioned]
+    versioned = any(is_placed(other) for other in of_engine)
+    before = [other for other in of_engine[:place] if is_placed(other) or not versioned]
     if run.engine.git_hash:
         aside = elsewhere(before, run)
         before = [other for other in before if other.engine.git_hash not in aside]
@@ -112,7 +113,7 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     This is what `latest` and `previous` choose from on the command line.
     """
     newest = max(runs, key=started)
-    placed = [run for run in runs if _placed(run)]
+    placed = [run for run in runs if is_placed(run)]
     if not placed:
         return list(runs)
     line = line_of(placed, placed[-1])
@@ -120,10 +121,11 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     aside = [run for run in placed if run.id not in here]
     if aside and len(other := line_of(placed, aside[-1])) > len(line):
         line = other  # a branch that was measured once is not what the history is about
-    return line if _placed(newest) else [*line, newest]
+    return line if is_placed(newest) else [*line, newest]
 
 
-def _placed(run: Any) -> bool:
+def is_placed(run: Any) -> bool:
+    """Whether a run has a place in the commit order: of a commit, and without local changes."""
     return bool(run.engine.git_hash) and not run.engine.dirty
 
 

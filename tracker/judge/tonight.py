@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import MapData, SeriesDefinition
-from spook_tracker.tracker.judge.accepted import Accepted, acceptance
+from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.lane import RECENT, Records, asked_for, histories, line_of
+from spook_tracker.tracker.judge.lane import Records, histories, line_of
+from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
 from spook_tracker.tracker.judge.series_history import (
     Judged,
     Told,
     blame,
     commit_of,
     judge_all,
-    night_of,
 )
-from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge_map
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
+from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 MOST_NAMED = 8  # tests in one sentence
 HOW_TO_COMPARE = (
     "; to compare, put today's to the old commit: tracker backfill COMMIT, or the old ones to today's engine: "
     "tracker judge RUN --old-questions"
 )
-NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +41,7 @@ class Finding:
     red: bool
     news: bool = True  # red for a reason of tonight, not only still red
     good: Any = None  # of a map: the run it is compared with
-    bad: Any = None  # of a map: the run it is of
+    bad: Any = None  # of a map: the run it is of, or the first that has lost it
 
     @property
     def name(self) -> str:
@@ -51,62 +49,56 @@ class Finding:
         return name_of(self.judged) if self.judged else self.verdict.name or self.verdict.word
 
     @property
+    def stands(self) -> Class:
+        """What it stands for tonight."""
+        return self.judged.stands if self.judged is not None else stands_of(self.verdict)
+
+    @property
+    def _range(self) -> tuple[Any, Any]:
+        """The last good run and the first bad one, each None where history knows none."""
+        if self.judged is None:
+            return (self.good, self.bad) if self.red else (None, None)
+        good, bad = self.judged.last_good, self.judged.first_bad
+        return good and good.run, bad and bad.run
+
+    @property
     def first_bad(self) -> str:
         """The commit where it began, as far as the history knows."""
-        if self.judged is None or self.judged.first_bad is None:
-            return ""
-        return commit_of(self.judged.first_bad.run)
+        _, bad = self._range
+        return "" if bad is None else commit_of(bad)
 
     @property
     def last_good(self) -> str:
-        if self.judged is None or self.judged.last_good is None:
-            return ""
-        return commit_of(self.judged.last_good.run)
+        good, _ = self._range
+        return "" if good is None else commit_of(good)
 
     @property
     def blame(self) -> str:
         """The commit or the range of commits it came with, in words; empty if history does not know."""
-        if self.judged is None or self.judged.first_bad is None:
-            return ""
-        good = self.judged.last_good
-        return blame(self.judged.first_bad.run, good.run if good else None)
+        good, bad = self._range
+        return "" if bad is None else blame(bad, good)
 
 
 def tonight(records: Records, run: Any, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """Findings of one recorded run against its history (tracker.store.history.History); red first."""
     line = line_of(records.runs(), run)
     findings = of_run(judge_all(histories(records, line), accepted), run.id)
-    findings += _of_maps(records, line, run, accepted)
+    findings += [_of_map(told) for told in told_maps(records, line, accepted) if told.tonight]
     return worst_first(findings)
 
 
-def is_newest(records: Records, run: Any) -> bool:
-    """Whether no later run of its engine is known: the maps of others may have been dropped, which is no answer lost."""
-    of_engine = [other.id for other in records.runs() if other.engine.name == run.engine.name]
-    return not of_engine or of_engine[-1] == run.id
-
-
-def _of_maps(records: Records, line: Sequence[Any], run: Any, accepted: Sequence[Accepted]) -> list[Finding]:
-    """Each stability map against the last run that has it: one that is not there any more stays missing."""
-    asked = asked_for(run, {} if run.asked is not None else records.samples(run.id)).get("stability", set())
-    if not is_newest(records, run):
-        asked = set()
-    maps, seen, findings = records.maps(run.id), set[str](), list[Finding]()
-    for other in reversed(line[-RECENT:-1]):
-        if other.machine.float_environment != run.machine.float_environment:
-            continue
-        earlier = [found for found in records.maps(other.id) if map_key(found) not in seen]
-        seen.update(map(map_key, earlier))
-        for finding in judge_maps(earlier, maps, asked):
-            gone = finding.verdict.word == "missing"
-            taken = (
-                acceptance(accepted, finding.series, math.nan, night_of(run), removed=True) if gone else None
-            )
-            if taken is not None:
-                known = replace(finding.verdict, word="accepted", name="")
-                finding = replace(finding, verdict=known, red=False)
-            findings.append(replace(finding, good=other, bad=run))
-    return findings
+def _of_map(told: ToldMap) -> Finding:
+    return Finding(
+        series=told.key,
+        definition=None,
+        test=told.newest.test,
+        judged=None,
+        verdict=told.verdict,
+        red=told.verdict.red,
+        news=told.news,
+        good=told.good,
+        bad=told.bad,
+    )
 
 
 def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
@@ -148,8 +140,7 @@ def worst_first(findings: Sequence[Finding]) -> list[Finding]:
     """Red before the rest, FAIL before WATCH, news before what was red already."""
 
     def rank(finding: Finding) -> tuple[bool, int, bool, str]:
-        stands = CLASS_RANK[finding.judged.stands] if finding.judged else CLASS_RANK["watch"]
-        return not finding.red, stands, not finding.news, finding.series
+        return not finding.red, CLASS_RANK[finding.stands], not finding.news, finding.series
 
     return sorted(findings, key=rank)
 
@@ -166,28 +157,3 @@ def not_compared(verdicts: Iterable[tuple[str, Verdict]]) -> list[str]:
         ask = HOW_TO_COMPARE if why == NEW_DEFINITION else ""
         said.append(f"not compared, {tests.total()} series of {len(tests)} tests ({named}): {why}{ask}")
     return said
-
-
-def judge_maps(
-    before: Sequence[MapData], after: Sequence[MapData], asked: Collection[str] = ()
-) -> list[Finding]:
-    """Tonight's stability maps against those of an earlier night; `asked` are the tests asked for stability tonight."""
-    new = {map_key(found): found for found in after}
-    findings = []
-    for old in before:
-        key = map_key(old)
-        if key in new:
-            verdict = judge_map(old, new[key])
-        elif old.test in asked:
-            verdict = NO_MAP
-        else:
-            continue
-        findings.append(
-            Finding(series=key, definition=None, test=old.test, judged=None, verdict=verdict, red=verdict.red)
-        )
-    return findings
-
-
-def map_key(stability_map: MapData) -> str:
-    """The series key of a map."""
-    return f"{stability_map.test}/{stability_map.configuration}/map:{stability_map.name}"

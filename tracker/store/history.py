@@ -70,6 +70,7 @@ class History:
         self._by_id = {run.id: run for run in self._runs}
         self._canonical = self._read_names()
         self._definitions: dict[int, SeriesDefinition] = {}
+        self._with_maps: frozenset[str] | None = None
 
     @classmethod
     @contextmanager
@@ -172,6 +173,13 @@ class History:
     def maps(self, run_id: str) -> tuple[document.MapData, ...]:
         """The stability maps of a run; empty once the retention rule has dropped them."""
         return self._bodies("stability_map", run_id, document.MapData)
+
+    def with_maps(self) -> frozenset[str]:
+        """Ids of the runs that have stability maps; read once."""
+        if self._with_maps is None:
+            having = {key for (key,) in self._reader.rows("SELECT DISTINCT run_key FROM stability_map")}
+            self._with_maps = frozenset(run.id for run in self._runs if run.key in having)
+        return self._with_maps
 
     def trajectories(self, run_id: str) -> tuple[document.Trajectory, ...]:
         """The motions recorded in a run; empty once the retention rule has dropped them."""

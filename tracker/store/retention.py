@@ -1,7 +1,8 @@
 """Figures, stability maps and motions are bulky and made every night: old ones are dropped, values never.
 
 Kept are, for each engine, each figure and map as the newest run drew it (clean and dirty builds apart), and
-as the newest run of each released version drew it. Released is a version without a development part
+as the newest run of each released version drew it; a map also as the newest run of each float environment drew it,
+because it is judged against no other. Released is a version without a development part
 ("1.2.0"), or one whose commit has a tag. Of motions the newest eight are kept, so that a reader can lay the
 night a change came in over the one before.
 """
@@ -43,7 +44,8 @@ def drop_old_figures(session: Session, history: History) -> int:
                 by_run.setdefault(run_key, []).append((position, test, name))
             superfluous: list[tuple[RunInfo, int]] = []
             for run in reversed(history.runs()):
-                versions = ["newest" if run.ordered else "newest, dirty"]
+                floats = run.machine.float_environment if model is models.StabilityMap else ""
+                versions = [f"newest {floats}" if run.ordered else f"newest, dirty {floats}"]
                 if released(run, tagged):
                     versions.append(f"released {run.engine.version}")
                 for position, test, name in by_run.get(run.key, ()):

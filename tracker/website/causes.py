@@ -21,10 +21,9 @@ from spook_tracker.tracker.document.wording import (
     version,
 )
 from spook_tracker.tracker.judge.causes import Cause, Hit, causes
+from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.series_history import blame
-from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.events import map_verdicts
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory
 from spook_tracker.tracker.website.page_rows import address
 
@@ -68,33 +67,28 @@ class ToldCause:
 def causes_of(book: Book) -> list[Cause]:
     """Every cause of the history: what lasts first, then the newest, then the widest."""
     told = {trend.definition.key: trend.told for test in book.tests for trend in test.trends}
-    return causes(told, [hit for test in book.tests for hit in _map_hits(test, book.tonight)])
+    return causes(told, [hit for test in book.tests for hit in _map_hits(test)])
 
 
-def _map_hits(test: TestHistory, tonight: Night) -> list[Hit]:
+def _map_hits(test: TestHistory) -> list[Hit]:
     """The stability maps of a test with worse cells than the night before that has them, and those that are gone."""
-    found = []
-    for key, verdict in map_verdicts(test).items():
-        good, newest = test.map_nights.get(key, (None, None))
-        lost = key in test.lost_maps
-        good, bad = (newest, tonight) if lost else (good, newest)
-        if verdict.red and bad is not None:
-            found.append(
-                Hit(
-                    series=key,
-                    test=test.name,
-                    definition=None,
-                    name=verdict.name,
-                    sentence=verdict.sentence,
-                    stands="fail" if lost else "watch",
-                    before=math.nan,
-                    value=math.nan,
-                    good=good,
-                    bad=bad,
-                    standing="detected",
-                )
-            )
-    return found
+    return [
+        Hit(
+            series=told.key,
+            test=test.name,
+            definition=None,
+            name=told.verdict.name,
+            sentence=told.verdict.sentence,
+            stands=told.stands,
+            before=math.nan,
+            value=math.nan,
+            good=told.good,
+            bad=told.bad,
+            standing="detected",
+        )
+        for told in test.told_maps
+        if told.verdict.red
+    ]
 
 
 def lasting(found: Sequence[Cause]) -> list[Cause]:

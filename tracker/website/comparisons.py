@@ -29,8 +29,8 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.known import judged_in, known_of
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
+from spook_tracker.tracker.judge.maps import may_be_dropped
 from spook_tracker.tracker.judge.series_history import Judged, is_release
-from spook_tracker.tracker.judge.tonight import is_newest
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.folder import digest
@@ -82,6 +82,7 @@ def comparisons(
         for t in test.trends
     }
     told = {t.definition.key: t.told for test in book.tests for t in test.trends}
+    dropped = may_be_dropped(history, nights)
 
     def side(night: Night) -> ComparedRun:
         if night.id not in sides:
@@ -92,7 +93,7 @@ def comparisons(
                 maps=history.maps(night.id),
                 whole=asked_whole(night),
                 asked=asked_for(night, samples),
-                newest=is_newest(history, night),
+                dropped=dropped[night.id],
             )
         return sides[night.id]
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from spook_tracker.tracker.judge import events
 from spook_tracker.tracker.judge.events import Event, events_of
-from spook_tracker.tracker.judge.tonight import NO_MAP, judge_maps
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
 from spook_tracker.tracker.website.nights import Book, TestHistory
@@ -27,8 +26,7 @@ def all_events(book: Book) -> list[Event]:
 
 def map_verdicts(test: TestHistory) -> dict[str, Verdict]:
     """What became of the stability maps of a test since the night before that has them, by series key."""
-    found = {finding.series: finding.verdict for finding in judge_maps(test.earlier_maps, test.maps)}
-    return found | dict.fromkeys(test.lost_maps, NO_MAP)
+    return {told.key: told.verdict for told in test.told_maps}
 
 
 def of_test(events: Sequence[Event], test: TestHistory) -> list[Event]:

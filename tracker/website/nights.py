@@ -23,17 +23,16 @@ from spook_tracker.tracker.document.run_document import (
     Trajectory,
 )
 from spook_tracker.tracker.document.wording import day, short_hash, version
-from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.lane import asked_for, histories, lines
-from spook_tracker.tracker.judge.series_history import Told, judge_all, night_of
+from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.lane import histories, lines
+from spook_tracker.tracker.judge.maps import ToldMap, map_key, told_maps
+from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.standing import worst
-from spook_tracker.tracker.judge.tonight import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.earlier_nights import Earlier, earlier_nights
 from spook_tracker.tracker.website.motions import Motion, kept_motions
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
-MapKey = tuple[str, str, str]  # test, configuration, name
 
 
 @dataclass(frozen=True)
@@ -104,9 +103,7 @@ class TestHistory:
     figures: tuple[FigureData, ...] = ()
     motions: tuple[tuple[Night, Trajectory], ...] = ()  # as recorded, newest first; see Book.motions
     maps: tuple[MapData, ...] = ()
-    earlier_maps: tuple[MapData, ...] = ()  # of the night before that has them
-    map_nights: dict[str, tuple[Night | None, Night]] = field(default_factory=dict)  # both, by key of a map
-    lost_maps: tuple[str, ...] = ()  # keys of those that the newest night was asked for and did not answer
+    told_maps: tuple[ToldMap, ...] = ()  # what became of them, as the judge says
 
     def gates(self) -> list[Trend]:
         """The series that decide green or red."""
@@ -123,6 +120,11 @@ class TestHistory:
     def of_kind(self, kind: str) -> list[Trend]:
         """Series of a kind: ladder, order, time, break_point."""
         return [t for t in self.trends if t.definition.kind == kind]
+
+    @property
+    def lost_maps(self) -> tuple[ToldMap, ...]:
+        """Those that are gone, and nobody gave them up."""
+        return tuple(told for told in self.told_maps if told.stands == "fail")
 
     @property
     def state(self) -> Class:
@@ -191,6 +193,7 @@ class Records(Protocol):
     def cards(self, run_id: str) -> Sequence[TestCard]: ...
     def figures(self, run_id: str) -> Sequence[FigureData]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
+    def with_maps(self) -> Collection[str]: ...
     def trajectories(self, run_id: str) -> Sequence[Trajectory]: ...
 
 
@@ -233,9 +236,7 @@ def _chapter(
     cards: dict[str, TestCard] = {}
     figures: dict[str, list[FigureData]] = {}
     motions: dict[str, list[tuple[Night, Trajectory]]] = {}
-    maps: dict[MapKey, MapData] = {}
-    earlier_maps: dict[MapKey, MapData] = {}
-    map_nights: dict[MapKey, tuple[Night | None, Night]] = {}
+    maps: dict[str, MapData] = {}
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
         figures_found = set(figures)
         for card in history.cards(night.id):
@@ -246,15 +247,10 @@ def _chapter(
         for motion in history.trajectories(night.id):
             motions.setdefault(motion.test, []).append((night, motion))
         for stability_map in history.maps(night.id):
-            place_of_map = (stability_map.test, stability_map.configuration, stability_map.name)
-            if place_of_map not in maps:
-                maps[place_of_map], map_nights[place_of_map] = stability_map, (None, night)
-            elif place_of_map not in earlier_maps:
-                earlier_maps[place_of_map] = stability_map
-                map_nights[place_of_map] = night, map_nights[place_of_map][1]
-    evidence = {} if nights[-1].asked is not None else history.samples(nights[-1].id)
-    asked = asked_for(nights[-1], evidence).get("stability", set())
-    lost = {key for key in _lost(maps, map_nights, nights[-1], asked) if not _gone(accepted, key, nights[-1])}
+            maps.setdefault(map_key(stability_map), stability_map)
+    told_of_maps = told_maps(history, nights, accepted)
+    for told_map in told_of_maps:
+        maps.setdefault(told_map.key, told_map.newest)
     by_test: dict[str, list[Trend]] = {}
     for trend in trends.values():
         by_test.setdefault(trend.definition.test, []).append(trend)
@@ -270,30 +266,11 @@ def _chapter(
             figures=tuple(figures.get(test, ())),
             motions=tuple(motions.get(test, ())),
             maps=tuple(m for m in maps.values() if m.test == test),
-            earlier_maps=tuple(m for m in earlier_maps.values() if m.test == test),
-            map_nights={map_key(m): map_nights[place] for place, m in maps.items() if m.test == test},
-            lost_maps=tuple(
-                sorted(map_key(m) for m in maps.values() if m.test == test and map_key(m) in lost)
-            ),
+            told_maps=tuple(told_map for told_map in told_of_maps if told_map.newest.test == test),
         )
         for test, card in cards.items()
     ]
     return nights, sorted(tests, key=lambda t: not t.card.seven), earlier
-
-
-def _lost(
-    maps: Mapping[MapKey, MapData],
-    nights: Mapping[MapKey, tuple[Night | None, Night]],
-    newest: Night,
-    asked: Collection[str],
-) -> list[str]:
-    """Keys of the maps that the newest night was asked for and has not."""
-    return [map_key(m) for place, m in maps.items() if nights[place][1] is not newest and m.test in asked]
-
-
-def _gone(accepted: Sequence[Accepted], key: str, night: Night) -> bool:
-    """Whether somebody accepted that a map is not asked for any more."""
-    return acceptance(accepted, key, math.nan, night_of(night), removed=True) is not None
 
 
 def _bare_card(name: str, title: str) -> TestCard:

@@ -38,7 +38,7 @@ def health(book: Book) -> tuple[Class, Count]:
     """What the newest night stands for, and how many limits and set points hold."""
     found = counted(book)
     states: list[Class] = [t.state for t in tonight(book)]
-    if any(test.lost_maps for test in book.tests):
+    if _maps_missing(book):
         states.append("fail")
     state = worst(states)
     return "none" if state == "followed" and not found.expected else state, found
@@ -60,7 +60,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     step = steps.pop() if len(steps) == 1 else None
     context = {
         "state": state,
-        "headline": _headline(state, found, tonight(book), sum(len(test.lost_maps) for test in book.tests)),
+        "headline": _headline(state, found, tonight(book), _maps_missing(book)),
         "summary": summary(book),
         "new": new,
         "old": old[:MOST_OLD],
@@ -92,6 +92,11 @@ def _nearest(test: TestHistory, book: Book) -> Row:
     shown = min(rows, key=lambda one: (CLASS_RANK[one.state], -float(one.share or 0.0)))
     shown.more = len(rows) - 1
     return shown
+
+
+def _maps_missing(book: Book) -> int:
+    """Stability maps that the newest night was asked for and has not."""
+    return sum(told.tonight for test in book.tests for told in test.lost_maps)
 
 
 def counts_by_night(book: Book, most: int) -> dict[int, Count]:

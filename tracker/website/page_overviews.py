@@ -8,7 +8,7 @@ from typing import Any
 
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.causes import Cause
-from spook_tracker.tracker.judge.tonight import map_key
+from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.vocabulary import OVERALL, spaced
 from spook_tracker.tracker.website.causes import hit_row, told
 from spook_tracker.tracker.website.charts import drawable
