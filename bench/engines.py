@@ -14,10 +14,12 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+import textwrap
 import time
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,7 @@ import bench.engine_kinds as engine_kinds
 import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
 import spook_tracker.tracker.judge.rank as ranks
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.wording import instant, number, quantity, seconds, version
 from spook_tracker.tracker.measure.timing import Repeats
 from spook_tracker.tracker.store.database import session_on
@@ -104,7 +107,7 @@ def page(database: str, of_facts: str = "") -> str:
     timed = {
         name: told for name, told in samples.items() if runs[name].machine.fingerprint == machine.fingerprint
     }
-    races = ranks.races(ranks.standings(timed))
+    run = places(timed)
     elsewhere = ", ".join(name for name in samples if name not in timed)
     lines = [
         "# Every engine on every scene",
@@ -112,18 +115,19 @@ def page(database: str, of_facts: str = "") -> str:
         "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
         f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
-        "Whoever is missing was not installed: `pip install 'spook-tracker[mujoco,exudyn,drake,dart,pybullet]'` and "
-        f"`npm install {' '.join(find.NODE.values())}` bring all.",
+        f"Whoever is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
+        f"and, through npm, of {', '.join(find.NODE.values())}.",
         "",
         *READING,
         *_treatment(samples),
         "",
-        *_choice(races),
+        *_choice(run),
+        *_single(run),
         *_facts(facts),
         *_gates(samples),
         *_rungs(samples, runs),
-        *_first(races),
-        *_behind(races, causes()),
+        *_first(run),
+        *_behind([one.race for one in run], causes()),
     ]
     return "\n".join(lines) + "\n"
 
@@ -146,9 +150,32 @@ def causes() -> Causes:
 
 
 def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
-    """What each engine says to the questions that decide green or red for ours."""
+    """What each engine says to the questions that decide green or red for ours, by whose limit it is."""
     gates = [d for d, _ in samples[OURS].values() if d.role == "gate"]
     told = ranks.answers(gates, samples)
+    facts = {
+        (name, measurement.configuration, metric.name)
+        for name, test in CATALOGUE.items()
+        for measurement, metric in test.metrics()
+        if metric.every_engine
+    }
+    printed = [one for one in told if (one[0].test, one[0].configuration, one[0].metric) in facts]
+    return [
+        f"## {len(told)} gates",
+        "",
+        f"The limits of {len(printed)} are printed or physical and hold for every engine. Those of the others are what our method",
+        "owes where it is right, often rounding: an engine of another method may rightly miss them.",
+        "",
+        f"### {len(printed)} printed or physical limits",
+        "",
+        *_counted(samples, printed),
+        f"### {len(told) - len(printed)} limits of our method",
+        "",
+        *_counted(samples, [one for one in told if one not in printed]),
+    ]
+
+
+def _counted(samples: Mapping[str, ranks.Samples], told: Sequence[Any]) -> list[str]:
     rows = []
     for name in samples:
         mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
@@ -157,10 +184,6 @@ def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
         kept = sum(a.stands == "pass" for a in mine)
         rows.append((name, kept, len(mine) - lacking - failed - kept, failed, lacking))
     return [
-        f"## {len(told)} gates",
-        "",
-        "The limits are physical ones or the method's own; an engine of another method may rightly miss the latter.",
-        "",
         "| engine | keeps | misses | fails | not supported |",
         "|---|---|---|---|---|",
         *(f"| {' | '.join(map(str, row))} |" for row in rows),
@@ -241,34 +264,88 @@ READING = (
     "is one quantity of one scalar test, its *error* the distance from a closed form or a reference of known accuracy, its",
     "*run time* that of the engine's own steps in one thread, models built before. *First* is who comes within an error",
     "soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
-    "supported, by name, and no mark against it.",
+    "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart and pybullet, before",
+    "every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there the run times of these",
+    "three are Python's more than theirs. All others push in their own loop.",
 )
+SINGLE = ("jolt", "rapier")  # whose packages count in single precision, in every setting
 
 
-def _choice(races: Sequence[ranks.Race]) -> list[str]:
+def _single(run: Sequence[Place]) -> list[str]:
+    """How far single precision comes."""
+    told = []
+    for name in SINGLE:
+        asked = {(one.race.test, one.race.ladder) for one in run if name in one.askable}
+        finest = [
+            f"{one.race.test}, {one.race.ladder.replace('_', ' ')}"
+            for one in run
+            if one.race.error == min(ranks.ERRORS) and name in {who for _, who in one.race.order}
+        ]
+        if asked:
+            where = f" ({'; '.join(finest)})" if finest else ""
+            told.append(f"{name} {len(finest)} of {len(asked)} scenes{where}")
+    if not told:
+        return []
+    text = f"Single precision ends near 1e-6 of what a scene is large: within {min(ranks.ERRORS):g} comes {', '.join(told)}."
+    return [*textwrap.wrap(text, 118, break_on_hyphens=False), ""]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A scene at an error: the race, and which engines can be asked that scene at all."""
+
+    race: ranks.Race
+    askable: frozenset[str]
+
+    @property
+    def first(self) -> str:
+        """Who is soonest."""
+        return self.race.order[0][1]
+
+    @property
+    def how(self) -> str:
+        """Whether the first is first of several, the only one to come so near, or the only one that can be asked."""
+        if len(self.race.order) > 1:
+            return "won"
+        return "alone" if self.askable - {self.first} else "unasked"
+
+
+def places(timed: Mapping[str, ranks.Samples]) -> list[Place]:
+    """All races, with who can be asked each."""
+    askable: dict[tuple[str, str], set[str]] = {}
+    for name, told in timed.items():
+        for definition, sample in told.values():
+            if definition.kind == "ladder" and sample.outcome != "not_supported":
+                askable.setdefault((definition.test, definition.metric.split(":")[1]), set()).add(name)
+    return [
+        Place(race, frozenset(askable[race.test, race.ladder]))
+        for race in ranks.races(ranks.standings(timed))
+    ]
+
+
+def _choice(run: Sequence[Place]) -> list[str]:
     """Engine by engine: how many places it reaches, in how many it is first or near, and at which errors."""
-    engines = sorted(
-        {name for race in races for _, name in race.order}, key=lambda name: (name != OURS, name)
-    )
+    engines = sorted({name for one in run for name in one.askable}, key=lambda name: (name != OURS, name))
     rows = []
     for name in engines:
-        here = [
-            (race.error, race.order[0][0], time) for race in races for time, who in race.order if who == name
-        ]
-        first = sum(time <= best for _, best, time in here)
-        near = sum(best < time <= 10.0 * best for _, best, time in here)
-        reached = [sum(error == one for error, _, _ in here) for one in ranks.ERRORS]
-        rows.append((name, first, near, *reached))
+        here = [(one.race, time) for one in run for time, who in one.race.order if who == name]
+        how = Counter(one.how for one in run if one.first == name)
+        near = sum(race.order[0][0] < time <= 10.0 * race.order[0][0] for race, time in here)
+        reached = [sum(race.error == error for race, _ in here) for error in ranks.ERRORS]
+        asked = sum(name in one.askable for one in run)
+        rows.append((name, asked, how["won"], how["alone"], how["unasked"], near, *reached))
     return [
         "## Which engine comes how far",
         "",
-        f"Of {len(races)} places (a scene at an error that somebody reaches): how often an engine is first, how often it",
-        "takes up to ten times as long as the first, and on how many scenes it comes within each error at all.",
+        f"Of {len(run)} places (a scene at an error that somebody reaches): at how many an engine can be asked; how often it is",
+        "first of several that come within the error, the only one to come so near though others can be asked, or the only one",
+        "that can be asked, which is no victory; how often it takes up to ten times as long as the first; and on how many",
+        "scenes it comes within each error at all.",
         "",
-        "| engine | first | within ten times | "
+        "| engine | can be asked | first of several | only one so near | only one asked | within ten times | "
         + " | ".join(f"reaches {error:g}" for error in ranks.ERRORS)
         + " |",
-        "|---|---|---|" + "---|" * len(ranks.ERRORS),
+        "|---|---|---|---|---|---|" + "---|" * len(ranks.ERRORS),
         *(f"| {' | '.join(map(str, row))} |" for row in rows),
         "",
     ]
@@ -329,27 +406,35 @@ HEADS = {
 KINDS = "Five questions whose answers follow from how an engine is made, in every setting (`bench/engine_facts.py` states them):"
 
 
-def _first(races: Sequence[ranks.Race]) -> list[str]:
+def _first(run: Sequence[Place]) -> list[str]:
     """Scene by scene: who comes within an error first, in what time, and what the next needs."""
     lines = [
         "## Who is first",
         "",
-        "Run time to come within an error, in the best setting; in brackets how much longer the next engine takes.",
+        "Run time to come within an error, in the best setting; in brackets how much longer the next engine takes. *Alone*:",
+        "others can be asked and do not come so near. *Only one asked*: nobody else has what the scene needs.",
         "",
         "| scene | " + " | ".join(f"{error:g}" for error in ranks.ERRORS) + " |",
         "|---|" + "---|" * len(ranks.ERRORS),
     ]
     scenes: dict[str, dict[float, str]] = {}
-    for race in races:
+    for one in run:
+        race = one.race
         (best, name), *rest = race.order
-        further = f"{number(rest[0][0] / best, 2)} × {rest[0][1]}" if rest and best > 0.0 else "alone"
+        further = {"alone": "alone", "unasked": "only one asked"}.get(one.how, "")
+        further = further or f"{number(rest[0][0] / best, 2)} × {rest[0][1]}"
         scene = f"{race.test}, {race.ladder.replace('_', ' ')} [{race.unit}]"
         scenes.setdefault(scene, {})[race.error] = f"{name} {seconds(best)} ({further})"
     for scene, cells in scenes.items():
         lines.append(f"| {scene} | {' | '.join(cells.get(error, 'nobody') for error in ranks.ERRORS)} |")
-    won = Counter(race.order[0][1] for race in races)
-    score = ", ".join(f"{name} {count}" for name, count in won.most_common())
-    return [*lines, "", f"First in {len(races)} places (a scene at an error): {score}.", ""]
+    kinds = {"won": "first of several", "alone": "the only one so near", "unasked": "the only one asked"}
+    told = []
+    for how, words in kinds.items():
+        score = Counter(one.first for one in run if one.how == how)
+        if score:
+            names = ", ".join(f"{name} {count}" for name, count in score.most_common())
+            told.append(f"{words} in {sum(score.values())}: {names}")
+    return [*lines, "", f"Of {len(run)} places (a scene at an error): {'; '.join(told)}.", ""]
 
 
 def _behind(races: Sequence[ranks.Race], known: Causes) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ import msgspec
 import pytest
 
 import spook_tracker.tracker as tracker
+from spook_tracker.tracker.judge.rank import Race
 from tests.synthetic_history import document, rival
 
 THEIRS = msgspec.structs.replace(rival("3.1"), trigger="manual")
@@ -46,6 +49,62 @@ def test_the_page_says_who_is_first_and_why_we_are_behind(
     assert "| rival | 5 | 1 | 0 | 1 |" in told, "a door too heavy, and friction is not supported"
     assert "Order four. A composition." in told
     assert "ours never" in told.partition("## Where another engine is first")[2]
+
+
+@pytest.mark.parametrize(
+    ("theirs", "how", "told"),
+    [
+        ("value", "won", "rival 468 µs (1.1 × spook)"),
+        ("diverged", "alone", "spook 500 µs (alone)"),
+        ("not_supported", "unasked", "spook 500 µs (only one asked)"),
+    ],
+)
+def test_a_place_is_won_reached_alone_or_nobody_elses_to_win(
+    engines: Any, theirs: str, how: str, told: str
+) -> None:
+    """Ours within an error in half a millisecond; the other a little sooner, not at all, or never asked."""
+    races = (tracker_race((468e-6, "rival"), (500e-6, "spook")), tracker_race((500e-6, "spook")))
+    place = engines.Place(
+        races[theirs != "value"], frozenset({"spook"} if theirs == "not_supported" else {"spook", "rival"})
+    )
+
+    assert place.how == how
+    lines = engines._first([place])
+    assert any(told in line.replace("\u202f", " ") for line in lines), lines
+    score = {"won": "first of several in 1: rival 1", "alone": "the only one so near in 1: spook 1",
+             "unasked": "the only one asked in 1: spook 1"}[how]  # fmt: skip
+    assert lines[-2] == f"Of 1 places (a scene at an error): {score}."
+    ours = next(line for line in engines._choice([place]) if line.startswith("| spook |"))
+    assert ours.split(" | ")[1:5] == ["1", "0", str(int(how == "alone")), str(int(how == "unasked"))]
+
+
+def tracker_race(*order: tuple[float, str]) -> Race:
+    return Race(test="pendulum", ladder="length", unit="%", error=1e-4, order=order)
+
+
+def test_printed_limits_and_those_of_our_method_are_counted_apart(engines: Any, tmp_path: Path) -> None:
+    """One gate of the made-up history is given a printed limit in the catalogue."""
+    database = f"sqlite:///{tmp_path}/engines.db"
+    first = document(0)
+    gate = next(d for d in first.series if d.role == "gate" and d.test == "pendulum")
+    printed = msgspec.structs.replace(gate, configuration="curved", metric="length_deviation")
+    series = tuple(printed if d is gate else d for d in first.series)
+    tracker.record(msgspec.structs.replace(first, series=series), database)
+    told = engines.page(database).partition("## 7 gates")[2]
+
+    assert "### 1 printed or physical limits" in told
+    assert "| spook | 1 | 0 | 0 | 0 |" in told
+    assert "### 6 limits of our method" in told
+    assert "| spook | 6 | 0 | 0 | 0 |" in told
+
+
+def test_an_engine_of_single_precision_is_said_to_end_where_it_ends(engines: Any) -> None:
+    fine = Race(test="grasp", ladder="held", unit="m", error=1e-6, order=((1e-4, "spook"), (2e-4, "jolt")))
+    coarse = Race(test="pendulum", ladder="angle", unit="rad", error=1e-6, order=((1e-4, "spook"),))
+    both = [engines.Place(race, frozenset({"spook", "jolt"})) for race in (fine, coarse)]
+
+    assert "within 1e-06 comes jolt 1 of 2 scenes (grasp, held)." in " ".join(engines._single(both))
+    assert engines._single([engines.Place(coarse, frozenset({"spook"}))]) == []
 
 
 def test_a_page_without_a_run_of_ours_is_refused(engines: Any, tmp_path: Path) -> None:
@@ -141,3 +200,24 @@ def test_a_new_page_says_so_too(engines: Any, tmp_path: Path) -> None:
     assert count > 0
     assert f"Rungs that ran out of time: {count} of the others, 0 of ours." in told
     assert "All nights together, the facts above not counted: " in told
+
+
+def test_a_package_called_tests_that_an_engine_brings_is_taken_out_and_nothing_else(tmp_path: Path) -> None:
+    """DART's wheel has one: it would be found in place of ours."""
+    about = tmp_path / "brings_tests-1.0.dist-info"
+    for file in ("tests/test_theirs.py", "brings_tests/tests/kept.py", "brings_tests/engine.py"):
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).write_text("")
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: brings_tests\nVersion: 1.0\n")
+    (about / "RECORD").write_text(
+        "tests/test_theirs.py,,\nbrings_tests/tests/kept.py,,\nbrings_tests/engine.py,,\n"
+    )
+    script = FILE.parents[1] / ".ci" / "without_tests.py"
+    for name in ("brings_tests", "nobody_has_this"):
+        subprocess.run(
+            [sys.executable, str(script), name], check=True, env={**os.environ, "PYTHONPATH": str(tmp_path)}
+        )
+
+    left = sorted(str(file.relative_to(tmp_path)) for file in tmp_path.rglob("*.py"))
+    assert left == ["brings_tests/engine.py", "brings_tests/tests/kept.py"]
