@@ -10,19 +10,21 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
+
+import msgspec
 
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.choice import Choice
-from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
+from spook_tracker.tracker.judge.compare import TIMES, ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
-from spook_tracker.tracker.judge.lane import line_of
+from spook_tracker.tracker.judge.lane import asked_for, line_of
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION
-from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.judge.work import FAMILIES, with_work
 from spook_tracker.tracker.measure.commits import CommitError, full_hash
 
 FIRST_BAD = re.compile(r"^([0-9a-f]{40,64}) is the first bad commit", re.MULTILINE)
@@ -62,56 +64,109 @@ def _samples(run: RunDocument) -> dict[str, tuple[SeriesDefinition, Sample]]:
     return {sample.series: (definitions[sample.series], sample) for sample in run.samples}
 
 
+UNTOLD = ("not_comparable", "not_measured")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OldAnswers:
-    """What became of tests whose definition changed, by their old definition: or why that cannot be told."""
+    """What became of tests whose definition changed, by their old definition, as far as that can be told."""
 
     commit: str  # whose questions
     tests: tuple[str, ...]
-    changes: tuple[Change, ...] = ()
-    why_not: str = ""
+    changes: tuple[Change, ...]  # of every series, also of those that could not be compared
+    why_not: str = ""  # why nothing was answered
 
     @property
     def red(self) -> bool:
         return any(change.red for change in self.changes)
 
+    @property
+    def told(self) -> list[Change]:
+        """What could be compared."""
+        return [change for change in self.changes if change.word not in UNTOLD]
+
+    @property
+    def untold(self) -> list[Change]:
+        """What could not; each says why."""
+        return [change for change in self.changes if change.word in UNTOLD]
+
+    @property
+    def open(self) -> bool:
+        """Whether it says nothing of some value: then it is not green. Work is only counted in the same build."""
+        return any(change.kind not in (*TIMES, "work") for change in self.untold) or not self.told
+
 
 def by_old_questions(
-    history: Any, run: Any, findings: Sequence[Finding], ask: Callable[[str, tuple[str, ...]], RunDocument]
+    history: Any,
+    run: Any,
+    findings: Sequence[Finding],
+    ask: Callable[..., RunDocument],
+    choice: Choice | None = None,
 ) -> list[OldAnswers]:
     """The tests of a run whose definition changed, judged by what they asked before.
 
-    `ask(commit, tests)` gives today's engine's answers to the questions of that commit; it raises CommitError.
+    `ask(commit, tests, *options)` gives today's engine's answers to the questions of that commit, with the options of
+    `tracker run`; it raises CommitError. Of each series the newest earlier answer counts: sweeps are rarer than values.
     """
+    choice = choice or Choice()
     changed = {
-        f.test
+        f.series: f.test
         for f in findings
         if f.verdict.word == "not_comparable" and f.verdict.sentence == NEW_DEFINITION
     }
-    told = []
+    first, told = set(changed.values()), list[OldAnswers]()
     for old in reversed(line_of(history.runs(), run)[:-1]):
-        stored = {key: pair for key, pair in history.samples(old.id).items() if pair[0].test in changed}
-        tests = tuple(sorted({definition.test for definition, _ in stored.values()}))
-        if not tests:
-            continue
-        changed -= set(tests)
-        commit = old.engine.git_hash
-        try:
-            if not commit or old.engine.dirty:
-                raise CommitError(f"run {old.id[:8]} is of no commit: nobody knows any more what it asked")
-            document = ask(commit, tests)
-            if document.engine.git_hash != run.engine.git_hash:
-                raise CommitError(
-                    f"the engine here is {document.engine.version}, not that of the run; check out and build its commit"
-                )
-            before = ComparedRun(side=side_of(old), samples=stored)
-            after = ComparedRun(side=side_of(document), samples=_samples(document))
-            changes = compare(before, after).changes
-            judged = tuple(change for change in changes if change.word not in ("not_measured", "new"))
-            told.append(OldAnswers(commit=commit, tests=tests, changes=judged))
-        except CommitError as error:
-            told.append(OldAnswers(commit=commit, tests=tests, why_not=str(error)))
+        if not changed and not first:
+            break
+        stored = {
+            key: pair
+            for key, pair in history.samples(old.id).items()
+            if (key in changed or pair[0].test in first)
+            and choice.takes(pair[0].test, pair[0].kind, pair[0].role)
+        }
+        if stored:
+            tests = {definition.test for definition, _ in stored.values()}
+            first -= tests
+            changed = {key: test for key, test in changed.items() if key not in stored}
+            answers = _by_questions_of(old, run, stored, tuple(sorted(tests)), ask)
+            chosen = tuple(c for c in answers.changes if choice.takes(c.test, c.kind, c.role))
+            told.append(replace(answers, changes=chosen))
     return told
+
+
+def _by_questions_of(
+    old: Any,
+    run: Any,
+    stored: dict[str, tuple[SeriesDefinition, Sample]],
+    tests: tuple[str, ...],
+    ask: Callable[..., RunDocument],
+) -> OldAnswers:
+    commit = old.engine.git_hash
+    before = ComparedRun(side=side_of(old), samples=with_work(stored, old.engine))
+    families = {FAMILIES[definition.kind] for definition, _ in stored.values()}
+    try:
+        if not commit or old.engine.dirty:
+            raise CommitError(f"run {old.id[:8]} is of no commit: nobody knows any more what it asked")
+        document = ask(commit, tests, *(f"--{more}" for more in ("sweep", "stability") if more in families))
+        if document.engine.git_hash != run.engine.git_hash:
+            raise CommitError(
+                f"the engine here is {document.engine.version}, not that of the run; check out and build its commit"
+            )
+    except CommitError as error:
+        nothing = compare(before, ComparedRun(side=side_of(run), samples={})).changes
+        untold = (msgspec.structs.replace(change, sentence=str(error)) for change in nothing)
+        return OldAnswers(commit=commit, tests=tests, changes=tuple(untold), why_not=str(error))
+    samples = {key: pair for key, pair in _samples(document).items() if key in stored}
+    after = ComparedRun(
+        side=side_of(document),
+        samples=with_work(samples, document.engine),
+        asked=asked_for(document, samples),
+    )
+    return OldAnswers(
+        commit=commit,
+        tests=tests,
+        changes=tuple(change for change in compare(before, after).changes if change.word != "new"),
+    )
 
 
 def bisect(

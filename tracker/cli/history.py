@@ -166,36 +166,38 @@ def judge_command(
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
-    RUN is named as for compare. What is red ends with exit code 1, a run that measured nothing with 3.
+    RUN is named as for compare. What is red ends with exit code 1, a run that measured nothing with 3, as do old
+    questions some of whose values cannot be told.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json, old_answer_lines
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import idle_entries, judge
 
+    choice = Choice(tests=tests, kinds=kinds, roles=roles)
     levels, run = accepted_levels(accepted), of_engine(engine, run)
     with history_of(database) as history:
         findings = judge(history, run, levels)
         notes = idle_entries(history, run, findings, levels)
-        asked_before = _by_old_questions(history, history.resolve(run), findings) if old_questions else []
-    findings = Choice(tests=tests, kinds=kinds, roles=roles).of_findings(findings)
+        findings = choice.of_findings(findings)
+        then = _by_old_questions(history, history.resolve(run), findings, choice) if old_questions else []
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
-        junit_file.write_text(junit_of_night(findings), encoding="utf-8")
+        junit_file.write_text(junit_of_night(findings, then), encoding="utf-8")
     if as_json:
-        click.echo(findings_json(findings))
+        click.echo(findings_json(findings, then))
     else:
         say("\n".join([*finding_lines(findings), *(f"note: {note}" for note in notes)]))
-        for old in asked_before:
+        for old in then:
             say("\n".join(old_answer_lines(old)))
-    if any(finding.red for finding in findings) or any(old.red for old in asked_before):
+    if any(finding.red for finding in findings) or any(old.red for old in then):
         click.get_current_context().exit(RED)
-    if not findings:
+    if not findings or any(old.open for old in then):
         click.get_current_context().exit(NOT_COMPARABLE)
 
 
-def _by_old_questions(history: Any, run: Any, findings: Any) -> Any:
+def _by_old_questions(history: Any, run: Any, findings: Any, choice: Any) -> Any:
     """Answers of this engine to the questions of earlier commits, in the repository where one stands."""
     import spook_tracker.tracker.past as past
     from spook_tracker.tracker.cli.past import KEPT
@@ -203,9 +205,11 @@ def _by_old_questions(history: Any, run: Any, findings: Any) -> Any:
 
     repository = repository_at(Path.cwd())
     kept = Path(KEPT).resolve()
-    return past.by_old_questions(
-        history, run, findings, lambda commit, tests: ask_today(checked_out(repository, commit, kept), tests)
-    )
+
+    def ask(commit: str, tests: tuple[str, ...], *options: str) -> Any:
+        return ask_today(checked_out(repository, commit, kept), tests, *options)
+
+    return past.by_old_questions(history, run, findings, ask, choice)
 
 
 @click.command(epilog=example("tracker trend pendulum max_length_deviation"))

@@ -243,18 +243,33 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
 
 
 def old_answer_lines(old: Any) -> list[str]:
-    """What became of tests by their old definition (tracker.past.OldAnswers)."""
+    """What became of tests by their old definition (tracker.past.OldAnswers), and what could not be told."""
     tests = ", ".join(map(clean, old.tests))
     asked = f"{tests} as asked at {old.commit[:12] or 'no commit'}"
     if old.why_not:
         return [f"? {asked}: cannot be told; {clean(old.why_not)}"]
-    red = [change for change in old.changes if change.red]
-    if not red:
-        return [f"✓ {asked}: {len(old.changes)} series, none worse"]
-    return [
-        click.style(f"✗ {asked}: {len(red)} of {len(old.changes)} series worse", fg="red"),
-        *red_lines(red),
+    red, told = [change for change in old.changes if change.red], old.told
+    why: dict[str, list[Any]] = {}
+    for change in old.untold:
+        why.setdefault(change.sentence, []).append(change)
+    left = [
+        f"? of these, {len(changes)} cannot be told, {kinds_of(changes)}: {clean(sentence)}"
+        for sentence, changes in why.items()
     ]
+    if not told:
+        return [f"? {asked}: none of {len(old.changes)} series can be told", *left]
+    if not red:
+        return [f"{'?' if old.open else '✓'} {asked}: {len(told)} series, none worse", *left]
+    return [
+        click.style(f"✗ {asked}: {len(red)} of {len(told)} series worse", fg="red"),
+        *red_lines(red),
+        *left,
+    ]
+
+
+def kinds_of(changes: Sequence[Any]) -> str:
+    """How many there are of each kind, in words."""
+    return ", ".join(f"{count} {spaced(kind)}" for kind, count in Counter(c.kind for c in changes).items())
 
 
 def _verdicts(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
@@ -298,10 +313,13 @@ def _finding_line(finding: Finding, site: str) -> str:
     return clean("; ".join(parts))
 
 
-def findings_json(findings: Sequence[Finding]) -> str:
-    """What tonight came to, the worst first, as JSON: a list with an object for each series."""
+def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
+    """What tonight came to, the worst first, as JSON: a list with an object for each series.
 
-    told = [
+    After them, of `then` (tracker.past.OldAnswers), one for each series by its old question; `asked_at` is whose.
+    """
+
+    told: list[dict[str, Any]] = [
         {
             "series": finding.series,
             "test": finding.test,
@@ -315,5 +333,22 @@ def findings_json(findings: Sequence[Finding]) -> str:
             "last_good": finding.last_good,
         }
         for finding in findings
+    ]
+    told += [
+        {
+            "series": change.series,
+            "test": change.test,
+            "asked_at": old.commit,
+            "word": change.word,
+            "name": change.name,
+            "red": change.red,
+            "news": change.red,
+            "sentence": change.sentence,
+            "value": change.after,
+            "first_bad": "",
+            "last_good": "",
+        }
+        for old in then
+        for change in old.changes
     ]
     return readable(told)

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import spook_tracker.tracker.document.outside as outside
 from spook_tracker.tracker.cli.report_compare import red_line
 from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.judge.comparison_document import CompareDocument
+from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.standing import is_red
 from spook_tracker.tracker.judge.tonight import Finding
 
 ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+class Case(NamedTuple):
+    """One value that is judged."""
+
+    name: str
+    failure: str = ""  # what is wrong with it
+    crashed: bool = False
+    skipped: str = ""  # why nothing can be said of it
 
 
 def legal(text: str) -> str:
@@ -34,50 +44,56 @@ def junit_of_run(run: RunDocument) -> str:
             words += ", set point left"
         failure = f"{words} {sample.failure}".strip() if is_red(definition, sample) else ""
         name = definition.key.partition("/")[2]
-        cases[definition.test].append((name, failure, sample.outcome == "crashed"))
-    return _document(dict(cases))
+        cases[definition.test].append(Case(name, failure, sample.outcome == "crashed"))
+    return _document(cases)
 
 
-def junit_of_night(findings: Sequence[Finding]) -> str:
-    """Every series of a night as judged against its history."""
+def junit_of_night(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
+    """Every series of a night as judged against its history.
+
+    After them, of `then` (tracker.past.OldAnswers), those by old questions; what cannot be told is skipped.
+    """
     cases = defaultdict(list)
     for finding in findings:
         failure = f"{finding.name}: {finding.verdict.sentence}; {finding.blame}" if finding.red else ""
         sample = finding.judged.night.sample if finding.judged else None
         crashed = sample is not None and sample.outcome == "crashed"
-        cases[finding.test].append((finding.series.partition("/")[2], failure, crashed))
-    return _document(dict(cases))
+        cases[finding.test].append(Case(finding.series.partition("/")[2], failure, crashed))
+    for old in then:
+        asked = f" as asked at {old.commit[:12] or 'no commit'}"
+        for change in old.changes:
+            cases[change.test].append(_of_change(change, asked))
+    return _document(cases)
 
 
 def junit_of_comparison(document: CompareDocument) -> str:
     """Every series of a comparison; red ones fail, incomparable ones are skipped."""
-    suites = Element("testsuites")
-    groups = defaultdict(list)
+    cases = defaultdict(list)
     for change in document.changes:
-        groups[change.test].append(change)
-    for test, changes in sorted(groups.items()):
-        suite = SubElement(suites, "testsuite", name=legal(test), tests=str(len(changes)))
-        suite.set("failures", str(sum(change.red for change in changes)))
-        for change in changes:
-            name = change.series.partition("/")[2]
-            case = SubElement(suite, "testcase", classname=legal(test), name=legal(name))
-            if change.red:
-                SubElement(case, "failure", message=legal(red_line(change)))
-            elif change.word in ("not_comparable", "not_measured"):
-                SubElement(case, "skipped", message=legal(change.sentence))
-    return _text(suites)
+        cases[change.test].append(_of_change(change))
+    return _document(dict(sorted(cases.items())))
 
 
-def _document(cases: dict[str, list[tuple[str, str, bool]]]) -> str:
+def _of_change(change: Change, asked: str = "") -> Case:
+    return Case(
+        name=change.series.partition("/")[2] + asked,
+        failure=red_line(change) if change.red else "",
+        skipped=change.sentence if change.word in ("not_comparable", "not_measured") else "",
+    )
+
+
+def _document(cases: Mapping[str, Sequence[Case]]) -> str:
     suites = Element("testsuites")
     for test, found in cases.items():
         suite = SubElement(suites, "testsuite", name=legal(test), tests=str(len(found)))
-        suite.set("failures", str(sum(bool(failure) and not crashed for _, failure, crashed in found)))
-        suite.set("errors", str(sum(bool(failure) and crashed for _, failure, crashed in found)))
-        for name, failure, crashed in found:
-            case = SubElement(suite, "testcase", classname=legal(test), name=legal(name))
-            if failure:
-                SubElement(case, "error" if crashed else "failure", message=legal(failure))
+        suite.set("failures", str(sum(bool(one.failure) and not one.crashed for one in found)))
+        suite.set("errors", str(sum(bool(one.failure) and one.crashed for one in found)))
+        for one in found:
+            case = SubElement(suite, "testcase", classname=legal(test), name=legal(one.name))
+            if one.failure:
+                SubElement(case, "error" if one.crashed else "failure", message=legal(one.failure))
+            elif one.skipped:
+                SubElement(case, "skipped", message=legal(one.skipped))
     return _text(suites)
 
 
