@@ -9,8 +9,10 @@ references from distributed tables go to reference tables. The stand-ins look al
 from __future__ import annotations
 
 import re
+from datetime import UTC, datetime
 
 import pytest
+from msgspec.structs import replace
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
@@ -130,4 +132,50 @@ def test_months_of_postgresql_hold_what_was_there_and_what_comes(postgresql_url:
         assert {"2026_09", "2026_10", "other"} < read("series_id = 7")
     with engine.begin() as connection:  # a year later
         connection.execute(text("SELECT months.make(now(), INTERVAL '3 years')"))
+    engine.dispose()
+
+
+def test_months_are_made_for_nights_that_had_none(postgresql_url: str) -> None:
+    """A clock that was wrong, before the tables are laid out or after it, and a team that forgot to make further months."""
+    engine = open_database(postgresql_url)
+    later = datetime.now(UTC).year + 5
+    make = text(f"SELECT months.make('{later}-01-01 00:00:00+00', INTERVAL '6 years')")
+    stray = [replace(night(3, 0.1), started=f"{year}-03-03T03:00:00+00:00") for year in (1970, later, 2199)]
+    with Session(engine) as session:
+        assert record(session, stray[0])
+    with engine.connect() as connection:
+        driver = connection.connection.driver_connection
+        driver.autocommit = True
+        driver.execute("\n".join(statements("postgresql")))
+        driver.autocommit = False
+    engine.dispose()
+
+    engine = open_database(postgresql_url)
+    parts = text(
+        "SELECT substring(relname FROM 8), n FROM pg_class c JOIN pg_namespace s ON s.oid = relnamespace, "
+        "LATERAL (SELECT (xpath('/row/n/text()', query_to_xml(format("
+        "'SELECT count(*) AS n FROM months.%I', relname), false, true, '')))[1]::text::int AS n) AS held "
+        "WHERE nspname = 'months' AND relkind = 'r' AND relname LIKE 'sample\\_%'"
+    )
+    with Session(engine) as session:
+        held = dict(session.execute(parts).all())
+        assert held["1970_03"] == 1
+        assert (
+            len(held) == 1 + 25 + 1
+        )  # its month, this one and those of two years, and the part for the rest
+        session.rollback()
+        for document in stray[1:]:
+            assert record(session, document)
+        assert dict(session.execute(parts).all())["other"] == 2
+        told = [encode(History(session).document(document.id)) for document in stray]
+        session.execute(make)
+        session.commit()
+        held = dict(session.execute(parts).all())
+        assert (held[f"{later}_03"], held["2199_03"], held["other"]) == (1, 1, 0)
+        assert sum(held.values()) == 3
+        assert [encode(History(session).document(document.id)) for document in stray] == told
+        session.execute(make)  # finds nothing to do
+        session.rollback()
+    with engine.connect() as connection:
+        assert differences(connection) == []
     engine.dispose()

@@ -22,6 +22,7 @@ from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.store.reader import LOCK_TIMEOUT, SAFE, address
 
 DEFAULT = "sqlite:///tracker.db"
+ONE_WRITER = 5755  # number of the lock that who writes to PostgreSQL holds
 NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "9p", "ceph", "lustre", "fuse.sshfs"})
 
 

@@ -12,7 +12,14 @@ from sqlalchemy import URL, Connection, Engine, inspect, text
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError
-from spook_tracker.tracker.store.connection import connected, database_url, in_words, is_file, shown
+from spook_tracker.tracker.store.connection import (
+    ONE_WRITER,
+    connected,
+    database_url,
+    in_words,
+    is_file,
+    shown,
+)
 from spook_tracker.tracker.store.damage import told_of_damage
 from spook_tracker.tracker.store.head import head, known_revisions
 
@@ -98,7 +105,7 @@ def one_writer(on: Connection | Session) -> None:
     """Wait until this transaction is the only one that writes. SQLite does so at its beginning, by itself."""
     connection = on if isinstance(on, Connection) else on.connection()
     if connection.dialect.name == "postgresql":
-        connection.execute(text("SELECT pg_advisory_xact_lock(5755)"))
+        connection.execute(text(f"SELECT pg_advisory_xact_lock({ONE_WRITER})"))
 
 
 def _pragma(connection: Any, words: str) -> None:

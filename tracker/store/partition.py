@@ -20,6 +20,7 @@ from sqlalchemy.schema import (
 )
 
 from spook_tracker.tracker.store import views
+from spook_tracker.tracker.store.connection import ONE_WRITER
 from spook_tracker.tracker.store.models import NAMING, Base
 
 Kind = Literal["postgresql", "timescaledb", "citus"]
@@ -29,20 +30,42 @@ MAKE = """
 CREATE OR REPLACE FUNCTION months.make(since timestamptz, ahead interval) RETURNS void LANGUAGE plpgsql AS $$
 DECLARE
     large text;
+    part text;
     month timestamp;  -- begin, in UTC
+    first timestamptz;
+    past timestamptz;
+    stray boolean;
 BEGIN
+    PERFORM pg_advisory_xact_lock({lock});  -- as whoever records a run
     FOREACH large IN ARRAY ARRAY[{large}] LOOP
-        FOR month IN SELECT generate_series(
-            date_trunc('month', since AT TIME ZONE 'UTC'), (now() AT TIME ZONE 'UTC') + ahead, INTERVAL '1 month')
-        LOOP
-            EXECUTE format('CREATE TABLE IF NOT EXISTS months.%I PARTITION OF %I FOR VALUES FROM (%L) TO (%L)',
-                large || to_char(month, '_YYYY_MM'), large, month AT TIME ZONE 'UTC',
-                (month + INTERVAL '1 month') AT TIME ZONE 'UTC');
-        END LOOP;
         EXECUTE format('CREATE TABLE IF NOT EXISTS months.%I PARTITION OF %I DEFAULT', large || '_other', large);
+        FOR month IN
+            SELECT generate_series(
+                date_trunc('month', since AT TIME ZONE 'UTC'), (now() AT TIME ZONE 'UTC') + ahead, INTERVAL '1 month')
+            UNION SELECT date_trunc('month', started_at AT TIME ZONE 'UTC') FROM run
+        LOOP
+            part := large || to_char(month, '_YYYY_MM');
+            CONTINUE WHEN to_regclass(format('months.%I', part)) IS NOT NULL;
+            first := month AT TIME ZONE 'UTC';
+            past := (month + INTERVAL '1 month') AT TIME ZONE 'UTC';
+            EXECUTE format('SELECT EXISTS (SELECT FROM months.%I WHERE {time} >= %L AND {time} < %L)',
+                large || '_other', first, past) INTO stray;
+            IF stray THEN  -- nights from before their month was made: a part may not be added while another has its rows
+                EXECUTE format('CREATE TABLE months.%I (LIKE %I INCLUDING DEFAULTS INCLUDING CONSTRAINTS)', part, large);
+                EXECUTE format('WITH moved AS (DELETE FROM months.%I WHERE {time} >= %L AND {time} < %L RETURNING *) '
+                    'INSERT INTO months.%I SELECT * FROM moved', large || '_other', first, past, part);
+                EXECUTE format('ALTER TABLE %I ATTACH PARTITION months.%I FOR VALUES FROM (%L) TO (%L)',
+                    large, part, first, past);
+            ELSE
+                EXECUTE format('CREATE TABLE months.%I PARTITION OF %I FOR VALUES FROM (%L) TO (%L)',
+                    part, large, first, past);
+            END IF;
+        END LOOP;
     END LOOP;
 END $$;"""
-AHEAD = "2 years"  # months that are made in advance; what comes later is kept in a part for all the rest
+AHEAD = (
+    "2 years"  # months that are made in advance, beside those of runs; the rest is kept in a part of its own
+)
 
 
 def statements(kind: Kind) -> Iterator[str]:
@@ -60,7 +83,7 @@ def _by_month() -> Iterator[str]:
     large = [table for table in tables if is_large(table)]
     dialect = make_url("postgresql+psycopg://").get_dialect()()
     yield "BEGIN;"
-    yield "SELECT pg_advisory_xact_lock(5755);"  # as whoever records a run
+    yield f"SELECT pg_advisory_xact_lock({ONE_WRITER});"  # as whoever records a run
     yield from (f"DROP VIEW IF EXISTS {name};" for name in reversed([*views.VIEWS, "column_comments"]))
     yield "CREATE SCHEMA months;"
     yield "CREATE SCHEMA before;"
@@ -70,8 +93,9 @@ def _by_month() -> Iterator[str]:
         made: list[ExecutableDDLElement] = [CreateTable(table), *map(CreateIndex, table.indexes)]
         made += [SetTableComment(table), *(SetColumnComment(c) for c in table.columns if c.comment)]
         yield from (f"{str(part.compile(dialect=dialect)).strip()};" for part in made)
-    yield MAKE.strip().format(large=", ".join(f"'{table.name}'" for table in large))
-    yield f"SELECT months.make(coalesce((SELECT min({TIME}) FROM run), now()), INTERVAL '{AHEAD}');"
+    names = ", ".join(f"'{table.name}'" for table in large)
+    yield MAKE.strip().format(large=names, lock=ONE_WRITER, time=TIME)
+    yield f"SELECT months.make(now(), INTERVAL '{AHEAD}');"
     for table in large:
         names = ", ".join(column.name for column in table.columns)
         yield f"INSERT INTO {table.name} ({names}) SELECT {names} FROM before.{table.name};"
