@@ -5,6 +5,7 @@ import json
 import re
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -13,11 +14,12 @@ import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.engine import simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.website.causes import causes_of, told
+from spook_tracker.tracker.website.motions import SEEN, apart
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import arrive, look, wait_for
 from tests.synthetic_history import DocumentHistory, document
-from tests.test_site_motion import shifted
+from tests.test_site_motion import moved, shifted
 
 SUBJECT, AUTHOR = "Fold <b>two</b> rods into one & save a step", "Dee O'Example"
 BROKEN, TONIGHT = 9, 9
@@ -85,8 +87,7 @@ def test_the_first_page_tells_the_new_cause_with_commit_author_damage_tests_and_
         assert damage in red
     for test in ("Friction", "Door on hinges", "Chain of 26 spheres"):
         assert test in red
-    assert "The worst: Chain of 26 spheres" in red
-    assert "no value" in red
+    assert "The worst: Friction" in red  # a limit before a rung that has no value
 
 
 def test_what_broke_earlier_stands_apart_in_a_line(tmp_path):
@@ -180,6 +181,26 @@ def test_one_click_leads_from_the_first_page_to_the_moment_it_goes_wrong(driver,
     assert sample == recorded[0].count // 2
     assert 0 <= top < 900
     assert "against=friction-" in against and "t=" in against
+
+
+def test_what_leads_there_is_a_scene_in_which_it_can_be_seen(recorded):
+    """The first test hit moves by a millimetre of a metre, the second by a quarter."""
+    sound, wrong = recorded
+    little = moved(sound, 1e-3)
+    door = [msgspec.structs.replace(motion, test="door") for motion in (sound, wrong)]
+    found = []
+    for n, night in enumerate(nights().documents.values()):
+        pair = (little, door[1]) if n >= BROKEN else (sound, door[0])
+        found.append(msgspec.structs.replace(night, trajectories=pair))
+    told_apart = book(DocumentHistory(found))
+    red = told(causes_of(told_apart)[0], told_apart)
+
+    assert red.tests[0].title == "Friction"
+    assert red.replay.startswith("tests/door.html#against=door-")
+    assert apart(sound, wrong) == pytest.approx(250 * apart(sound, little), rel=0.1)  # of quantised places
+    assert apart(sound, little) < SEEN < apart(sound, wrong)
+    assert apart(sound, msgspec.structs.replace(wrong, count=sound.count - 1)) == 0.0
+    assert f"SEEN = {SEEN};" in (Path(__file__).parent.parent / "site" / "static" / "replay.js").read_text()
 
 
 def test_subject_and_author_stand_wherever_a_version_is_chosen_or_listed(site):

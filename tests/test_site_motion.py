@@ -18,12 +18,17 @@ NOISE = ("GL Driver Message", "software WebGL")  # what the browser says of draw
 
 
 def shifted(recorded):
-    """The same motion, wrong from the middle on."""
+    """The same motion, a quarter of a metre higher from the middle on."""
+    return moved(recorded, 0.25)
+
+
+def moved(recorded, up):
+    """The same motion, so many metres higher from the middle on."""
     channels = []
     for channel in recorded.channels:
         if channel.name == "position":
             values = motion.values_of(channel, recorded.count).copy()
-            values[recorded.count // 2 :, 2] += 0.25
+            values[recorded.count // 2 :, 2] += up
             channel = motion.channel("position", "m", values)
         channels.append(channel)
     return type(recorded)(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -158,3 +159,15 @@ def test_the_hover_text_of_plotly_is_inert() -> None:
     assert trace["hoverinfo"] == "text"
     assert "hovertemplate" not in trace
     assert "<a" not in trace["text"][0]
+
+
+@pytest.mark.parametrize(("low", "high"), [(2.7e-4, 1.2e-3), (1.5e-6, 8.8e-6), (3.1, 3.9), (2e-9, 9e3)])
+def test_words_at_a_logarithmic_axis_leave_room_for_each_other(low: float, high: float) -> None:
+    line = Line(name="a", x=(low, high), y=(1.0, 2.0))
+    axis = figure(chart((1.0, 2.0), lines=(line,), x_scale="log"))["layout"]["xaxis"]
+    marks = [math.log10(value) for value in axis["tickvals"]]
+    room = axis["range"][1] - axis["range"][0]
+
+    assert marks == sorted(marks)
+    assert 1 <= len(marks) <= 8
+    assert all(b - a >= room / 8.0 for a, b in pairwise(marks))

@@ -110,7 +110,7 @@ class LivePage {
     const place = this.facts.querySelector('[data-fact="order of accuracy"]');
     if (!LIVE_SCENES[this.name].smooth) { place.textContent = "none: contacts make the motion jump"; return; }
     const order = observedOrder(this.engine, this.name, parameters);
-    place.textContent = Number.isFinite(order) ? `${order.toFixed(2)} (by halving h twice, first second)` : "not measurable here: the differences are rounding, or a run failed";
+    place.textContent = Number.isFinite(order) ? `${order.toFixed(2)} of the positions (h halved twice, first second)` : "not measurable here: the differences are rounding, or a run failed";
   }
 }
 

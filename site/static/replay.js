@@ -42,14 +42,19 @@ async function movieFrom(source) {
 
 function sameScene(one, other) { return one.bodies === other.bodies && one.count === other.count && one.step === other.step; }
 
-const TOLD = 1e-4, SEEN = 0.02;  // of the scene's reach: what the stored digits can tell, what an eye sees
+const TOLD = 1e-4;  // of the reach of its bodies: what the stored digits can tell
+const SEEN = 0.05;  // of half the picture: what an eye sees
 
-// The first sample at which two nights are further apart than a share of the scene's reach; -1 if there is none.
-function firstDifference(one, other, share) {
-  const away = apart(one.position, other.position, one.bodies, one.count);
-  let reach = 0;
-  one.position.forEach((v) => { reach = Math.max(reach, Math.abs(v) || 0); });
-  return away.findIndex((d) => !(d <= share * reach));
+// The first sample at which two nights are so far apart, in metres; -1 if there is none.
+function firstDifference(one, other, far) {
+  return apart(one.position, other.position, one.bodies, one.count).findIndex((d) => !(d <= far));
+}
+
+function reachOf(movie) { return movie.position.reduce((most, v) => Math.max(most, Math.abs(v) || 0), 0); }
+
+function halfPicture(movie) {
+  const { low, high } = extentOf(movie);
+  return Math.hypot(...high.map((v, k) => v - low[k])) / 2;
 }
 
 async function startReplay(box) {
@@ -90,12 +95,12 @@ async function startReplay(box) {
         say(`${source.label} was recorded with other steps or bodies, so it cannot be laid over tonight.`);
         return;
       }
-      const at = firstDifference(tonight, night, TOLD);
+      const at = firstDifference(tonight, night, TOLD * reachOf(tonight));
       first.hidden = false;
       first.disabled = at < 0;
       first.textContent = at < 0 ? "No difference" : "First difference";
       first.dataset.sample = String(at);
-      first.dataset.seen = String(firstDifference(tonight, night, SEEN));
+      first.dataset.seen = String(firstDifference(tonight, night, SEEN * halfPicture(tonight)));
       player.use({ ...tonight, ghost: { name: source.label, position: night.position, orientation: night.orientation, energy: night.energy } }, true);
       if (beside.querySelector("input").checked) { player.beside(night, label); }
     }

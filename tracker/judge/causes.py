@@ -224,9 +224,11 @@ def _cause(hits: list[Hit], order: Mapping[str, int]) -> Cause:
     return Cause(good=good, bad=hits[0].bad, hits=tuple(sorted(hits, key=_rank)))
 
 
-def _rank(hit: Hit) -> tuple[int, int, float, str]:
+def _rank(hit: Hit) -> tuple[int, int, bool, float, str]:
+    """Of one class what decides before what is only followed, as in comparisons: a lost rung says less than a limit."""
     margin = 0.0 if math.isnan(hit.margin) else hit.margin
-    return STANDINGS.index(hit.standing), CLASS_RANK[hit.stands], -margin, hit.series
+    decides = hit.definition is not None and hit.definition.role == "gate"
+    return STANDINGS.index(hit.standing), CLASS_RANK[hit.stands], not decides, -margin, hit.series
 
 
 def _order(told: Mapping[str, Told]) -> dict[str, int]:

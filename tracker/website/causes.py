@@ -24,6 +24,7 @@ from spook_tracker.tracker.judge.causes import Cause, Hit, causes
 from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.series_history import blame
 from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.website.motions import SEEN, apart
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory
 from spook_tracker.tracker.website.page_rows import address
 
@@ -161,15 +162,18 @@ def _damage(hits: Sequence[Hit]) -> list[tuple[str, int]]:
 def _replay(
     by_test: dict[str, list[Hit]], known: dict[str, TestHistory], good: Night | None, book: Book
 ) -> str:
-    """The first test hit whose recorded motion differs from that of the last good night, at that moment."""
+    """Where it is seen to go wrong: the first test hit whose motion parts from that of the last good night as far as
+    an eye sees, else the one that parts furthest; empty if none does."""
+    found: list[tuple[float, str]] = []
     for name in by_test:
-        keys = {motion.night.id: motion.key for motion in book.motions[name]}
-        if good is None or good.id not in keys or book.tonight.id not in keys:
+        motions = {motion.night.id: motion for motion in book.motions[name]}
+        if good is None or good.id not in motions or book.tonight.id not in motions:
             continue
-        now, then = keys[book.tonight.id], keys[good.id]
-        if now != then:
-            return f"{address(known[name])}#against={then}&at=first"
-    return ""
+        now, then = motions[book.tonight.id], motions[good.id]
+        if now.key != then.key:
+            far = apart(now.recorded, then.recorded)
+            found.append((min(far, SEEN), f"{address(known[name])}#against={then.key}&at=first"))
+    return max(found, key=lambda one: one[0], default=(0.0, ""))[1]
 
 
 def hit_row(hit: Hit, book: Book) -> dict[str, Any]:

@@ -79,9 +79,10 @@ def view(chart: Chart, *, table: bool = True) -> View:
         for line, i in points[:: every or 1]:
             at = labels.get(line.x[i]) or number(line.x[i], 6)
             rows.append((clean(line.name), at, number(line.y[i], 6)))
+    data = figure(chart, shown)
     return View(
-        chart.name, chart.title, chart.thesis, shown.note, picture(chart, shown), figure(chart, shown), columns, rows, every,
-        sum(not line.quiet for line in chart.lines) > 5,
+        chart.name, chart.title, chart.thesis, shown.note, picture(chart, shown), data, columns, rows, every,
+        data["layout"]["showlegend"] and sum(not line.quiet for line in chart.lines) > 5,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 from spook_tracker.tracker.document.wording import clean, number
@@ -153,7 +154,9 @@ def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]
         decades = ticks(low, high, scale)
         shown = decades if len(decades) > 2 else _within(low, high, (1, 2, 5))
         if len(shown) < 3:
-            shown = _within(low, high, (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9))
+            shown = _legible(
+                [_within(low, high, steps) for steps in ((1,), (5, 2), (3, 7), (1.5, 4))], high - low
+            )
         axis |= {
             "tickvals": [10.0**e for e in shown],
             "ticktext": [number(float(f"{10.0**e:.3g}"), 3) for e in shown],
@@ -166,6 +169,15 @@ def _within(low: float, high: float, steps: Sequence[float]) -> list[float]:
     """Marks inside the decades, as decades."""
     marks = [e + math.log10(m) for e in range(math.floor(low), math.ceil(high)) for m in steps]
     return [e for e in marks if low <= e <= high]
+
+
+def _legible(ranks: Sequence[Sequence[float]], room: float) -> list[float]:
+    """Marks whose words do not touch, those of the first ranks before the rest."""
+    kept: list[float] = []
+    for mark in chain.from_iterable(ranks):
+        if all(abs(mark - other) >= room / 7.0 for other in kept):
+            kept.append(mark)
+    return sorted(kept)
 
 
 def _polar(layout: dict[str, Any], chart: Chart) -> None:

@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import base64
 import json
+import math
+import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from spook_tracker.tracker.document.json_form import encode
@@ -57,6 +60,39 @@ def kept_motions(tests: Iterable[TestHistory]) -> dict[str, tuple[Motion, ...]]:
                 spent += len(script)
             found[test.name].append(Motion(night, recorded, key, written[key]))
     return {name: tuple(motions) for name, motions in found.items()}
+
+
+SEEN = 0.05  # of half the picture: what an eye sees (as replay.js has it)
+WORLD = -1  # among the bodies of a link
+
+
+@lru_cache(maxsize=256)  # causes share nights, and stand on three pages
+def apart(one: Trajectory, other: Trajectory) -> float:
+    """The largest distance along an axis between two motions of a scene, as a share of half the diagonal of what the
+    first shows: its bodies, and the places in the world they hang from. 0 if they are of different scenes."""
+    if (one.count, one.step, one.bodies) != (other.count, other.step, other.bodies):
+        return 0.0
+    mine, theirs = (_values(motion, "position") for motion in (one, other))
+    fixed = [link.anchors[end] for link in one.links for end in (0, 1) if link.bodies[end] == WORLD]
+    ends = [
+        [place[axis] for place in fixed] + list(filter(math.isfinite, mine[axis::3])) for axis in range(3)
+    ]
+    size = math.hypot(*(max(along, default=0.0) - min(along, default=0.0) for along in ends)) / 2.0
+    far = max((abs(a - b) for a, b in zip(mine, theirs, strict=True) if math.isfinite(a - b)), default=0.0)
+    return far / size if size > 0.0 else 0.0
+
+
+def _values(motion: Trajectory, name: str) -> list[float]:
+    """The numbers of a channel (tracker.document.run_document.Channel says how they are packed)."""
+    channel = next(channel for channel in motion.channels if channel.name == name)
+    packed = zlib.decompress(channel.data)
+    half, codes, found = len(packed) // 2, [0] * channel.width, []
+    for place in range(half):
+        column = place % channel.width
+        codes[column] = (codes[column] + packed[place] + 256 * packed[half + place]) % 65536
+        code = codes[column]
+        found.append(math.nan if code == 65535 else channel.low + channel.step * code)
+    return found
 
 
 def _script(key: str, motion: Trajectory) -> bytes:

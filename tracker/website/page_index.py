@@ -56,6 +56,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         for test in book.tests
         if not (test.card.seven and test.gates()) and _judged(test)
     ]
+    others.sort(key=lambda one: CLASS_RANK[one.state] if one.state in RED else len(CLASS_RANK))
     steps = {t.definition.time_step for test, t in gates if test.card.seven}
     step = steps.pop() if len(steps) == 1 else None
     context = {
@@ -190,6 +191,7 @@ def said(state: Class) -> str:
     return CLASSES[state][1]
 
 
+RED: tuple[Class, ...] = ("fail", "watch")
 QUIET: tuple[Class, ...] = ("pass", "followed", "none")  # the best first
 
 
