@@ -129,12 +129,18 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
+def blow_costs(kick: float, w: float) -> float:
+    """First order in h of the energy that a blow at ω keeps [1/s]: what kicks in its step, `kick` times ω h, counts twice;
+    the corner's arm is that at a lean of h ω, 6 ω sin α cos α over what is kept; and the step's own energy before and
+    after is off by the kick."""
+    s, c = math.sin(SLENDER), math.cos(SLENDER)
+    return 2.0 * kick + 6.0 * w * s * c / KEPT + 2.0 * kick * (1.0 + 1.0 / KEPT)
+
+
 def kept_limit(time_step: float) -> float:
-    """First order of the energy kept: gravity's kick in the step of the blow, 2 h p² sin α/ω; the corner's arm at a lean
-    of h ω, 6 h ω sin α cos α over what is kept; and the step's own energy before and after, off by h p² sin α/ω."""
-    w, s, c = speed(START), math.sin(SLENDER), math.cos(SLENDER)
-    kick = RATE**2 * s / w
-    return time_step * (2.0 * kick + 6.0 * w * s * c / KEPT + 2.0 * kick * (1.0 + 1.0 / KEPT))
+    """Gravity kicks by h p² sin α."""
+    w = speed(START)
+    return time_step * blow_costs(RATE**2 * math.sin(SLENDER) / w, w)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:

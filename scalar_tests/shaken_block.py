@@ -46,6 +46,7 @@ from spook_tracker.scalar_tests.rocking_block import (
     MASS,
     RATE,
     SLENDER,
+    blow_costs,
     blows,
 )
 from spook_tracker.scalar_tests.sweep import line, told
@@ -194,12 +195,11 @@ def measure(simulate: Simulate) -> dict[str, float]:
 
 
 def blow_error(time_step: float) -> float:
-    """First order of the speed kept at the blow: half of what is off in the energy. In the step of the blow gravity and the
-    floor kick by h p² (sin α + a/g cos α), the corner's arm is that at a lean of h ω, and the step's own energy before and
-    after is off by the kick (as of the block on a floor at rest)."""
-    w, s, c = abs(rocking().speed), math.sin(SLENDER), math.cos(SLENDER)
-    kick = RATE**2 * (s + SHAKE * UPLIFT / GRAVITY * c) / w
-    return 0.5 * time_step * (2.0 * kick + 6.0 * w * s * c / KEPT + 2.0 * kick * (1.0 + 1.0 / KEPT))
+    """First order of the speed kept at the blow: half of what is off in the energy. In its step gravity and the floor kick
+    by h p² (sin α + a/g cos α)."""
+    w = abs(rocking().speed)
+    kick = RATE**2 * (math.sin(SLENDER) + SHAKE * UPLIFT / GRAVITY * math.cos(SLENDER)) / w
+    return 0.5 * time_step * blow_costs(kick, w)
 
 
 def before_limit(time_step: float) -> float:
