@@ -77,7 +77,7 @@ Segment edge_of(const Polytope& polytope, const Polytope::Edge& edge) noexcept {
 
 SegmentSolid segment_solid(const Segment& core, const Polytope& polytope) noexcept {
     double enter = -core.half, leave = core.half;
-    const Polytope::Face* nearest_face = nullptr;
+    const Polytope::Face* nearest_face = polytope.faces.data();  // also of what is no number
     double overlap = -1e300;
     for (const Polytope::Face& face : polytope.faces) {
         const double start = dot(face.normal, core.centre) - face.offset,

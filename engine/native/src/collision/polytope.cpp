@@ -59,7 +59,7 @@ double farthest(const Polytope& polytope, Vec3 n) noexcept {
 }
 
 Nearest nearest(const Polytope& polytope, Vec3 p) noexcept {
-    const Polytope::Face* highest = nullptr;
+    const Polytope::Face* highest = polytope.faces.data();  // also of what is no number
     double top = -1e300;
     for (const Polytope::Face& face : polytope.faces) {
         const double height = dot(face.normal, p) - face.offset;

@@ -33,7 +33,7 @@ namespace {
 
 /// The face of `one` that the other lies farthest beyond; `sign` turns its normal from second to first.
 SolidAxes::Best best_face(const Solid& one, const Solid& other, double sign) noexcept {
-    SolidAxes::Best best;
+    SolidAxes::Best best{-1e300, sign * one.normal(0), 0, 0};  // also of what is no number
     for (int k = 0; k < static_cast<int>(one.shape.faces.size()); ++k) {
         const Vec3 n = one.normal(k);
         const double gap = other.lowest(n) - dot(n, one.corner_of(one.face(k), 0));
