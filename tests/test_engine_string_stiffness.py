@@ -166,3 +166,43 @@ def test_it_takes_no_momentum_from_what_floats(kind: str, h: float, corrections:
 
     assert run.status == "completed" and run["f"].max() > 0.1
     assert run["l"].max() < 1e-11 and run["p"].max() < 1e-11
+
+
+EDGES = {
+    "one that is held": ({"a": (1.0, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))}, ((0.0, 0.0, 1.0), "a")),
+    "a light one that turns about two heavy ones": (
+        {
+            "a": (1e15, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+            "b": (1e15, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+            "c": (1.0, (0.0, 0.5, 0.0), (0.0, 0.0, 1.0)),
+        },
+        ("a", "b"),
+        ("a", "c"),
+        ("c", "b"),
+    ),
+    "a heavy one and a speck": (
+        {"a": (1.0, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "b": (1e-15, (1.0, 0.0, 0.0), (0.0, -1.0, 0.3))},
+        ("a", "b"),
+    ),
+    "a tiny pair": (
+        {"a": (1.0, (0.0, 0.0, 0.0), (0.0, -0.5, 0.0)), "b": (1.0, (1e-9, 0.0, 0.0), (0.0, 0.5, 0.0))},
+        ("a", "b"),
+    ),
+}
+
+
+@pytest.mark.parametrize("h", [H, 0.5])
+@pytest.mark.parametrize("name", EDGES)
+def test_nor_at_the_edges_of_what_floats(name: str, h: float) -> None:
+    """Bodies of all masses, in one line and about it; what is held owes its momentum to what holds it."""
+    bodies, *ends = EDGES[name]
+    scene = Scene(
+        bodies=tuple(Particle(name=k, mass=m, position=x, velocity=v) for k, (m, x, v) in bodies.items()),
+        constraints=tuple(Distance(name=f"{a} {b}", between=(a, b)) for a, b in ends),  # type: ignore[arg-type]
+    )
+    observe = {"l": Trace(quantity=AngularMomentum()), "e": MaximumAbsolute(quantity=Energy())}
+    run = simulate(scene, time_step=h, steps=400, method=STRINGS, observe=observe)
+
+    assert run.status == "completed" and run["e"] < 1.0
+    if name != "one that is held":
+        assert np.abs(run["l"] - run["l"][0]).max() < 1e-11

@@ -182,6 +182,7 @@ private:
         Mat3 inertia;
     };
     IslandFrame island_frame(const std::vector<int>& members) const;
+    Vec3 turn_of(const std::vector<int>& members, Vec3 centre, Vec3 angular_momentum) const;
     struct Loop;
     void find_loops();
     void judge_loops();
