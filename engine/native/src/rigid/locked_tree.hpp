@@ -156,8 +156,8 @@ private:
         if (states) ask(&bodies[links_[k].body], sizeof(BodyState));
     }
 
-    std::vector<Link> links_;  // leaves first; a parent follows one of its children at once
-    std::vector<Hold> holds_;
+    LargeArray<Link> links_;  // leaves first; a parent follows one of its children at once
+    LargeArray<Hold> holds_;
     std::vector<Gain> gains_;
     LargeArray<Work> works_;
     std::vector<Carried> waiting_;

@@ -57,8 +57,8 @@ public:
         replaying_ = true;
         early_joints_.clear();
     }
-    /// Fewer steps between two checks, the larger the scene: a time limit is looked at there.
-    std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 8, 64); }
+    /// Fewer steps between two checks, the larger the scene: they are taken back together.
+    std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 16, 64); }
 
     class Memory;
     /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it. Where

@@ -27,8 +27,9 @@ struct Health {
 ///   void save(), void restore()            keep and take back everything advance() changes, for a replay
 ///   int64 block() const                    steps between two checks, at most
 /// The check costs nothing inside a step: a block that ends unfit is replayed step by step to find the step. Blocks
-/// begin with one step, and grow as long as they are short. Long steps look at the clock themselves (Watch); a block
-/// they leave unfinished is taken back: no more than a few hundredths of a second of whole steps.
+/// begin with one step, and grow as long as they are short, or keeping what a replay needs is a fiftieth of them. Long
+/// steps look at the clock themselves (Watch); a block they leave unfinished is taken back: a few hundredths of a second
+/// of whole steps, or a hundred times what keeping the state of a large scene costs.
 template <class System>
 void run_loop(System& system, Recorder& recorder, std::int64_t steps, double time_limit, RunReport& report) {
     Watch watch(time_limit);
@@ -75,10 +76,11 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
             stop(done);
             break;
         }
+        const double before = watch.elapsed();
         system.save();
         recorder.save();
         const std::int64_t from = done;
-        const double began = watch.elapsed();
+        const double began = watch.elapsed(), enough = 50.0 * (began - before);
         try {
             run_block(std::min(done + length, steps));
         } catch (const Stopped&) {
@@ -89,8 +91,9 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
             break;
         }
         const double took = watch.elapsed() - began;
-        if (took > Watch::patience) length = std::max<std::int64_t>(1, length / 2);
-        else if (2.0 * took < Watch::patience) length = std::min(2 * length, system.block());
+        if (took < std::max(0.5 * Watch::patience, enough)) length = std::min(2 * length, system.block());
+        else if (took > std::max(Watch::patience, 2.0 * enough))
+            length = std::max<std::int64_t>(1, length / 2);
     }
     if (health.status != Status::completed) {
         report.status = health.status;
