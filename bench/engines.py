@@ -50,7 +50,7 @@ Causes = Mapping[tuple[str, str], tuple[str, str]]  # (test, engine): (cause, wh
 def installed() -> list[str]:
     """Ours, and every other engine that is here."""
     found = [OURS]
-    for name in (*find.EXTRAS, *find.NODE):
+    for name in (*find.EXTRAS, *find.NODE, *find.BUILT):
         try:
             find.find(name)
         except find.EngineMissing as reason:
@@ -116,7 +116,7 @@ def page(database: str, of_facts: str = "") -> str:
         f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
         f"Whoever is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
-        f"and, through npm, of {', '.join(find.NODE.values())}.",
+        f"and, through npm, of {', '.join(find.NODE.values())}, and builds {', '.join(find.BUILT)} from its source.",
         "",
         *READING,
         *_treatment(samples),
@@ -268,7 +268,7 @@ READING = (
     "every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there the run times of these",
     "three are Python's more than theirs. All others push in their own loop.",
 )
-SINGLE = ("jolt", "rapier")  # whose packages count in single precision, in every setting
+SINGLE = ("box3d", "jolt", "rapier")  # whose packages count in single precision, in every setting
 
 
 def _single(run: Sequence[Place]) -> list[str]:

@@ -1,7 +1,7 @@
 """An engine by its name: ours, one of `engine/peers/`, one a package announces, or module:attribute.
 
     spook                      ours (also "engine", the older name)
-    mujoco, exudyn, cannon …   another engine behind an adapter of ours, an optional extra (from PyPI or npm)
+    mujoco, exudyn, cannon …   another engine behind an adapter of ours: an optional extra (from PyPI or npm), or built
     any other word             what an installed package announces as an entry point "spook_tracker.engines"
     my_engine, my_engine:NAME  a module with simulate and build_info, or an `Adapter` called ENGINE or NAME
 
@@ -40,6 +40,9 @@ NODE: Mapping[str, str] = {
     "jolt": "jolt-physics",
     "p2": "p2-es",
 }  # engine: its package, from npm
+BUILT: Mapping[str, str] = {
+    "box3d": ".ci/box3d"
+}  # engine: what builds it from its source, in a checkout of ours
 
 
 class EngineMissing(EngineError):
@@ -74,7 +77,7 @@ def find(name: str) -> Any:
     """The engine of that name: our package, a Peer, or a module. Raises EngineMissing."""
     if name in OURS:
         return importlib.import_module("spook_tracker.engine")
-    if name in EXTRAS or name in NODE:
+    if name in EXTRAS or name in NODE or name in BUILT:
         return Peer(_peer(name).ENGINE)
     for point in entry_points(group=GROUP):
         if point.name == name:
@@ -91,7 +94,7 @@ def find(name: str) -> Any:
 
 def known() -> tuple[str, ...]:
     """Names of the engines that can be asked for, installed or not."""
-    return ("spook", *EXTRAS, *NODE, *sorted(point.name for point in entry_points(group=GROUP)))
+    return ("spook", *EXTRAS, *NODE, *BUILT, *sorted(point.name for point in entry_points(group=GROUP)))
 
 
 def _faced(found: Any) -> Any:
@@ -105,8 +108,13 @@ def _peer(name: str) -> Any:
     try:
         return importlib.import_module(f"spook_tracker.engine.peers.{name}")
     except ImportError as error:
-        how = f"npm install {NODE[name]}" if name in NODE else f"pip install 'spook-tracker[{name}]'"
-        raise EngineMissing(f"engine {name!r} is not installed ({error}); install it with: {how}") from None
+        if name in BUILT:
+            how = f"build it with: {BUILT[name]}"
+        elif name in NODE:
+            how = f"install it with: npm install {NODE[name]}"
+        else:
+            how = f"install it with: pip install 'spook-tracker[{name}]'"
+        raise EngineMissing(f"engine {name!r} is not installed ({error}); {how}") from None
 
 
 def _loaded(name: str, load: Any) -> Any:

@@ -145,3 +145,13 @@ def test_a_missing_engine_is_answered_with_what_to_install(monkeypatch: pytest.M
         find("mujoco")
     with pytest.raises(EngineMissing, match="name one of spook, mujoco"):
         find("no_such_engine_anywhere")
+
+
+def test_a_library_that_is_not_built_is_answered_with_what_builds_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("TRACKER_BOX3D", str(tmp_path / "libspook_box3d.so"))
+    monkeypatch.delitem(sys.modules, "spook_tracker.engine.peers.box3d", raising=False)
+
+    with pytest.raises(EngineMissing, match=r"no libspook_box3d\.so in .*; build it with: \.ci/box3d"):
+        find("box3d")
