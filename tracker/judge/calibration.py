@@ -65,16 +65,18 @@ def taken_again(night: Point) -> str:
 
 
 def engines_own(nights: Sequence[Point]) -> list[float]:
-    """The values to be judged, in seconds of the machine as it usually is; as they are without a kernel."""
-    kernels = [found for night in nights if (found := _kernel(night)) is not None]
-    usual = median(kernels) if kernels else 1.0
+    """The values to be judged, in seconds of the machine as it was when it was first calibrated.
+
+    They are as they are without a kernel. No later night changes them, nor what was said of them.
+    """
+    first = next((found for night in nights if (found := _kernel(night)) is not None), 1.0)
     values = []
     for night in nights:
         kernel, timing = _kernel(night), night.sample.timing
         if kernel is None or timing is None:
             values.append(night.value)
         else:
-            values.append(that_counts(timing).cpu_seconds[0] * usual / kernel)
+            values.append(that_counts(timing).cpu_seconds[0] * first / kernel)
     return values
 
 

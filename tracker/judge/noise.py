@@ -29,7 +29,7 @@ from spook_tracker.tracker.judge.shifts import (
     shift,
     standard_error,
 )
-from spook_tracker.tracker.judge.slower import Usual, change_in_words, slower, worse_by
+from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.visits import Visited, Visits, left_before, steadiness
 from spook_tracker.tracker.judge.vocabulary import State
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 WINDOW = 30  # nights that say what is usual
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
-LEAST = 0.01  # relative: no change below is told
 FLOOR = 0.05  # relative; less where the noise is less than an eighth of it, of nights enough
 ENOUGH = 20  # nights
 CLEAR = 8.0  # noises, below the floor: the noise of few nights may be told too small
@@ -73,12 +72,14 @@ def judge_noisy(
     releases: Sequence[bool] | None = None,
     accepted: Sequence[bool] | None = None,
     tolerance: float = 0.0,
+    absolute: float = 0.0,
 ) -> list[Noisy]:
     """A verdict for each value of one machine, oldest first. Values are positive; worse is larger.
 
-    `tolerance`: the relative change up to which the series' definition tells none, whatever its noise.
+    `tolerance` and `absolute`: the change, relative and in the unit of the values, up to which the series' definition
+    tells none, whatever its noise.
     """
-    walk = _Walk(values, larger_is_better, tolerance)
+    walk = _Walk(values, larger_is_better, tolerance, absolute)
     releases = releases or [False] * len(values)
     accepted = accepted or [False] * len(values)
     found = [walk.night(place, releases[place], accepted[place]) for place in range(len(values))]
@@ -93,6 +94,7 @@ class _Walk:
     values: Sequence[float]
     larger_is_better: bool
     tolerance: float = 0.0
+    absolute: float = 0.0
     usual: list[int] = field(default_factory=list)  # places of the last nights that hold
     level_since: list[int] = field(default_factory=list)  # the same, back to where the level began
     reached: list[float] = field(default_factory=list)  # deviations of nights that hold; worse is positive
@@ -332,7 +334,7 @@ class _Walk:
         if near < LEAST:
             return None  # most nights: nothing to count
         found = shift([self._cost(self.values[i]) for i in nights], clusters_only=near < deviation)
-        if found is None or found.change <= self.tolerance:
+        if found is None or found.change <= self._tolerates(level):
             return None
         self.level_since, nights = nights[: -found.span], nights[-found.span :]
         self.usual = [i for i in self.usual if i not in nights] or self.level_since[-WINDOW:]
@@ -364,7 +366,12 @@ class _Walk:
     def _clear(self, outermost: Sequence[float]) -> Usual:
         """The level, and what stands clear of it: of its noise, and of what its definition tolerates."""
         level, clear = self._clear_of_noise(outermost)
-        return level, max(clear, self.tolerance)
+        return level, max(clear, self._tolerates(level))
+
+    def _tolerates(self, level: float) -> float:
+        """The relative change of a level that the definition does not tell."""
+        known = self.absolute and math.isfinite(level) and level != 0.0
+        return max(self.tolerance, self.absolute / abs(level) if known else 0.0)
 
     def _clear_of_noise(self, outermost: Sequence[float]) -> Usual:
         """The level, and what stands clear of it on the side where nights that hold have reached so far."""

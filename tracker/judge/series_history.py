@@ -20,7 +20,6 @@ from functools import lru_cache
 import msgspec
 
 from spook_tracker.tracker.document.collection import no_collection
-from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
@@ -51,7 +50,7 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
     before_worse: Point | None = None  # the night before that
     accepted: str = ""
     usual: Usual | None = None  # of run times: level and noise after this night
-    time: float | None = None  # of run times: the value judged, in seconds of the machine as it usually is
+    time: float | None = None  # of run times: the value judged (tracker.judge.calibration.engines_own)
     confirms: bool = False  # of run times: the second slow night, which makes both red
 
     @property
@@ -366,13 +365,6 @@ def _why_not(before: Point, after: Point) -> str:
     return "measured in another float environment"
 
 
-def _time_tolerance(definition: SeriesDefinition, values: Sequence[float]) -> float:
-    """The relative change of a time that its own definition does not tell."""
-    finite = [abs(value) for value in values if math.isfinite(value) and value != 0.0]
-    absolute = definition.tolerance / median(finite) if definition.tolerance and finite else 0.0
-    return max(definition.relative_tolerance, absolute)
-
-
 def _judge_times(
     key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> list[Judged]:
@@ -398,7 +390,8 @@ def _judge_times(
             larger_is_better=definition.better == "larger",
             releases=[is_release(night.run) for night in lane],
             accepted=[level is not None for level in taken],
-            tolerance=_time_tolerance(definition, values),
+            tolerance=definition.relative_tolerance,
+            absolute=definition.tolerance,
         )
         for i, noisy in enumerate(verdicts):
             if noisy.state in ("detected", "suspected") and is_read_off(definition):

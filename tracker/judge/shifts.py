@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from spook_tracker.tracker.document.middle import median_of_sorted
+from spook_tracker.tracker.judge.slower import LEAST
 
 if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
     import numpy as np
@@ -28,7 +29,6 @@ FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
 RAREST = 1e-5  # of what no second test has to confirm
 RARER = 4.265  # standard deviations, by the t test: one in a hundred thousand
-LEAST = 0.01  # relative: no shift below is told
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
 CLIP = 6.0  # noises: what lies further out counts as if it lay there
 GRID = 300  # steps between the smallest and the largest value

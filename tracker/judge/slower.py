@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from spook_tracker.tracker.judge.verdict import Verdict
 
+LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence
 Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
 
 

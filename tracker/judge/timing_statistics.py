@@ -16,9 +16,9 @@ from functools import lru_cache
 
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Timing
+from spook_tracker.tracker.judge.slower import LEAST
 
 FLOOR = 0.10  # least relative change of run time worth a word, between two sessions by the clock
-LEAST = 0.01  # the same of processor time over the kernel's, where spread and rungs support it
 CLEAR = 8.0  # spreads: as histories ask of few nights
 FEWEST_RUNGS = 4  # whose scatter shows what repeats of one session do not
 REPEATED = 3  # repeats on each side, or nothing is said

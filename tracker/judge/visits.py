@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.judge.slower import LEAST
 
-LEAST = 0.01  # no change below is told
 VISITS = 2  # to a level, before it is known as one of the machine's
 LONGER = 2  # times its longest visit, and it is no visit any more
 STRAYS = 2  # nights of a visit so far above its level that it is another
