@@ -71,6 +71,6 @@ def test_an_absolute_tolerance_is_of_the_level_of_its_time() -> None:
         return [judged.state for judged in judge_history(definition.key, definition, points)]
 
     assert set(states(values)[:20]) == {"green"}  # 40 % of 1 ms: tolerated
-    assert states(values)[21] == "detected"
+    assert states(values)[24] == "detected"
     assert states(values[:20]) == states(values)[:20]
     assert states([1e-2] * 30 + [1.4e-2] * 3)[-1] == "detected"  # 4 ms of 10 are more
