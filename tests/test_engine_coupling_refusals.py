@@ -67,15 +67,10 @@ HOSTILE: dict[str, tuple[Any, type, str]] = {
         SceneError,
         "'ball'",
     ),
-    "three bodies curved": (
-        lambda: run(three(), corrections=1),
+    "three bodies stiffened": (
+        lambda: run(three(), string_stiffness=True),
         MethodError,
-        "'sum' ties more than two moving bodies, which only plain steps can do, and here is corrections=1",
-    ),
-    "three bodies at mid-step": (
-        lambda: run(three(), half_step_velocities=True),
-        MethodError,
-        "here is half_step_velocities",
+        "'sum' ties more than two moving bodies, which string_stiffness cannot hold",
     ),
     "short wire": (lambda: Wire(name="w", through=((WORLD, X),)), SceneError, "two points"),
     "through itself": (

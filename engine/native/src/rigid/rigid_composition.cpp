@@ -97,10 +97,10 @@ void RigidSystem::kick_all(double span) {
 void RigidSystem::push(const double* multipliers) {
     const auto blocks = joints_.blocks();
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-        for (const bool second : {false, true}) {
-            const int body = second ? blocks[k].second : blocks[k].first;
+        for (int end = 0; end < ends(static_cast<int>(k)); ++end) {
+            const int body = end_body(static_cast<int>(k), end);
             if (body < 0 || !constants_[body].moves()) continue;
-            const double* j = jacobian(static_cast<int>(k), second);
+            const double* j = end_rows(static_cast<int>(k), end);
             Vec3 force, torque;
             for (int i = 0; i < blocks[k].size; ++i, j += 6) {
                 force += multipliers[i] * Vec3{j[0], j[1], j[2]};

@@ -15,12 +15,12 @@ void RigidSystem::find_bias(double* bias) const {
     const auto blocks = joints_.blocks();
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         joints_.bias(static_cast<int>(k), live_.bodies, bias);
-        for (const bool second : {false, true}) {
-            const int body = second ? blocks[k].second : blocks[k].first;
+        for (int end = 0; end < ends(static_cast<int>(k)); ++end) {
+            const int body = end_body(static_cast<int>(k), end);
             if (body < 0 || !constants_[body].moves() || constants_[body].particle) continue;
             const BodyState& s = live_.bodies[body];
             const Vec3 gyro = turned_by(constants_[body], s, cross(s.angular_velocity, s.angular_momentum));
-            const double* rows = jacobian(static_cast<int>(k), second) + 3;
+            const double* rows = end_rows(static_cast<int>(k), end) + 3;
             for (int i = 0; i < blocks[k].size; ++i)
                 bias[i] -= dot({rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]}, gyro);
         }
@@ -117,10 +117,10 @@ void RigidSystem::violations_at(const LargeArray<BodyState>& at, double* out) co
 /// G v per row, with the velocities of the bodies as they are, or of the solution.
 double RigidSystem::row_speed(int block, int row, bool solved) const {
     double sum = 0.0;
-    for (const bool second : {false, true}) {
-        const int body = second ? joints_.blocks()[block].second : joints_.blocks()[block].first;
+    for (int end = 0; end < ends(block); ++end) {
+        const int body = end_body(block, end);
         if (body < 0 || constants_[body].motion == Motion::fixed) continue;
-        const double* j = jacobian(block, second) + 6 * row;
+        const double* j = end_rows(block, end) + 6 * row;
         const BodyState& s = live_.bodies[body];
         Vec3 v = s.velocity, w = s.angular_velocity;
         if (solved && slot_[body] >= 0) {

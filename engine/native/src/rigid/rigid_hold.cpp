@@ -38,17 +38,16 @@ void RigidSystem::prepare_hold() {
     meetings_.clear();
     std::vector<int> first_row{0};
     for (const JointBlock& block : blocks) first_row.push_back(first_row.back() + block.size);
-    const auto moving = [&](std::size_t k, bool second) {
-        const int body = second ? blocks[k].second : blocks[k].first;
+    const auto moving = [&](int k, int end) {
+        const int body = end_body(k, end);
         return body >= 0 && constants_[body].moves() ? body : -1;
     };
-    for (std::size_t k = 0; k < blocks.size(); ++k)
-        for (const bool second : {false, true})
-            for (std::size_t l = 0; l <= k && moving(k, second) >= 0; ++l)
-                for (const bool other : {false, true})
-                    if (moving(l, other) == moving(k, second))
-                        meetings_.push_back({static_cast<int>(k), static_cast<int>(l), first_row[k],
-                                             first_row[l], second, other});
+    for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
+        for (int end = 0; end < ends(k); ++end)
+            for (int l = 0; l <= k && moving(k, end) >= 0; ++l)
+                for (int other = 0; other < ends(l); ++other)
+                    if (moving(l, other) == moving(k, end))
+                        meetings_.push_back({k, l, first_row[k], first_row[l], end, other, moving(k, end)});
 }
 
 /// G M⁻¹ Gᵀ from the Jacobians as assembled.
@@ -57,8 +56,8 @@ bool RigidSystem::factor_dense() {
     const int rows = static_cast<int>(rows_);
     for (int i = 0; i < rows; ++i) std::fill_n(dense_rows_.row(i), i + 1, 0.0);
     for (const Meeting& m : meetings_) {
-        const int body = m.second ? blocks[m.block].second : blocks[m.block].first;
-        const double *mine = jacobian(m.block, m.second), *its = jacobian(m.other, m.other_second);
+        const int body = m.body;
+        const double *mine = end_rows(m.block, m.end), *its = end_rows(m.other, m.other_end);
         const double over = 1.0 / constants_[body].mass;
         const BodyConstants& c = constants_[body];
         const Mat3& r = axes_[slot_[body]];

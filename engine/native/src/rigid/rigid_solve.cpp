@@ -14,6 +14,7 @@ void RigidSystem::analyse_block() {
     std::vector<BlockEdge> edges;
     std::vector<std::uint8_t> is_constraint(blocks.size() + tied_.size(), 0);
     places_.assign(blocks.size(), {});
+    std::size_t wide = 0;
     for (int k = 0; k < row_blocks; ++k) {
         sizes.push_back(blocks[k].size);
         is_constraint[k] = 1;
@@ -25,12 +26,15 @@ void RigidSystem::analyse_block() {
         };
         tie(blocks[k].first, places_[k].first_edge, places_[k].first_particle);
         tie(blocks[k].second, places_[k].second_edge, places_[k].second_particle);
+        places_[k].wide_at = wide;
+        wide += 6 * joints_.others(k).size();
         for (int body : joints_.others(k)) {
             bool particle = false;
             places_[k].other_edges.push_back(-1);
             tie(body, places_[k].other_edges.back(), particle);
         }
     }
+    wide_.assign(wide, 0.0);
     for (int body : tied_) sizes.push_back(constants_[body].particle ? 3 : 6);
     matrix_.analyse(sizes, edges, is_constraint, true);
     right_.assign(matrix_.unknowns(), 0.0);
@@ -52,6 +56,19 @@ double* RigidSystem::jacobian(int block, bool second) noexcept {
     const bool particle = second ? place.second_particle : place.first_particle;
     if (edge >= 0 && !particle) return matrix_.coupling(edge);
     return spare_.data() + spare_at_[block] + (second ? 6 * joints_.blocks()[block].size : 0);
+}
+
+int RigidSystem::ends(int block) const noexcept {
+    return 2 + static_cast<int>(places_[block].other_edges.size());
+}
+
+int RigidSystem::end_body(int block, int end) const noexcept {
+    const JointBlock& both = joints_.blocks()[block];
+    return end == 0 ? both.first : end == 1 ? both.second : joints_.others(block)[end - 2];
+}
+
+const double* RigidSystem::end_rows(int block, int end) const noexcept {
+    return end < 2 ? jacobian(block, end == 1) : wide_.data() + places_[block].wide_at + 6 * (end - 2);
 }
 
 /// Jacobians into the matrix, right sides of the rows.
@@ -80,6 +97,7 @@ void RigidSystem::assemble_blocks() {
             for (int i = 0; i < block.size; ++i) std::copy_n(rows + 6 * i, 3, matrix_.coupling(edge) + 3 * i);
         };
         const double* other = joints_.other_rows();
+        std::copy_n(other, 6 * place.other_edges.size(), wide_.data() + place.wide_at);
         for (std::size_t i = 0; i < place.other_edges.size(); ++i, other += 6) {
             const int edge = place.other_edges[i];
             if (edge < 0) {

@@ -286,6 +286,11 @@ private:
     void integrate_all();
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
+    /// The bodies of a block of rows as they follow each other: its first, its second, those beyond; and the Jacobian of
+    /// one, rows × 6, as assembled for the block matrix.
+    int ends(int block) const noexcept;
+    int end_body(int block, int end) const noexcept;
+    const double* end_rows(int block, int end) const noexcept;
     Vec3 place(const End& end) const noexcept { return end.body < 0 ? end.point : position_of(end.body); }
     double share(int body) const noexcept { return share_.empty() ? 1.0 : share_[body]; }
     const double* jacobian(int block, bool second) const noexcept {
@@ -349,10 +354,12 @@ private:
         int first_edge = -1, second_edge = -1;  // in matrix_
         bool first_particle = false, second_particle = false;
         std::vector<int> other_edges;  // of a row over more than two bodies, −1: it does not move by itself
+        std::size_t wide_at = 0;       // in wide_
     };
     std::vector<BlockPlace> places_;
     LargeArray<double> spare_;  // Jacobians with nowhere else to go, per block 2 × rows × 6
     std::vector<std::size_t> spare_at_;
+    LargeArray<double> wide_;    // Jacobians of the bodies beyond a row's first two
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_;
     std::vector<std::vector<Beyond>> beyond_, holding_beyond_;  // per block of joints: what its rows show
@@ -396,7 +403,7 @@ private:
     DenseRows dense_rows_;
     struct Meeting {                    // of two blocks on one moving body
         int block, other, row, column;  // row and column: the first of each
-        bool second, other_second;
+        int end, other_end, body;
     };
     std::vector<Meeting> meetings_;
     std::vector<Mat3> stiffness_;            // per tied body: h²/4 of its joints' geometric stiffness, kg m²
