@@ -136,11 +136,13 @@ def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> lis
         tuple[str, int], list[int]
     ] = {}  # few machines and definitions: a name each, not one each night
     lanes: dict[Hashable, list[int]] = {}
+    version, machine, places = "", None, None
     for place, night in enumerate(history):
-        facts = night.test_version, id(night.run.machine)
-        places = known.get(facts)
-        if places is None:
-            places = known[facts] = lanes.setdefault(lane(night), [])
+        if places is None or night.run.machine is not machine or night.test_version is not version:
+            version, machine = night.test_version, night.run.machine
+            places = known.get((version, id(machine)))
+            if places is None:
+                places = known[version, id(machine)] = lanes.setdefault(lane(night), [])
         places.append(place)
     return list(lanes.values())
 

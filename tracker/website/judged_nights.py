@@ -117,6 +117,7 @@ def accepted_fields(accepted: Sequence[Accepted], keys: Sequence[str]) -> list[d
     ]  # fmt: skip
 
 
+NO_MARK: tuple[tuple[float, float] | None, bool, str] = (None, False, "")
 Marks = dict[str, tuple[tuple[float, float] | None, bool, str]]  # by key: usual, suspected, blame
 
 
@@ -191,6 +192,9 @@ def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[
     texts = Texts()
     rows: dict[str, list[Row]] = {}
     last: dict[str, Row] = {}
+    facts: dict[
+        str, tuple[Any, ...]
+    ] = {}  # what each last row was made from: most stand still from night to night
     sides = []
     for place, night in enumerate(nights):
         samples = with_work(history.samples(night.id), night.engine)
@@ -198,9 +202,17 @@ def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[
         here = marks.get(night.id, {})
         for key in last.keys() - samples.keys():
             rows[key].append([place])
-            del last[key]
+            del last[key], facts[key]
         for key, (definition, sample) in samples.items():
-            row = texts.row(definition, sample, *here.get(key, (None, False, "")))
+            mark = here.get(key, NO_MARK)
+            made_from = (
+                definition, sample.value, sample.outcome, sample.passed, sample.set_point_held, sample.state_hash,
+                sample.failure, mark,
+            )  # fmt: skip
+            if facts.get(key) == made_from:
+                continue
+            facts[key] = made_from
+            row = texts.row(definition, sample, *mark)
             if last.get(key) != row:
                 rows.setdefault(key, []).append([place, *row])
                 last[key] = row
