@@ -3,8 +3,10 @@
     python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md
     python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md --only-page
     python bench/engines.py --db sqlite:///build/engines.db --missing
+    python bench/engines.py --db sqlite:///build/engines.db --test climb --test rolling_log
 
-Each engine's runs are recorded as soon as it has answered, so that an interrupted night goes on with --missing.
+Each engine's runs are recorded as soon as it has answered, so that an interrupted night goes on with --missing. Questions
+that are new, or asked otherwise now, can be asked by themselves (--test): the page takes of every test the newest answers.
 Why another engine is first stands in docs/engine-causes.toml, by hand: a cause is found, not measured. Where there is
 none, the page says so.
 """
@@ -60,16 +62,20 @@ def installed() -> list[str]:
     return found
 
 
-def measure(names: Sequence[str], database: str, facts: str, limit: float) -> None:
-    """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took."""
+def measure(names: Sequence[str], database: str, facts: str, limit: float, tests: Sequence[str] = ()) -> None:
+    """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took.
+
+    Of `tests` alone if there are any, and no facts then.
+    """
     for name in names:
         begin = time.perf_counter()
         theirs: dict[str, Any] = {}
         if name != OURS:
             theirs = {"limit": limit, "patience": limit, "every_setting": False, "repeats": REPEATS}
-        document = tracker.run(sweep=True, engine=name, workers=2, **theirs)
+        document = tracker.run(tests, sweep=True, engine=name, workers=2, **theirs)
         tracker.record(document, database)
-        measure_facts([name], facts)
+        if not tests:
+            measure_facts([name], facts)
         outcomes = Counter(sample.outcome for sample in document.samples)
         told = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in outcomes.most_common())
         print(f"{name}: {time.perf_counter() - begin:.0f} s; {told}", flush=True)
@@ -93,27 +99,58 @@ def _newest(history: tracker.History) -> dict[str, Any]:
     return {run.engine.name: run for run in history.runs()}
 
 
+def nights(history: tracker.History) -> dict[str, list[Any]]:
+    """Runs of each engine, the newest first, back to the first that was asked everything: ours, then by name.
+
+    Of another engine all are of one version; ours goes on between two of them.
+    """
+    found: dict[str, list[Any]] = {}
+    whole: set[str] = set()
+    for run in reversed(history.runs()):
+        name = run.engine.name
+        told = found.setdefault(name, [])
+        if name in whole or (told and name != OURS and told[0].engine.version != run.engine.version):
+            continue
+        told.append(run)
+        if run.asked is None or run.asked.whole:
+            whole.add(name)
+    return dict(sorted(found.items(), key=lambda one: (one[0] != OURS, one[0])))
+
+
+def answered(history: tracker.History, runs: Sequence[Any]) -> ranks.Samples:
+    """Every test as the newest run that was asked it answers."""
+    found: dict[str, tuple[Any, Any]] = {}
+    later: set[str] = set()
+    for run in runs:
+        here = history.samples(run.id)
+        found |= {key: one for key, one in here.items() if one[0].test not in later}
+        later |= {definition.test for definition, _ in here.values()}
+    return found
+
+
 def page(database: str, of_facts: str = "") -> str:
-    """The page in Markdown, from the newest run of each engine."""
+    """The page in Markdown, from the newest answers of each engine."""
     with session_on(database, readonly=True) as session:
         history = tracker.History(session)
-        newest = _newest(history)
-        runs = {name: newest[name] for name in sorted(newest, key=lambda name: (name != OURS, name))}
-        samples = {name: history.samples(run.id) for name, run in runs.items()}
+        runs = nights(history)
+        samples = {name: answered(history, of_one) for name, of_one in runs.items()}
     facts = _recorded_facts(of_facts) if of_facts else {}
     if OURS not in runs:
         raise SystemExit(f"{database} has no run of ours to set the others beside")
-    machine = runs[OURS].machine
+    machine = runs[OURS][0].machine
     timed = {
-        name: told for name, told in samples.items() if runs[name].machine.fingerprint == machine.fingerprint
+        name: told
+        for name, told in samples.items()
+        if all(run.machine.fingerprint == machine.fingerprint for run in runs[name])
     }
     run = places(timed)
     elsewhere = ", ".join(name for name in samples if name not in timed)
     lines = [
         "# Every engine on every scene",
         "",
-        "Made by `make engines`: " + ", ".join(f"{n} {version(r.engine)}" for n, r in runs.items()) + ".",
-        f"Measured on {runs[OURS].started[:10]}, one core at a time for the run times, {machine.processor}.",
+        "Made by `make engines`: " + ", ".join(f"{n} {version(r[0].engine)}" for n, r in runs.items()) + ".",
+        f"Measured on {runs[OURS][-1].started[:10]}, one core at a time for the run times, {machine.processor}.",
+        *_asked_later(runs[OURS]),
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
         f"Whoever is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
         f"and, through npm, of {', '.join(find.NODE.values())}, and builds {', '.join(find.BUILT)} from its source.",
@@ -191,7 +228,21 @@ def _counted(samples: Mapping[str, ranks.Samples], told: Sequence[Any]) -> list[
     ]
 
 
-def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Any]) -> list[str]:
+def _asked_later(runs: Sequence[Any]) -> list[str]:
+    """Tests that were asked by themselves, later than the rest."""
+    later = [(run, run.asked.tests) for run in reversed(runs[:-1]) if run.asked is not None]
+    return [
+        line
+        for run, tests in later
+        for line in textwrap.wrap(
+            f"Asked by themselves on {run.started[:10]} ({version(run.engine)} of ours): {', '.join(tests)}.",
+            118,
+            break_on_hyphens=False,
+        )
+    ]
+
+
+def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Sequence[Any]]) -> list[str]:
     """How much of the ladders below was had of each engine, and what stopped the rest."""
     rows = []
     for name, told in samples.items():
@@ -228,9 +279,10 @@ def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Any]) -> lis
     ]
 
 
-def _minutes(run: Any) -> str:
-    begun, ended = instant(run.started), instant(run.finished)
-    return "-" if begun is None or ended is None else f"{(ended - begun).total_seconds() / 60.0:.1f} min"
+def _minutes(runs: Sequence[Any]) -> str:
+    times = [(instant(run.started), instant(run.finished)) for run in runs]
+    took = [(e - b).total_seconds() for b, e in times if b is not None and e is not None]
+    return f"{sum(took) / 60.0:.1f} min" if len(took) == len(times) else "-"
 
 
 def _limits(samples: Sequence[Any]) -> str:
@@ -475,6 +527,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--only-page", action="store_true", help="measure nothing, write the page of what is recorded"
     )
+    parser.add_argument(
+        "--test", action="append", default=[], help="ask this test alone; may be repeated: new questions"
+    )
     parser.add_argument("engines", nargs="*", help="by default all that are installed")
     asked: Any = parser.parse_args(arguments)
     names = [] if asked.only_page else asked.engines or installed()
@@ -482,7 +537,7 @@ def main(arguments: list[str]) -> int:
         measure_facts(names, asked.facts_db)
     else:
         names = without_a_run(names, asked.db) if asked.missing else names
-        measure(names, asked.db, asked.facts_db, asked.limit)
+        measure(names, asked.db, asked.facts_db, asked.limit, asked.test)
     Path(asked.page).write_text(page(asked.db, asked.facts_db), encoding="utf-8")
     print(f"wrote {asked.page}")
     return 0

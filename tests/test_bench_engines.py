@@ -13,6 +13,7 @@ import msgspec
 import pytest
 
 import spook_tracker.tracker as tracker
+from spook_tracker.tracker.document.run_document import Asked
 from spook_tracker.tracker.judge.rank import Race
 from tests.synthetic_history import document, rival
 
@@ -96,6 +97,40 @@ def test_printed_limits_and_those_of_our_method_are_counted_apart(engines: Any, 
     assert "| spook | 1 | 0 | 0 | 0 |" in told
     assert "### 6 limits of our method" in told
     assert "| spook | 6 | 0 | 0 | 0 |" in told
+
+
+def test_questions_asked_again_by_themselves_take_the_place_of_their_answers_alone(
+    engines: Any, tmp_path: Path
+) -> None:
+    """A night of both, then one test of ours: that is new, all else stands; a whole night later and nothing older counts."""
+    database = f"sqlite:///{tmp_path}/engines.db"
+    whole = document(0)
+    gates = [d.key for d in whole.series if d.role == "gate" and d.test == "pendulum"]
+
+    def again(night: int, asked: Asked, value: float) -> Any:
+        run = document(night)
+        series = tuple(d for d in run.series if asked.whole or d.test == "pendulum")
+        keys = {d.key for d in series}
+        samples = tuple(
+            msgspec.structs.replace(s, value=value, passed=not value) if s.series in gates else s
+            for s in run.samples
+            if s.series in keys
+        )
+        return msgspec.structs.replace(run, asked=asked, series=series, samples=samples)
+
+    part = again(1, Asked(tests=("pendulum",), families=(), whole=False), 99.0)
+    for run in (whole, THEIRS, part):
+        tracker.record(run, database)
+    told = engines.page(database)
+    assert "(0.1.1 of ours): pendulum." in " ".join(told.split())
+    assert "| spook | 6 | 1 | 0 | 0 |" in told, (
+        "the pendulum misses its limit now, the other six are as they were"
+    )
+
+    tracker.record(again(2, Asked(tests=(), families=(), whole=True), 0.0), database)
+    told = engines.page(database)
+    assert "Asked by themselves" not in told
+    assert "| spook | 7 | 0 | 0 | 0 |" in told
 
 
 def test_an_engine_of_single_precision_is_said_to_end_where_it_ends(engines: Any) -> None:

@@ -42,6 +42,52 @@ def test_releases_come_oldest_first_and_unknown_ones_are_refused(monkeypatch: py
         releases.released("spook")
 
 
+def test_releases_come_from_npm_too_without_those_that_are_tried_out(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[tuple[str, ...]] = []
+    starts = CompletedProcess([], 0, "", "")
+
+    def npm(*arguments: str) -> CompletedProcess[str]:
+        asked.append(arguments)
+        return CompletedProcess([], 0, '["0.18.0", "0.19.0-alpha.1", "0.20.0"]', "")
+
+    monkeypatch.setattr(releases, "_npm", npm)
+    monkeypatch.setattr(releases, "_python", lambda *a, **o: starts)
+    assert releases.released("cannon") == ("0.18.0", "0.20.0")
+
+    place = releases.install("cannon", "0.18.0", tmp_path)
+    assert place == tmp_path / "cannon-0.18.0"
+    assert asked[-1][-3:] == ("--prefix", str(place), "cannon-es@0.18.0")
+    assert releases.install("cannon", "0.18.0", tmp_path) == place
+    assert len(asked) == 2, "what is there already is used again"
+
+    starts = CompletedProcess([], 1, "", "ImportError: Node is not installed\n")
+    with pytest.raises(
+        releases.ReleaseError, match=r"cannon-es@0\.20\.0 is installed but does not start: ImportError: Node"
+    ):
+        releases.install("cannon", "0.20.0", tmp_path)
+    assert not (tmp_path / "cannon-0.20.0").exists()
+
+
+def test_a_release_from_npm_is_found_before_what_is_installed_here(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A made-up release beside the adapter's own search: the process that measures sees it first."""
+    package = tmp_path / "cannon-9.9.9" / "node_modules" / "cannon-es"
+    package.mkdir(parents=True)
+    (package / "package.json").write_text('{"name": "cannon-es", "version": "9.9.9", "module": "none.js"}')
+    monkeypatch.setenv("TRACKER_NODE_MODULES", str(tmp_path / "elsewhere"))
+    monkeypatch.setattr("shutil.which", lambda name: f"/somewhere/{name}")
+    program = (
+        "import shutil; shutil.which = lambda name: name\n"
+        "from spook_tracker.engine.find import find; print(find('cannon').build_info.version)"
+    )
+    told = releases._python(tmp_path / "cannon-9.9.9", "-c", program)
+
+    assert told.stdout.strip() == "9.9.9", told.stderr
+
+
 def test_a_release_that_cannot_be_installed_or_started_is_named(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

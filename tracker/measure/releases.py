@@ -1,12 +1,13 @@
 """Released versions of another engine, each in a folder of its own, asked the same questions.
 
-A release is installed beside this environment, not into it: `pip install --target` into a folder that comes
-first on the path of the process that measures. What a release needs of others is taken from here, unless it
-does not start with it; then it gets a NumPy of its own time.
+A release is installed beside this environment, not into it: `pip install --target`, or `npm install --prefix`, into a folder
+that comes first where the process that measures looks. What a release from PyPI needs of others is taken from here,
+unless it does not start with it; then it gets a NumPy of its own time.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -17,7 +18,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from spook_tracker.engine.find import EXTRAS
+from spook_tracker.engine.find import EXTRAS, NODE
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.json_form import decode
 from spook_tracker.tracker.document.run_document import RunDocument
@@ -32,8 +33,16 @@ class ReleaseError(TrackerError):
 
 
 def released(engine: str) -> tuple[str, ...]:
-    """The versions pip can install here, oldest first."""
+    """The versions pip or npm can install here, oldest first; of npm's, those that are not tried out only (1.0.0-beta)."""
     package = _package(engine)
+    if engine in NODE:
+        done = _npm("view", package, "versions", "--json")
+        if done.returncode:
+            raise ReleaseError(f"npm finds no versions of {package}: {_last(done.stderr)}")
+        told = json.loads(done.stdout)
+        return tuple(
+            version for version in (told if isinstance(told, list) else [told]) if "-" not in version
+        )
     done = _pip("index", "versions", package)
     found = re.search(r"Available versions: (.+)", done.stdout)
     if done.returncode or not found:
@@ -58,6 +67,12 @@ def install(engine: str, version: str, folder: Path) -> Path:
     place = folder / f"{engine}-{version}"
     if (place / WORKS).exists():
         return place
+    if engine in NODE:
+        _put_from_npm(place, f"{_package(engine)}@{version}")
+        if (why := _start(engine, place)) is not None:
+            shutil.rmtree(place)
+            raise ReleaseError(f"{_package(engine)}@{version} is installed but does not start: {why}")
+        return place
     wanted = [f"{_package(engine)}=={version}"]
     _put(place, wanted)
     parts = _pinned(place)
@@ -66,12 +81,28 @@ def install(engine: str, version: str, folder: Path) -> Path:
     for extra in ((), (OLD_NUMPY,)):
         if extra:
             _put(place, [*wanted, *parts, *extra])
-        started = _python(place, "-c", f"from spook_tracker.engine.find import find; find({engine!r})")
-        if started.returncode == 0:
-            (place / WORKS).touch()
+        why = _start(engine, place)
+        if why is None:
             return place
     shutil.rmtree(place)
-    raise ReleaseError(f"{wanted[0]} is installed but does not start: {_last(started.stderr)}")
+    raise ReleaseError(f"{wanted[0]} is installed but does not start: {why}")
+
+
+def _start(engine: str, place: Path) -> str | None:
+    """Why a release does not start; None if it does, which is kept in its folder."""
+    started = _python(place, "-c", f"from spook_tracker.engine.find import find; find({engine!r})")
+    if started.returncode:
+        return _last(started.stderr)
+    (place / WORKS).touch()
+    return None
+
+
+def _put_from_npm(place: Path, package: str) -> None:
+    place.mkdir(parents=True, exist_ok=True)
+    done = _npm("install", "--silent", "--no-audit", "--no-fund", "--prefix", str(place), package)
+    if done.returncode:
+        shutil.rmtree(place, ignore_errors=True)
+        raise ReleaseError(f"{package} cannot be installed: {_last(done.stderr)}")
 
 
 def _put(place: Path, packages: Sequence[str]) -> None:
@@ -122,29 +153,41 @@ def measure_release(
 
 
 def _package(engine: str) -> str:
-    if engine not in EXTRAS:
+    packages = {**EXTRAS, **NODE}
+    if engine not in packages:
         raise ReleaseError(
-            f"releases of {engine!r} are not known; engines with releases: {', '.join(EXTRAS)}"
+            f"releases of {engine!r} are not known; engines with releases: {', '.join(packages)}"
         )
-    return EXTRAS[engine]
+    return packages[engine]
 
 
 def _pip(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *arguments]
+    return _installer("pip", [sys.executable, "-m", "pip", "--disable-pip-version-check", *arguments])
+
+
+def _npm(*arguments: str) -> subprocess.CompletedProcess[str]:
+    if shutil.which("npm") is None:
+        raise ReleaseError("there is no npm here; install Node")
+    return _installer("npm", ["npm", *arguments])
+
+
+def _installer(name: str, command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     try:
         return subprocess.run(command, capture_output=True, text=True, timeout=INSTALL_LIMIT)
     except subprocess.TimeoutExpired:
-        raise ReleaseError(f"pip took longer than {INSTALL_LIMIT:g} s for {arguments[-1]}") from None
+        raise ReleaseError(f"{name} took longer than {INSTALL_LIMIT:g} s for {command[-1]}") from None
 
 
 def _python(
     place: Path, *arguments: str, limit: float | None = START_LIMIT
 ) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(place), *filter(None, [os.environ.get("PYTHONPATH")])])
+    packages = place / "node_modules"  # of npm's
+    own = {"TRACKER_NODE_MODULES": str(packages)} if packages.exists() else {}
     try:
         return subprocess.run(
             [sys.executable, *arguments],
-            env={**os.environ, "PYTHONPATH": path},
+            env={**os.environ, "PYTHONPATH": path, **own},
             capture_output=True,
             text=True,
             timeout=limit,
