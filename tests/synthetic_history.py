@@ -321,6 +321,9 @@ class DocumentHistory:
             for run_id in run_ids
         }
 
+    def answered(self, run_ids: Sequence[str]) -> dict[str, set[tuple[str, str]]]:
+        return {run_id: {(d.test, d.kind) for d, _ in self.samples(run_id).values()} for run_id in run_ids}
+
     def cards(self, run_id: str) -> tuple[TestCard, ...]:
         return self.documents[run_id].tests
 

@@ -38,6 +38,7 @@ class Records(Protocol):
     def samples_of(
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
     ) -> Mapping[str, Samples]: ...
+    def answered(self, run_ids: Sequence[str]) -> Mapping[str, Collection[tuple[str, str]]]: ...
     def maps(self, run_id: str) -> Sequence[MapData]: ...
     def with_maps(self) -> Collection[str]: ...
 
@@ -136,10 +137,7 @@ def histories(
     place = {run.id: run for run in runs}
     tests = None if keys is None else {key.partition("/")[0] for key in keys}
     looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
-    told_by_answers = any(
-        not _says(run) for run in looked_at
-    )  # what these were asked, only all they answered tells
-    recent = records.samples_of([run.id for run in looked_at], None if told_by_answers else tests)
+    recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
     known: dict[
         int, tuple[Any, Samples]
@@ -161,7 +159,14 @@ def histories(
                 points.append(point if run is point.run else Point(run, point.sample, point.test_version))
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
-    found = with_missing(found, runs, recent)
+    silent = [
+        run.id for run in looked_at if not _says(run)
+    ]  # only all they answered tells what these were asked
+    if tests is None:
+        asked = {run_id: asked_in(recent.get(run_id, nothing)) for run_id in silent}
+    else:
+        asked = {run_id: _families(pairs) for run_id, pairs in records.answered(silent).items()}
+    found = with_missing(found, runs, asked)
     return found | run_times(found) | work(looked_at, recent, tests)
 
 
@@ -211,7 +216,7 @@ def work(
 
 
 def with_missing(
-    found: Mapping[str, SeriesHistory], runs: Sequence[Run], measured: Mapping[str, Samples]
+    found: Mapping[str, SeriesHistory], runs: Sequence[Run], answered: Mapping[str, dict[str, set[str]]]
 ) -> dict[str, SeriesHistory]:
     """The histories with a point for every value that was asked for and not answered.
 
@@ -219,15 +224,15 @@ def with_missing(
     tool), it is taken to be every value of the tests and families (values, sweep, stability) it measured, and for
     a nightly the whole catalogue. If the whole catalogue was asked, a gate whose test is gone is removed, not
     forgotten. What is read off the clock is not missed: a machine may be too busy for it. A run that neither says
-    nor is among the measured is not asked.
+    nor is among the `answered` (tests by family) is not asked.
     """
     place = {run.id: i for i, run in enumerate(runs)}
     ids = [run.id for run in runs]
-    telling = [i for i, run in enumerate(runs) if run.id in measured or _says(run)]
+    telling = [i for i, run in enumerate(runs) if run.id in answered or _says(run)]
 
     @cache
     def asked(i: int) -> dict[str, set[str]]:
-        return asked_for(runs[i], measured.get(ids[i], {}))
+        return asked_for(runs[i], {}) if _says(runs[i]) else answered[ids[i]]
 
     told = {}
     for key, series in found.items():
@@ -236,9 +241,9 @@ def with_missing(
             told[key] = series
             continue
         points = list(series.points)
-        answered = {point.run.id for point in points}
+        there = {point.run.id for point in points}
         first = place[points[0].run.id]
-        silent = [i for i in telling if i > first and ids[i] not in answered]
+        silent = [i for i in telling if i > first and ids[i] not in there]
         for i in silent:
             if runs[i].engine.name != points[0].run.engine.name:
                 continue
@@ -269,9 +274,14 @@ def asked_for(run: Any, samples: Samples) -> dict[str, set[str]]:
 
 def asked_in(samples: Samples) -> dict[str, set[str]]:
     """The tests that were measured, by family: all that is known of a run that does not say."""
+    return _families((definition.test, definition.kind) for definition, _ in samples.values())
+
+
+def _families(answered: Iterable[tuple[str, str]]) -> dict[str, set[str]]:
+    """Tests by family, of tests and kinds of series."""
     asked: dict[str, set[str]] = {}
-    for definition, _ in samples.values():
-        asked.setdefault(FAMILIES[definition.kind], set()).add(definition.test)
+    for test, kind in answered:
+        asked.setdefault(FAMILIES[kind], set()).add(test)
     return asked
 
 

@@ -8,19 +8,22 @@ or given up. Nights of another floating-point environment are a history of their
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from spook_tracker.tracker.document.run_document import MapData
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.lane import Records, asked_for, asked_in, is_placed
+from spook_tracker.tracker.judge.lane import Records, asked_for, is_placed
 from spook_tracker.tracker.judge.series_history import night_of
 from spook_tracker.tracker.judge.verdict import Verdict, judge_map
 from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.judge.work import FAMILIES
 
 NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
 GIVEN_UP = Verdict(word="accepted", sentence=NO_MAP.sentence)
+STABILITY = [kind for kind, family in FAMILIES.items() if family == "stability"]
 Held = dict[str, list[tuple[int, Any, MapData]]]  # by key, newest first: place in the line, run, map
 
 
@@ -160,17 +163,16 @@ def _blind(records: Records, line: Sequence[Any], held: Held) -> dict[tuple[str,
 
 def _asked(records: Records, line: Sequence[Any], oldest: int) -> Callable[[int, str], bool]:
     """Whether a run, at `oldest` or after, was asked for the stability of a test; silent ones tell by their answers."""
-    silent = [run.id for run in line[oldest:] if getattr(run, "asked", None) is None]
-    answered: dict[str, set[str]] = {}
+
+    @cache
+    def answered() -> Mapping[str, Collection[tuple[str, str]]]:
+        return records.answered([run.id for run in line[oldest:] if getattr(run, "asked", None) is None])
 
     def asked(place: int, test: str) -> bool:
         run = line[place]
         if getattr(run, "asked", None) is not None:
             return test in asked_for(run, {}).get("stability", ())
-        if test not in answered:
-            measured = records.samples_of(silent, {test})
-            answered[test] = {run for run, samples in measured.items() if "stability" in asked_in(samples)}
-        return run.id in answered[test]
+        return any((test, kind) in answered()[run.id] for kind in STABILITY)
 
     return asked
 

@@ -57,6 +57,7 @@ BESIDE = """
     LEFT JOIN evidence e ON e.started_at = s.started_at AND e.run_key = s.run_key AND e.series_id = s.series_id
     LEFT JOIN timing t ON t.started_at = s.started_at AND t.run_key = s.run_key AND t.series_id = s.series_id"""
 OF_RUN = "s.started_at = (SELECT started_at FROM run WHERE key = :run) AND s.run_key = :run"  # one range of the key
+OF_ITS_RUN = "ON s.started_at = r.started_at AND s.run_key = r.key"
 Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definition, sample
 
 
@@ -136,6 +137,19 @@ class History:
                 if key not in found[run.id] or definition.key == key:
                     found[run.id][key] = definition, sample
         return found
+
+    def answered(self, run_ids: Sequence[str]) -> dict[str, set[tuple[str, str]]]:
+        """By run: tests and kinds of the series that it has samples of."""
+        places = {self.run(run_id).key: run_id for run_id in run_ids}
+        having: dict[str, set[int]] = {run_id: set() for run_id in run_ids}
+        for start in range(0, len(run_ids), CHUNK):
+            runs = listed(self.run(run_id).key for run_id in run_ids[start : start + CHUNK])
+            query = f"SELECT s.run_key, s.definition_id FROM run r JOIN sample s {OF_ITS_RUN} WHERE r.key IN {runs}"
+            for run_key, definition_id in self._reader.rows(query):
+                having[places[run_key]].add(definition_id)
+        definitions = self._read_definitions({one for ids in having.values() for one in ids})
+        kinds = {one: (definition.test, definition.kind) for one, definition in definitions.items()}
+        return {run_id: {kinds[one] for one in ids} for run_id, ids in having.items()}
 
     def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> dict[str, SeriesHistory]:
         """Histories of all series or those named (by today's or an earlier name), by today's key.
@@ -317,11 +331,7 @@ class History:
     ) -> list[Found]:
         """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
         query = f"SELECT {SAMPLE}{EVIDENCE if evidence else ''} FROM "
-        query += (
-            "run r JOIN sample s ON s.started_at = r.started_at AND s.run_key = r.key"
-            if by_run
-            else "sample s"
-        )
+        query += f"run r JOIN sample s {OF_ITS_RUN}" if by_run else "sample s"
         query += (BESIDE if evidence else "") + (f" WHERE {where}" if where else "")
         stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
         definitions = self._read_definitions(row[2] for row in stored)
