@@ -6,7 +6,7 @@ are made here and nowhere else, so that whoever judges a history judges them, to
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, Protocol
 
@@ -159,14 +159,8 @@ def histories(
                 points.append(point if run is point.run else Point(run, point.sample, point.test_version))
         if points:
             found[key] = SeriesHistory(stored.definition, tuple(points))
-    silent = [
-        run.id for run in looked_at if not _says(run)
-    ]  # only all they answered tells what these were asked
-    if tests is None:
-        asked = {run_id: asked_in(recent.get(run_id, nothing)) for run_id in silent}
-    else:
-        asked = {run_id: _families(pairs) for run_id, pairs in records.answered(silent).items()}
-    found = with_missing(found, runs, asked)
+    whole = None if tests is None else cache(lambda run_id: _families(records.answered([run_id])[run_id]))
+    found = with_missing(found, runs, recent, whole)
     return found | run_times(found) | work(looked_at, recent, tests)
 
 
@@ -216,7 +210,10 @@ def work(
 
 
 def with_missing(
-    found: Mapping[str, SeriesHistory], runs: Sequence[Run], answered: Mapping[str, dict[str, set[str]]]
+    found: Mapping[str, SeriesHistory],
+    runs: Sequence[Run],
+    measured: Mapping[str, Samples],
+    whole: Callable[[str], dict[str, set[str]]] | None = None,
 ) -> dict[str, SeriesHistory]:
     """The histories with a point for every value that was asked for and not answered.
 
@@ -224,15 +221,22 @@ def with_missing(
     tool), it is taken to be every value of the tests and families (values, sweep, stability) it measured, and for
     a nightly the whole catalogue. If the whole catalogue was asked, a gate whose test is gone is removed, not
     forgotten. What is read off the clock is not missed: a machine may be too busy for it. A run that neither says
-    nor is among the `answered` (tests by family) is not asked.
+    nor is among the measured is not asked. Where `measured` are some tests alone, `whole` tells of all that a run
+    answered.
     """
     place = {run.id: i for i, run in enumerate(runs)}
     ids = [run.id for run in runs]
-    telling = [i for i, run in enumerate(runs) if run.id in answered or _says(run)]
+    telling = [i for i, run in enumerate(runs) if run.id in measured or _says(run)]
 
     @cache
     def asked(i: int) -> dict[str, set[str]]:
-        return asked_for(runs[i], {}) if _says(runs[i]) else answered[ids[i]]
+        return asked_for(runs[i], measured.get(ids[i], {}))
+
+    def removed(i: int, family: str, gate: bool) -> bool:
+        """Whether a run was asked for everything of a family, so that a gate of a test it was not asked for is gone."""
+        if not gate or not asked_whole(runs[i]):
+            return False
+        return family in (asked(i) if whole is None or _says(runs[i]) else whole(ids[i]))
 
     told = {}
     for key, series in found.items():
@@ -241,17 +245,15 @@ def with_missing(
             told[key] = series
             continue
         points = list(series.points)
-        there = {point.run.id for point in points}
+        answered = {point.run.id for point in points}
         first = place[points[0].run.id]
-        silent = [i for i in telling if i > first and ids[i] not in there]
+        silent = [i for i in telling if i > first and ids[i] not in answered]
+        family = FAMILIES[definition.kind]
         for i in silent:
             if runs[i].engine.name != points[0].run.engine.name:
                 continue
-            family = FAMILIES[definition.kind]
-            if family not in asked(i):
-                continue
-            gone = definition.test not in asked(i)[family]
-            if gone and not (asked_whole(runs[i]) and definition.role == "gate"):
+            gone = definition.test not in asked(i).get(family, ())
+            if gone and not removed(i, family, definition.role == "gate"):
                 continue
             why = "removed from the catalogue" if gone else "asked for and not answered"
             lost = Sample(

@@ -57,7 +57,7 @@ BESIDE = """
     LEFT JOIN evidence e ON e.started_at = s.started_at AND e.run_key = s.run_key AND e.series_id = s.series_id
     LEFT JOIN timing t ON t.started_at = s.started_at AND t.run_key = s.run_key AND t.series_id = s.series_id"""
 OF_RUN = "s.started_at = (SELECT started_at FROM run WHERE key = :run) AND s.run_key = :run"  # one range of the key
-OF_ITS_RUN = "ON s.started_at = r.started_at AND s.run_key = r.key"
+OF_ITS_RUN = "s.started_at = r.started_at AND s.run_key = r.key"
 Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definition, sample
 
 
@@ -131,7 +131,7 @@ class History:
         found: dict[str, dict[str, tuple[SeriesDefinition, Sample]]] = {run_id: {} for run_id in run_ids}
         for start in range(0, len(run_ids), CHUNK):
             runs = [self.run(run_id) for run_id in run_ids[start : start + CHUNK]]
-            where = f"r.key IN {listed(run.key for run in runs)} AND s.series_id IN {series}"
+            where = f"r.key IN {listed(run.key for run in runs)} AND {OF_ITS_RUN} AND s.series_id IN {series}"
             for run, series_id, definition, sample in self._read_samples(where, {}, by_run=True):
                 key = self._canonical.get(series_id, definition.key)
                 if key not in found[run.id] or definition.key == key:
@@ -144,7 +144,7 @@ class History:
         having: dict[str, set[int]] = {run_id: set() for run_id in run_ids}
         for start in range(0, len(run_ids), CHUNK):
             runs = listed(self.run(run_id).key for run_id in run_ids[start : start + CHUNK])
-            query = f"SELECT s.run_key, s.definition_id FROM run r JOIN sample s {OF_ITS_RUN} WHERE r.key IN {runs}"
+            query = f"SELECT s.run_key, s.definition_id FROM run r CROSS JOIN sample s WHERE r.key IN {runs} AND {OF_ITS_RUN}"
             for run_key, definition_id in self._reader.rows(query):
                 having[places[run_key]].add(definition_id)
         definitions = self._read_definitions({one for ids in having.values() for one in ids})
@@ -331,7 +331,9 @@ class History:
     ) -> list[Found]:
         """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
         query = f"SELECT {SAMPLE}{EVIDENCE if evidence else ''} FROM "
-        query += f"run r JOIN sample s {OF_ITS_RUN}" if by_run else "sample s"
+        query += (
+            "run r CROSS JOIN sample s" if by_run else "sample s"
+        )  # SQLite keeps to the order of a cross join
         query += (BESIDE if evidence else "") + (f" WHERE {where}" if where else "")
         stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
         definitions = self._read_definitions(row[2] for row in stored)
