@@ -9,6 +9,7 @@ thousand nights take more than 1.5 s of the processor, one more night more than 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 import time
@@ -22,6 +23,7 @@ from spook_tracker.tracker.website.publish import publish
 from tests.page_weights import before_charts, too_heavy
 from tests.synthetic_history import DocumentHistory, decade
 
+REPEATS = 3  # the least counts: others at work on the machine only make it longer
 MOST = (1.5, 0.5)  # s of the processor for a thousand nights, and for one more
 
 
@@ -44,13 +46,19 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "public"
         seconds = []
-        for nights in (asked.nights, asked.nights + 1):
-            found = history(nights, asked.series)
-            start = time.process_time()
-            report = publish(found, out)
-            seconds.append(time.process_time() - start)
+        grown = [history(nights, asked.series) for nights in (asked.nights, asked.nights + 1)]
+        for found in grown:
+            least = math.inf
+            for attempt in range(REPEATS):
+                site = out.with_name(f"{out.name}-{attempt}")
+                start = time.process_time()
+                report = publish(found, site)
+                least = min(least, time.process_time() - start)
+            seconds.append(least)
             told = f"{report.written} files written, {report.skipped} kept"
-            print(f"{nights} nights, {asked.series} series: {seconds[-1]:.1f} s of processor time, {told}")
+            nights = len(found.documents)
+            print(f"{nights} nights, {asked.series} series: {least:.2f} s of processor time, {told}")
+        out = site
         print(f"one more night / all nights: {seconds[1] / seconds[0]:.2f}")
         slow = [f"{took:.2f} s" for took, most in zip(seconds, MOST, strict=True) if took > most]
         print(f"{'page':<32}{'bytes':>10}{'before charts':>15}")

@@ -59,14 +59,18 @@ def test_any_id_of_a_run_can_be_published(runs_of_any_name, name):
     assert {p.parent.name for p in out.rglob("*.html")} == {"public", "tests"}
 
 
-@pytest.mark.parametrize("value", [1e308, -1.7e308, 5e-324, 0.0, "inf", "nan"])
-def test_any_number_can_be_drawn(tmp_path, value):
-    night = document(1)
+WILD = [1e308, -1.7e308, 5e-324, 0.0, "inf", "nan"]
+
+
+@pytest.mark.parametrize("values", [*([value] for value in WILD), WILD, WILD[::-1]])
+def test_any_number_can_be_drawn(tmp_path, values):
+    """Each alone everywhere, and all side by side: on neighbouring rungs of a ladder, too."""
+    night, value = document(1), values[0]
     samples = [
-        msgspec.structs.replace(s, value=Number(value))
+        msgspec.structs.replace(s, value=Number(values[place % len(values)]))
         if "ladder" in s.series or "deviation" in s.series
         else s
-        for s in night.samples
+        for place, s in enumerate(night.samples)
     ]
     figures = [
         msgspec.structs.replace(

@@ -167,6 +167,14 @@ def test_time_and_error_are_read_between_rungs_by_powers():
     assert time_at_error(seconds, errors, 0.01) == 2.0
 
 
+def test_rungs_as_far_apart_as_numbers_go_are_read_by_powers_too():
+    """Ratios of these are lost below the smallest number or above the largest: on a line of logarithms they are not."""
+    assert time_at_error([1.0, 4.0], [1e308, 1e-308], 1.0) == pytest.approx(2.0, rel=1e-12)
+    assert time_at_error([4.0, 1.0], [5e-324, 1.7e308], 1e-8) == pytest.approx(2.0, abs=0.01)
+    assert time_at_error([1e-300, 1e300], [1e2, 1e-2], 1.0) == pytest.approx(1.0, rel=1e-9)
+    assert error_in_time([1e-300, 1e300], [1e200, 1e-200], 1.0) == pytest.approx(1.0, rel=1e-9)
+
+
 def test_what_no_rung_reaches_is_infinite():
     assert time_at_error([1.0, 2.0], [0.1, 0.01], 1e-6) == math.inf
     assert error_in_time([1.0, 2.0], [0.1, 0.01], 0.5) == math.inf

@@ -59,8 +59,24 @@ def least_cost(cost: Sequence[float], quality: Sequence[float]) -> Callable[[flo
         found = [c for c, q in points if q <= target]
         for (c1, q1), (c2, q2) in between if target > 0.0 else ():
             if (q1 - target) * (q2 - target) < 0.0:
-                share = math.log(target / q1) / math.log(q2 / q1)
-                found.append(c1 * (c2 / c1) ** share)
+                found.append(_along(c1, c2, _powers(target, q1) / _powers(q2, q1)))
         return min(found, default=math.inf)
 
     return at
+
+
+TELLS = (1e-300, 1e300)  # ratios that are neither lost below the smallest number nor above the largest
+
+
+def _powers(one: float, other: float) -> float:
+    """The logarithm of the ratio of two positive numbers, however far apart."""
+    ratio = one / other
+    return math.log(ratio) if TELLS[0] < ratio < TELLS[1] else math.log(one) - math.log(other)
+
+
+def _along(one: float, other: float, share: float) -> float:
+    """The number at a share of the way between two positive ones, by powers."""
+    ratio = other / one
+    if TELLS[0] < ratio < TELLS[1]:
+        return float(one * ratio**share)
+    return math.exp(math.log(one) + share * _powers(other, one))
