@@ -140,7 +140,7 @@ class RigidBody:
         owner = f"rigid body {self.name!r}"
         if self.name == WORLD:
             raise SceneError(f"{owner}: the name {WORLD!r} is taken by the fixed world; choose another")
-        if self.motion not in ("dynamic", "static", "kinematic"):
+        if not check.one_of(self.motion, ("dynamic", "static", "kinematic")):
             raise SceneError(f"{owner}: motion must be dynamic, static or kinematic, not {self.motion!r}")
         if self.shape is not None and not isinstance(self.shape, Shape):
             raise SceneError(f"{owner}: shape must be one of engine's shapes, not {self.shape!r}")
@@ -231,7 +231,7 @@ class RigidBody:
 
 def _principal(owner: str, inertia: Any) -> tuple[Vector, Rotation | None]:
     """Principal moments, and their axes if they are given as a tensor that is not diagonal."""
-    rows = list(inertia) if isinstance(inertia, Iterable) and not isinstance(inertia, str) else []
+    rows = check.entries(inertia) or []
     if len(rows) != 3 or not all(isinstance(row, Iterable) and not isinstance(row, str) for row in rows):
         return check.vector(owner, "inertia", inertia), None
     tensor = tuple(check.vector(owner, "inertia", row) for row in rows)

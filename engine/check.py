@@ -43,6 +43,21 @@ def not_negative(owner: str, field: str, value: object) -> float:
     return result
 
 
+def entries(value: Any) -> list[Any] | None:
+    """What a sequence holds; None for a text and for whatever cannot be gone through."""
+    if isinstance(value, str | bytes):
+        return None
+    try:
+        return list(value)
+    except TypeError:
+        return None
+
+
+def one_of(value: object, words: tuple[str, ...]) -> bool:
+    """Whether it is one of some words: arrays, too, can be asked."""
+    return isinstance(value, str) and value in words
+
+
 def vector(owner: str, field: str, value: Any) -> Vector:
     """Three finite floats."""
     try:
@@ -91,7 +106,7 @@ def step_count(value: Any) -> int:
     if steps < 0:
         raise MethodError(f"steps must be a whole number, zero or above, not {value!r}")
     if steps >= 2**53:
-        raise MethodError(f"{steps} steps are more than any machine can do; use a larger time step")
+        raise MethodError("so many steps are more than any machine can do; use a larger time step")
     return steps
 
 

@@ -12,7 +12,10 @@ from __future__ import annotations
 
 
 class EngineError(Exception):
-    """Base of every error the engine raises on purpose."""
+    """Base of every error the engine raises on purpose: one sentence on one line, also where it shows a matrix."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(" ".join(message.split()) if "\n" in message else message)
 
 
 class SceneError(EngineError, ValueError):

@@ -17,9 +17,10 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 def check_ends(owner: str, between: Any) -> tuple[End, End]:
     """Two ends, each a body's name or a world point; at least one must be a body."""
-    if isinstance(between, str) or not hasattr(between, "__len__") or len(between) != 2:
+    ends = check.entries(between)
+    if ends is None or len(ends) != 2:
         raise SceneError(f"{owner}: between must name two ends, not {between!r}")
-    first, second = (end if isinstance(end, str) else check.vector(owner, "between", end) for end in between)
+    first, second = (end if isinstance(end, str) else check.vector(owner, "between", end) for end in ends)
     if not isinstance(first, str) and not isinstance(second, str):
         raise SceneError(f"{owner}: at least one end must be a body")
     if first == second:
@@ -29,9 +30,10 @@ def check_ends(owner: str, between: Any) -> tuple[End, End]:
 
 def check_anchors(owner: str, anchors: Any) -> tuple[Vector, Vector]:
     """Two points in body axes [m]."""
-    if isinstance(anchors, str) or not hasattr(anchors, "__len__") or len(anchors) != 2:
+    points = check.entries(anchors)
+    if points is None or len(points) != 2:
         raise SceneError(f"{owner}: anchors must be two points, not {anchors!r}")
-    first, second = (check.vector(owner, "anchors", anchor) for anchor in anchors)
+    first, second = (check.vector(owner, "anchors", point) for point in points)
     return (first, second)
 
 
@@ -122,7 +124,7 @@ class Fluid:
         check.name("fluid", self.name)
         owner = f"fluid {self.name!r}"
         object.__setattr__(self, "density", check.positive(owner, "density", self.density))
-        if self.level != math.inf:
+        if not (isinstance(self.level, float) and self.level == math.inf):
             object.__setattr__(self, "level", check.number(owner, "level", self.level))
         object.__setattr__(self, "velocity", check.vector(owner, "velocity", self.velocity))
         drag = check.not_negative(owner, "drag_coefficient", self.drag_coefficient)

@@ -7,7 +7,6 @@ rims a mesh is met by its edges and corners. A shape whose centre is below a tri
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -72,9 +71,10 @@ class TriangleMesh(_Sheet):
 
 
 def _listed(name: str, given: Any) -> list[Any]:
-    if isinstance(given, str) or not isinstance(given, Iterable):
+    found = check.entries(given)
+    if found is None:
         raise SceneError(f"triangle mesh: {name} must be a list, not {given!r}")
-    return list(given)
+    return found
 
 
 def _triangle(number: int, face: Any, points: list[Vector]) -> polytope.Face:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from spook_tracker.engine.check import entries, one_of
 from spook_tracker.engine.errors import MethodError
 
 STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
@@ -80,17 +80,17 @@ class Method:
         for field in ("corrections", "substeps", "iterations", "refinements"):
             if isinstance(getattr(self, field), bool):
                 refuse(field, "a whole number")
-        if self.corrections not in (0, 1, 2):
+        if not isinstance(self.corrections, int) or self.corrections not in (0, 1, 2):
             refuse("corrections", "0, 1 or 2")
         if not 0.0 < self.correction_cap <= 1.0:
             refuse("correction_cap", "above 0 and at most 1")
         if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 1_000_000:
             refuse("substeps", "a whole number from 1")
-        if self.composition not in ("none", "order4", "order6", "order8"):
+        if not one_of(self.composition, ("none", "order4", "order6", "order8")):
             refuse("composition", "none, order4, order6 or order8")
-        if self.solver not in ("direct", "iterative", "hybrid"):
+        if not one_of(self.solver, ("direct", "iterative", "hybrid")):
             refuse("solver", "direct, iterative or hybrid")
-        if self.impacts not in ("simultaneous", "successive"):
+        if not one_of(self.impacts, ("simultaneous", "successive")):
             refuse("impacts", "simultaneous or successive")
         if not self.unsettled_residual > 0.0:
             refuse("unsettled_residual", "above 0")
@@ -98,17 +98,18 @@ class Method:
             refuse("iterations", "a whole number from 1 to a thousand million")
         if not self.residual_tolerance >= 0.0:
             refuse("residual_tolerance", "zero or above")
-        if self.friction not in ("cone", "box", "scaled_box"):
+        if not one_of(self.friction, ("cone", "box", "scaled_box")):
             refuse("friction", "cone, box or scaled_box")
         if not isinstance(self.refinements, int) or not 0 <= self.refinements <= 10:
             refuse("refinements", "a whole number from 0 to 10")
         if not 0.0 <= self.floor < 1.0:
             refuse("floor", "from 0 to below 1")
-        if isinstance(self.force_stages, str) or not isinstance(self.force_stages, Iterable):
+        stages = entries(self.force_stages)
+        if stages is None:
             refuse("force_stages", "names of stages, such as ('rotation',)")
-        object.__setattr__(self, "force_stages", tuple(self.force_stages))
+        object.__setattr__(self, "force_stages", tuple(stages or ()))
         for stage in self.force_stages:
-            if stage not in STAGES_THAT_CAN_BE_FORCED:
+            if not isinstance(stage, str) or stage not in STAGES_THAT_CAN_BE_FORCED:
                 raise MethodError(
                     f"method: {stage!r} cannot be forced; try one of {', '.join(STAGES_THAT_CAN_BE_FORCED)}"
                 )

@@ -169,8 +169,8 @@ class Observable:
     def __post_init__(self) -> None:
         if not isinstance(self.quantity, Quantity):
             raise MethodError(f"observe: {self.quantity!r} is not a quantity")
-        for bound in (self.first, self.last):
-            if bound is not None and (isinstance(bound, bool) or not isinstance(bound, int)):
+        for bound in (self.first, 0 if self.last is None else self.last):
+            if isinstance(bound, bool) or not isinstance(bound, int):
                 raise MethodError(f"observe: samples are counted by whole numbers, not {bound!r}")
         if self.first < 0 or (self.last is not None and self.last < self.first):
             raise MethodError(f"observe: samples {self.first} to {self.last} are not a range")

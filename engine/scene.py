@@ -43,9 +43,9 @@ class Scene:
 
     def __post_init__(self) -> None:
         for field in ("bodies", "constraints", "forces", "no_contact"):
-            given = getattr(self, field)
-            if not isinstance(given, Iterable) or isinstance(given, str):
-                raise SceneError(f"scene: {field} must be a sequence, not {given!r}")
+            given = check.entries(getattr(self, field))
+            if given is None:
+                raise SceneError(f"scene: {field} must be a sequence, not {getattr(self, field)!r}")
             object.__setattr__(self, field, tuple(given))
         if not isinstance(self.contacts, bool):
             raise SceneError(f"scene: contacts must be True or False, not {self.contacts!r}")

@@ -222,9 +222,9 @@ class ConvexHull(Shape):
     faces: tuple[polytope.Face, ...] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        given: Any = self.corners
-        if isinstance(given, str) or not isinstance(given, Iterable):
-            raise SceneError(f"convex hull: corners must be points, not {given!r}")
+        given = check.entries(self.corners)
+        if given is None:
+            raise SceneError(f"convex hull: corners must be points, not {self.corners!r}")
         points = [check.vector("convex hull", "corners", point) for point in given]
         try:
             corners, faces = polytope.hull(points)
@@ -319,9 +319,9 @@ class Compound(Shape):
     parts: tuple[Part, ...]
 
     def __post_init__(self) -> None:
-        parts = tuple(self.parts)
+        parts = tuple(check.entries(self.parts) or ())
         if not parts or not all(isinstance(part, Part) for part in parts):
-            raise SceneError("compound: needs at least one Part")
+            raise SceneError(f"compound: parts must be Parts, one at least, not {self.parts!r}")
         object.__setattr__(self, "parts", parts)
 
     @property

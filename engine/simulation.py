@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping
-from typing import SupportsFloat
 
 from spook_tracker.engine import check
 from spook_tracker.engine.compiler import NOTHING, compile
@@ -36,11 +34,15 @@ def simulate(
     if (duration is None) == (steps is None):
         raise MethodError("give either a duration or a number of steps")
     if duration is not None:
-        if isinstance(duration, bool | str) or not isinstance(duration, SupportsFloat):
-            raise MethodError(f"duration must be a number of seconds, not {duration!r}")
-        if isinstance(duration, int) and abs(duration) > sys.float_info.max:
-            raise MethodError("duration is a number too large for arithmetic")
-        if not (math.isfinite(duration) and duration >= 0.0):
+        try:
+            if isinstance(duration, bool | str | bytes):
+                raise TypeError
+            seconds = float(duration)
+        except (TypeError, ValueError):
+            raise MethodError(f"duration must be a number of seconds, not {duration!r}") from None
+        except OverflowError:
+            raise MethodError("duration is a number too large for arithmetic") from None
+        if not (math.isfinite(seconds) and seconds >= 0.0):
             raise MethodError(f"duration must be finite and not negative, not {duration!r}")
-        steps = round(duration / time_step)
+        steps = round(min(seconds / time_step, 1e300))
     return program.run(check.step_count(steps), time_limit, time_stages)
