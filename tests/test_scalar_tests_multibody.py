@@ -74,3 +74,20 @@ def test_halving_the_step_halves_the_error_of_the_loop_and_of_the_governor() -> 
     for problem in (bricard, governor):
         coarse, fine = (problem.answers(simulate, 1 / n)["library_error"] for n in (1000, 2000))
         assert coarse / fine == pytest.approx(2.0, rel=0.05)
+
+
+def test_forty_linkages_reach_both_classes_where_their_ladders_end() -> None:
+    """Of the compositions, which cost a fraction of a second each; the plain step's end is the test's own gate."""
+    for ladder in four_bars.TEST.ladders:
+        if not ladder.name.startswith("forty, "):
+            continue
+        assert (
+            ladder.target_error == {"forty, low precision": 1e-1, "forty, high precision": 1e-3}[ladder.name]
+        )
+        for configuration in ladder.configurations:
+            if configuration.name == "plain":
+                continue
+            finest = ladder.steps_of(configuration)[-1]
+            assert ladder.error(simulate, finest, configuration.method) <= ladder.target_error, (
+                configuration.name
+            )

@@ -154,6 +154,16 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(FEW, time_step), time_step=time_step, duration=10.0, method=method)
 
 
+def many_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Of forty linkages over 20 s, the library's own case."""
+    return answers(simulate, MANY, time_step, 20.0, method)["library_error"]
+
+
+def many_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(scene(MANY, time_step), time_step=time_step, duration=20.0, method=method)
+
+
 def falling_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest component [m] of B0 away from the exact place after BEFORE_LEVEL, two linkages."""
     observe = {"side": Final(quantity=Position("side 0"))}
@@ -165,6 +175,13 @@ def falling_error(simulate: Simulate, time_step: float, method: Method) -> float
 def falling_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same with nothing observed."""
     return simulate(scene(FEW, time_step), time_step=time_step, duration=BEFORE_LEVEL, method=method)
+
+
+def _composed(order: Literal["order4", "order6", "order8"], *time_steps: float) -> Configuration:
+    """A composition that meets a class at its first or second step: too few for a slope."""
+    return Configuration(
+        name=order, method=Method(composition=order), expected_order=None, time_steps=time_steps
+    )
 
 
 ENERGY = Metric(
@@ -182,7 +199,10 @@ TEST = ScalarTest(
     why="Level, all rods lie on one line: one freedom becomes 41, and an engine may fall into any of them.",
     model="81 uniform rods of 1 kg and 1 m: 41 upright on the ground, 40 level between their tops, moving at 1 m/s.",
     parameters=(
-        ("time step", "1e-3 s; ladder 1/20 to 1/4000 s for N = 2 over 10 s"),
+        (
+            "time step",
+            "1e-3 s; ladders 1/20 to 1/4000 s for N = 2 over 10 s, 1/20 to 1/1000 s for N = 40 over 20 s",
+        ),
         ("rods", "1 kg, 1 m, 9.81 m/s²"),
         ("hinges", "compliance 1e-13, damping one time step"),
         ("duration", "20 s, 400 outputs; N = 2: 10 s, 200 outputs"),
@@ -246,6 +266,23 @@ TEST = ScalarTest(
             },
             ladder_error,
             ladder_run,
+        ),
+        *ladders(
+            "B0 of forty linkages over 20 s",
+            {
+                "low": ((1 / 480, 1 / 1000), (PLAIN_CONFIGURATION, _composed("order4", 1 / 20))),
+                "high": (
+                    (1 / 1000, 1 / 2000),
+                    (
+                        _composed("order4", 1 / 20, 1 / 40),
+                        _composed("order6", 1 / 20),
+                        _composed("order8", 1 / 20),
+                    ),
+                ),
+            },
+            many_error,
+            many_run,
+            of="forty, ",
         ),
         Ladder(
             name="before level",

@@ -59,14 +59,16 @@ def ladders(
     classes: Mapping[str, tuple[tuple[float, ...], tuple[Configuration, ...]]],
     error: Callable[[Simulate, float, Method], float],
     run: Callable[[Simulate, float, Method], Result],
+    of: str = "",
 ) -> tuple[Ladder, ...]:
-    """A ladder for each precision class, {"low" or "high": (time steps, configurations that reach it)}.
+    """A ladder for each precision class, {"low" or "high": (time steps, configurations that reach it)}; `of` stands
+    before their names.
 
     The time at which it is reached is the library's own question.
     """
     return tuple(
         Ladder(
-            name=f"{name} precision",
+            name=f"{of}{name} precision",
             description=f"{what}, the library's error; allowed {ALLOWED[name]:g}",
             unit="1",
             time_steps=time_steps,
