@@ -47,7 +47,8 @@ RODS = 10
 LENGTH, MASS = 1.0, 1.0  # m, kg
 ACROSS = MASS * LENGTH**2 / 12.0  # kg m², of a thin rod about its centre
 GRAVITY = 9.81  # m/s²
-HEAVY = 1e6  # kg
+HEAVY, SOME = 1e6, 1e3  # kg
+STIFFEST = 1e-18  # m/N, where the search ends
 TILT = 0.01  # rad
 ZIGZAG = 1e-9  # rad, left and right in turn: wakes the fastest mode
 TIME_STEP = 1.0 / 60.0  # s
@@ -130,10 +131,17 @@ def swing(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _kind(simulate: Simulate, load: float, time_step: float, method: Method, seconds: float) -> str:
+def _kind(
+    simulate: Simulate,
+    load: float,
+    time_step: float,
+    method: Method,
+    seconds: float,
+    compliance: float = 0.0,
+) -> str:
     """Stable while the load swings no wider than it started, beyond what a step's start offset adds."""
     observe = {"load": Trace(quantity=Position("load"))}
-    built, steps = scene(load), round(seconds / time_step)
+    built, steps = scene(load, compliance), round(seconds / time_step)
     result = simulate(built, time_step=time_step, steps=steps, method=method, observe=observe)
     start = RODS * LENGTH * TILT
     return cell(result, result.partial["load"][:, 0] / start, bound=1.1 + time_step * float(rates(load)[0]))
@@ -157,6 +165,28 @@ def predicted_break(time_step: float = TIME_STEP) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if time_step * rates(middle)[-1] < 2.0 else (low, middle)
     return low
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """Longest time step [s] of plain SPOOK under SOME kilograms."""
+    guess = 2.0 / float(rates(SOME)[-1])
+    return break_point(
+        lambda h: is_stable(_kind(simulate, SOME, h, PLAIN, 20.0)),
+        0.2 * guess,
+        3.0 * guess,
+        resolution=0.005,
+        walk=9,
+    )
+
+
+def stiffest(simulate: Simulate) -> BreakPoint:
+    """Smallest compliance [m/N] of the joints under the heavy load, its tension taken implicitly."""
+    return break_point(
+        lambda compliance: is_stable(_kind(simulate, HEAVY, TIME_STEP, STIFF, 20.0, compliance)),
+        1e-12,
+        STIFFEST,
+        walk=7,
+    )
 
 
 def _explicit_growth(load: float, time_step: float) -> float:
@@ -271,6 +301,28 @@ TEST = ScalarTest(
             unit="kg",
             expected=(0.99 * predicted_break(), 1.01 * predicted_break()),
             expected_source="h ω = 2 for the fastest mode of ten rods",
+        ),
+        StabilityStudy(
+            name="longest-step-plain",
+            title="Longest time step of ten rods under 1000 kg, plain SPOOK",
+            configuration="plain",
+            definition=HOLDS,
+            study=longest_step,
+            unit="s",
+            expected=(0.99 * 2.0 / float(rates(SOME)[-1]), 1.005 * 2.0 / float(rates(SOME)[-1])),
+            expected_source="h ω = 2 for the fastest mode of ten rods, to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="smallest-compliance-string",
+            title="Smallest compliance of the joints under 1e6 kg, string stiffness",
+            configuration="string",
+            definition=HOLDS,
+            study=stiffest,
+            unit="m/N",
+            better="smaller",
+            expected=(STIFFEST, STIFFEST),
+            expected_source="rows of an open chain do not repeat each other: the system is regular at 0 as well, and a "
+            "row's own map is stable for every compliance while τ > 0; the search ends at 1e-18",
         ),
         StabilityStudy(
             name="map-plain",

@@ -14,10 +14,12 @@ from spook_tracker.scalar_tests.beam import stability as beam
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import StabilityStudy
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.multibody import bricard
 from spook_tracker.scalar_tests.n_pendulum import stability as chain
 from spook_tracker.scalar_tests.pendulum import stability as pendulum
 from spook_tracker.scalar_tests.planetarium.scene import GAUSS, PERIOD, SPEED
 from tests import oracle_chain, oracle_simulate
+from tests.loop_theory import off
 
 STUDIES = [
     pytest.param(study, id=f"{name}-{study.name}")
@@ -159,6 +161,29 @@ def test_ten_loaded_rods_break_where_an_explicit_step_of_their_angles_does() -> 
         return float(np.abs(np.linalg.eigvals(step)).max())
 
     assert growth(low) < 1.0 + 1e-6 and growth(high) > 1.1
+
+
+def test_ten_loaded_rods_take_the_step_that_an_explicit_one_of_their_angles_takes() -> None:
+    low, high = band("loaded_rods", "longest-step-plain")
+    count, load = loaded_rods.RODS, loaded_rods.SOME
+    centres = np.tril(np.ones((count, count)), -1) + 0.5 * np.eye(count)  # sideways, per angle
+    mass = loaded_rods.ACROSS * np.eye(count) + centres.T @ centres + load * np.ones((count, count))
+    pull = np.linalg.solve(mass, np.diag(9.81 * (centres.sum(axis=0) + load)))
+
+    def growth(h: float) -> float:
+        step = np.block([[np.eye(count) - h * h * pull, h * np.eye(count)], [-h * pull, np.eye(count)]])
+        return float(np.abs(np.linalg.eigvals(step)).max())
+
+    assert growth(low) < 1.0 + 1e-6 and growth(high) > 1.1
+
+
+def test_a_loop_stops_where_the_damping_of_rows_that_repeat_others_takes_its_motion() -> None:
+    """Bricard's mechanism on its exact path, and what linearised rows take from it on the way."""
+    low, high = band("bricard", "smallest-compliance")
+    exact = np.array(bricard.EXACT[1.0])
+
+    assert off(high, 1 / 240, exact) < bricard.AFTER_ONE_SECOND < off(low, 1 / 240, exact)
+    assert off(1.0, 1e-9, exact) < 1e-3  # the path itself, by fifty steps
 
 
 def test_the_fastest_turn_of_a_step_is_where_its_equation_loses_its_root() -> None:
