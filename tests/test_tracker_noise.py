@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from spook_tracker.tracker.document.middle import quartile
 from spook_tracker.tracker.document.run_document import Timing
 from spook_tracker.tracker.judge.change_points import change_points
 from spook_tracker.tracker.judge.noise import judge_noisy
@@ -281,3 +282,33 @@ def test_a_series_tells_no_change_of_time_below_its_own_tolerance():
     assert "detected" in states([*values, *noisy(3, 3, level=1.4e-3)], tolerance=0.15)
     assert compare_times(ladder(1), ladder(2, 1.4)).slower
     assert not compare_times(ladder(1), ladder(2, 1.4), tolerance=0.5).slower
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, 0.0])
+def test_a_rate_that_began_without_a_number_is_judged_as_any_other(odd: float) -> None:
+    """What is not finite, and the time of a rate of zero, has no place in sums over the nights of a level."""
+    level = [1.0 + 0.01 * math.sin(7.0 * n) for n in range(10)]
+    faster, slower = [1.1 * v for v in level], [0.55 * v for v in level]
+    found = states([odd, *level, *faster, *slower], larger_is_better=True)
+
+    assert "detected" not in found[1:21]
+    assert set(found[24:]) == {"detected"}
+
+
+def test_whatever_nights_there_are_each_gets_a_verdict() -> None:
+    chance = random.Random(2)
+    for count in range(2, 60):
+        level, values = 1.0, []
+        for _ in range(count):
+            level *= chance.choice([0.8, 1.1, 1.3, 2.0, 0.5]) if chance.random() < 0.05 else 1.0
+            odd = chance.choice([math.nan, math.inf, 0.0])
+            values.append(odd if chance.random() < 0.06 else level * (1.0 + chance.gauss(0.0, 0.01)))
+        for larger in (False, True):
+            assert len(states(values, larger_is_better=larger)) == count
+
+
+def test_the_lower_quartile_is_numpys() -> None:
+    chance = np.random.default_rng(4)
+    for count in (*range(1, 20), 400):
+        values = chance.lognormal(size=count)
+        assert quartile(values.tolist()) == float(np.quantile(values, 0.25))

@@ -20,6 +20,7 @@ import numpy.typing as npt
 Values = npt.NDArray[np.float64]
 
 PERMUTATIONS = 999
+TOGETHER = 50  # permutations drawn at once: they stay in the cache
 SIGNIFICANT = 0.005
 FIRST, GIVE_UP = 99, 5  # of the first permutations so many as extreme: it can no longer become significant
 PERSISTENCE = 4  # values a level must hold
@@ -74,10 +75,11 @@ def _split(
     if scale == 0.0 or abs(after - before) < least_change * scale:
         return
     extreme = 0
-    for count in (FIRST, PERMUTATIONS - FIRST):
+    pieces = range(FIRST, PERMUTATIONS, TOGETHER)
+    for count in (FIRST, *(min(TOGETHER, PERMUTATIONS - done) for done in pieces)):
         _, drawn = _largest(random.permuted(np.tile(ranks, (count, 1)), axis=1))
         extreme += int(np.sum(drawn >= statistic))
-        if extreme >= GIVE_UP:
+        if count == FIRST and extreme >= GIVE_UP:
             return
     probability = (extreme + 1) / (PERMUTATIONS + 1)
     if probability > SIGNIFICANT:

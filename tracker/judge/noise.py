@@ -14,11 +14,12 @@ median of the last nights against those at the last release, and is red until ha
 from __future__ import annotations
 
 import math
+from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
@@ -107,6 +108,11 @@ class _Walk:
     visits: Visits = field(init=False)
     start: int = 0  # the first night there is, or the last that was accepted
     levels: list[Usual] = field(default_factory=list)  # before each night
+    _stretch: tuple[Any, int, list[float]] = (
+        None,
+        0,
+        [],
+    )  # since when and off which level, until when, in order
     _told: tuple[list[int], Usual] | None = None  # what was asked last, of which nights
     _known_spread: tuple[list[int], tuple[float, float]] | None = None
     _known_anchor: tuple[list[int], float | None] | None = None
@@ -149,8 +155,15 @@ class _Walk:
         return change > threshold and not self._remembers(change)
 
     def _size(self, start: int, end: int) -> float:
-        """How far the nights of a stretch lie off, in the middle."""
-        return self._size_of(range(start, end))
+        """How far the nights of a stretch lie off, in the middle. A stretch grows by its end: the rest is in order."""
+        level, _ = self._spread()
+        known, until, off = self._stretch
+        if known != (start, level) or until > end:
+            until, off = start, []
+        for place in range(until, end):
+            insort(off, worse_by(level, self.values[place], self.larger_is_better))
+        self._stretch = (start, level), end, off
+        return median_of_sorted(off)
 
     def _begin(self, place: int) -> None:
         """A level that starts here."""
@@ -328,7 +341,7 @@ class _Walk:
         level, deviation = self._spread()
         if not 0.0 < level < math.inf:
             return None
-        nights = [*self.level_since, *suspects]
+        nights = [i for i in (*self.level_since, *suspects) if math.isfinite(self._cost(self.values[i]))]
         last = nights[-min(SPANS) :]
         near = sum(worse_by(level, self.values[i], self.larger_is_better) for i in last) / len(last)
         if near < LEAST:

@@ -51,7 +51,7 @@ def worse_by(level: float, value: float, larger_is_better: bool) -> float:
     if not math.isfinite(level):
         return -math.inf
     if level == 0.0:
-        return 0.0 if value == 0.0 else math.inf
+        return 0.0 if value == 0.0 else math.copysign(math.inf, -value if larger_is_better else value)
     change = value / level - 1.0
     return -change if larger_is_better else change
 
@@ -68,7 +68,7 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
         word="regressed",
         sentence=change_in_words(change),
         name=name,
-        decades=math.log10(abs(value / level)) if level else None,
+        decades=math.log10(abs(value / level)) if level and value else None,
     )
 
 

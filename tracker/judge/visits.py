@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.document.middle import median, quartile
 from spook_tracker.tracker.judge.slower import LEAST
 
 VISITS = 2  # to a level, before it is known as one of the machine's
@@ -113,7 +113,7 @@ def left_before(cost: Sequence[float], here: float, level: float, span: int) -> 
     values = values[np.isfinite(values)]
     if len(values) < 2 * span:
         return None
-    level = min(float(np.quantile(values, 0.25)), level)
+    level = min(quartile(values.tolist()), level)
     short = max(steadiness(values.tolist()) / math.sqrt(span), NEAR * (here - level))
     times, longest, since = 0, 0, -1
     for place, mean in enumerate(np.convolve(values, np.full(span, 1.0 / span), "valid")):
