@@ -65,13 +65,13 @@ def _box(facts: Columns) -> bool:
     stands = {name for name, way in facts[4].items() if way < 1e-4}
     expected = {
         "spook (plain)", "cannon (accurate)", "jolt (many-iterations)", "jolt (defaults)", "mujoco (rk4)", "mujoco (equalities)",
-        "pybullet (joints)", "pybullet (constraints)", "rapier (defaults)",
+        "pybullet (joints)", "pybullet (constraints)", "rapier (defaults)", "box3d (many-substeps)", "box3d (defaults)",
     }  # fmt: skip
     return stands == expected and max(facts[4], key=facts[4].__getitem__) == "mujoco (defaults)"
 
 
 def _digits(facts: Columns) -> bool:
-    single = {"jolt", "rapier"}
+    single = {"box3d", "jolt", "rapier"}
     lost = {name: name.split()[0] in single or name == "p2 (defaults)" for name in facts[5]}
     return single <= {name.split()[0] for name in lost} and all(
         1e-6 < facts[5][name] < 1e-2 if much else facts[5][name] < 1e-12 for name, much in lost.items()
@@ -105,9 +105,9 @@ SENTENCES: tuple[tuple[Callable[[Columns], bool], tuple[str, ...]], ...] = (
         _box,
         (
             "- **A box** on a slope of 0.3 with a friction of 0.5 stands. Once it has come to rest it stays within a tenth of a",
-            "  millimetre for ten seconds in spook, jolt and pybullet, in mujoco with exact friction, in rapier's defaults and in",
-            "  cannon when it is asked for accuracy; in the others it creeps, furthest in mujoco's defaults, whose friction is",
-            "  regularised.",
+            "  millimetre for ten seconds in spook, box3d, jolt and pybullet, in mujoco with exact friction, in rapier's defaults",
+            "  and in cannon when it is asked for accuracy; in the others it creeps, furthest in mujoco's defaults, whose friction",
+            "  is regularised.",
         ),
     ),
     (

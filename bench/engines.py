@@ -151,6 +151,7 @@ def page(database: str, of_facts: str = "") -> str:
         "Made by `make engines`: " + ", ".join(f"{n} {version(r[0].engine)}" for n, r in runs.items()) + ".",
         f"Measured on {runs[OURS][-1].started[:10]}, one core at a time for the run times, {machine.processor}.",
         *_asked_later(runs[OURS]),
+        *_not_asked(samples[OURS]),
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
         f"Whoever is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
         f"and, through npm, of {', '.join(find.NODE.values())}, and builds {', '.join(find.BUILT)} from its source.",
@@ -240,6 +241,14 @@ def _asked_later(runs: Sequence[Any]) -> list[str]:
             break_on_hyphens=False,
         )
     ]
+
+
+def _not_asked(samples: ranks.Samples) -> list[str]:
+    """Tests that came into the catalogue after this night."""
+    asked = {definition.test for definition, _ in samples.values()}
+    new = [name for name in CATALOGUE if name not in asked]
+    text = f"In the catalogue by now, and not asked here: {', '.join(new)}."
+    return textwrap.wrap(text, 118, break_on_hyphens=False) if new else []
 
 
 def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Sequence[Any]]) -> list[str]:

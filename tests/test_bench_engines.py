@@ -133,6 +133,15 @@ def test_questions_asked_again_by_themselves_take_the_place_of_their_answers_alo
     assert "| spook | 7 | 0 | 0 | 0 |" in told
 
 
+def test_the_page_names_the_questions_that_are_newer_than_it(engines: Any, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/engines.db"
+    tracker.record(document(0), database)
+    told = " ".join(engines.page(database).partition("## Which engine")[0].split())
+    words = told.partition("In the catalogue by now, and not asked here: ")[2].partition(".")[0].split(", ")
+
+    assert set(words) == set(engines.CATALOGUE) - {d.test for d in document(0).series}
+
+
 def test_an_engine_of_single_precision_is_said_to_end_where_it_ends(engines: Any) -> None:
     fine = Race(test="grasp", ladder="held", unit="m", error=1e-6, order=((1e-4, "spook"), (2e-4, "jolt")))
     coarse = Race(test="pendulum", ladder="angle", unit="rad", error=1e-6, order=((1e-4, "spook"),))
