@@ -64,7 +64,7 @@ def test_bricards_mechanism_is_right_or_refused(compliance: float, h: float) -> 
 
 
 def test_it_is_refused_only_where_the_rows_hold_it_up() -> None:
-    """The energy that contradicting rows hold is of order h⁴ over the compliance."""
+    """What damping takes where rows contradict each other is of order h⁵ over the compliance."""
     refused = {
         h: [c for c in 10.0 ** np.arange(-14, -5) if not third_after_a_second(c, h)[0].completed]
         for h in (1 / 60, 1 / 240, 1 / 960)
