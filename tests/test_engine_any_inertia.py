@@ -212,3 +212,24 @@ def test_a_tensor_has_its_own_axes_and_a_compound_its_centre() -> None:
     off = Compound((Part(shape=Sphere(0.1)), Part(shape=Sphere(0.1), position=(1.0, 0.0, 0.0))))
     with pytest.raises(SceneError, match=r"centre of mass at \(0.5, 0, 0\) m"):
         RigidBody(name="b", mass=1.0, position=(0.0, 0.0, 0.0), shape=off)
+
+
+@pytest.mark.parametrize("exponent", [-900, -550, -300, 300, 550, 900])
+@pytest.mark.parametrize("principal", [True, False])
+def test_a_free_turn_does_not_depend_on_the_unit_of_mass(principal: bool, exponent: int) -> None:
+    """To the bit, from 1e-270 to 1e270 kg m²: its cubes are beyond what there are numbers for."""
+    ends = []
+    for scale in (1.0, 2.0**exponent):
+        moments = tuple(scale * moment for moment in MOMENTS)
+        tensor = rotation(TURN) @ np.diag(MOMENTS) @ rotation(TURN).T
+        free = RigidBody(
+            name="it",
+            mass=1.0,
+            inertia=moments if principal else given(scale * tensor),
+            position=(0.0, 0.0, 0.0),
+            angular_velocity=SPIN,
+        )
+        observe = {"q": Final(quantity=Orientation("it"))}
+        ends.append(simulate(Scene(bodies=(free,)), time_step=H, steps=100, observe=observe)["q"])
+
+    np.testing.assert_array_equal(*ends)

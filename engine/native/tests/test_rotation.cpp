@@ -41,6 +41,19 @@ void the_rate_solves_its_equation() {
     }
 }
 
+void the_rate_does_not_depend_on_the_unit_of_mass() {
+    for (const Vec3 inertia : {kInertia, Vec3{2, 2, 2}})
+        for (double h : {1e-6, 1e-3, 0.1, 0.4})
+            for (const int exponent : {-1000, -700, -400, -260, 260, 400, 700, 1000}) {
+                const double s = std::ldexp(1.0, exponent);
+                Vec3 one, other;
+                EXPECT(rotation_rate(inertia, h, {1, 0.2, -0.3}, one));
+                EXPECT(rotation_rate(s * inertia, h, s * Vec3{1, 0.2, -0.3}, other));
+                EXPECT(one.x == other.x && one.y == other.y && one.z == other.z);
+                EXPECT(!rotation_rate(s * kInertia, 1.0, s * Vec3{0, 3, 0}, other));
+            }
+}
+
 void equal_moments_have_a_closed_form() {
     Vec3 w;
     EXPECT(rotation_rate({2, 2, 2}, 0.3, {1, 2, 3}, w));
@@ -100,6 +113,7 @@ void a_kinematic_body_turns_at_its_rate() {
 
 int main() {
     the_rate_solves_its_equation();
+    the_rate_does_not_depend_on_the_unit_of_mass();
     equal_moments_have_a_closed_form();
     a_body_too_fast_for_the_step_is_refused();
     energy_of_a_tumbling_body_is_bounded();

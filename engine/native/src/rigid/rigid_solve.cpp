@@ -58,19 +58,6 @@ double* RigidSystem::jacobian(int block, bool second) noexcept {
     return spare_.data() + spare_at_[block] + (second ? 6 * joints_.blocks()[block].size : 0);
 }
 
-int RigidSystem::ends(int block) const noexcept {
-    return 2 + static_cast<int>(places_[block].other_edges.size());
-}
-
-int RigidSystem::end_body(int block, int end) const noexcept {
-    const JointBlock& both = joints_.blocks()[block];
-    return end == 0 ? both.first : end == 1 ? both.second : joints_.others(block)[end - 2];
-}
-
-const double* RigidSystem::end_rows(int block, int end) const noexcept {
-    return end < 2 ? jacobian(block, end == 1) : wide_.data() + places_[block].wide_at + 6 * (end - 2);
-}
-
 /// Jacobians into the matrix, right sides of the rows.
 void RigidSystem::assemble_blocks() {
     const auto blocks = joints_.blocks();

@@ -288,9 +288,14 @@ private:
     double* jacobian(int block, bool second) noexcept;
     /// The bodies of a block of rows as they follow each other: its first, its second, those beyond; and the Jacobian of
     /// one, rows × 6, as assembled for the block matrix.
-    int ends(int block) const noexcept;
-    int end_body(int block, int end) const noexcept;
-    const double* end_rows(int block, int end) const noexcept;
+    int ends(int block) const noexcept { return 2 + static_cast<int>(places_[block].other_edges.size()); }
+    int end_body(int block, int end) const noexcept {
+        const JointBlock& both = joints_.blocks()[block];
+        return end == 0 ? both.first : end == 1 ? both.second : joints_.others(block)[end - 2];
+    }
+    const double* end_rows(int block, int end) const noexcept {
+        return end < 2 ? jacobian(block, end == 1) : wide_.data() + places_[block].wide_at + 6 * (end - 2);
+    }
     Vec3 place(const End& end) const noexcept { return end.body < 0 ? end.point : position_of(end.body); }
     double share(int body) const noexcept { return share_.empty() ? 1.0 : share_[body]; }
     const double* jacobian(int block, bool second) const noexcept {

@@ -1,5 +1,8 @@
 #include "rigid/rotation.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace spook {
 namespace {
 
@@ -15,9 +18,19 @@ bool sphere_rate(double inertia, double h, Vec3 p, Vec3& w) noexcept {
     return true;
 }
 
+constexpr double LARGE = 0x1p200;  // of moments: their cubes stay far from the ends of the numbers
+
 }  // namespace
 
 bool rotation_rate(Vec3 inertia, double h, Vec3 p, Vec3& w, bool near) noexcept {
+    if (!(inertia.x < LARGE && inertia.x > 1.0 / LARGE)) {
+        int exponent = 0;
+        std::frexp(std::fmax(inertia.x, std::fmax(inertia.y, inertia.z)), &exponent);
+        const double scale =
+            std::ldexp(1.0, -std::clamp(exponent, -1000, 1000));  // exact: no bit of w differs
+        if (scale * inertia.x < LARGE && scale * inertia.x > 1.0 / LARGE)
+            return rotation_rate(scale * inertia, h, scale * p, w, near);
+    }
     if (inertia.x == inertia.y && inertia.y == inertia.z) return sphere_rate(inertia.x, h, p, w);
     const Vec3 over{1.0 / inertia.x, 1.0 / inertia.y, 1.0 / inertia.z};
     if (!near) w = times(over, p);
