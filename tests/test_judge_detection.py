@@ -7,6 +7,7 @@ sixty nights of learning; here a part of the battery is put, in which a bound br
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def test_a_visit_that_does_not_end_is_red_since_it_came() -> None:
     assert told[-1].state == "detected"
 
 
-FOUND = {  # in a hundred series, and how many of them
+FOUND = {  # the least share of forty series
     "+10 % at 1 % noise": 1.0,
     "+3 % at .2 % noise": 1.0,
     "+3 % at 1 % noise": 0.8,
@@ -101,6 +102,18 @@ def test_steps_are_found_within_their_nights(name: str) -> None:
 
     assert sum(any(found[30:60]) for found in told) <= 1  # while it learns
     assert sum(any(found[60:]) for found in told) / 40 >= FOUND[name]
+
+
+@pytest.mark.parametrize("name", battery.STEPS)
+def test_the_page_tells_how_many_steps_are_found(name: str) -> None:
+    """`docs/detectors.md` says of ours what is found in the same forty series."""
+    nights = battery.STEPS[name][2]
+    told = [red(battery.step(name, series, 60, 15)) for series in range(40)]
+    hits = sum(any(found[60 : 60 + nights]) for found in told)
+    page = (Path(__file__).parent.parent / "docs" / "detectors.md").read_text(encoding="utf-8")
+    (row,) = [line for line in page.splitlines() if line.startswith(f"| {name}, within {nights} nights |")]
+
+    assert row.split("|")[2].split("(")[0].strip() == f"{100.0 * hits / 40:.0f} %"
 
 
 def test_a_shift_that_several_nights_found_is_blamed_on_its_first_and_ends_where_it_ends() -> None:

@@ -384,15 +384,28 @@ def test_an_imported_run_of_another_engine_that_became_worse_is_red(tmp_path):
     assert "door/" in shown.output
 
 
-def test_list_and_rank_tell_of_what_is_asked_for(two_versions):
-    from spook_tracker.scalar_tests.catalogue import CATALOGUE
+def test_list_tells_of_what_is_asked_for(two_versions):
+    def listed(*options):
+        told = json.loads(tracker("list", "--json", *options).output)
+        return {one["test"]: {metric["role"] for metric in one["metrics"]} for one in told}
 
-    every = tracker("list", "--json", "--catalogue", "standard").output
-    gates = tracker("list", "--json", "--role", "gate", "--test", "fall").output
-    assert "fall" in gates
-    assert "stand" not in gates
-    assert len(CATALOGUE) > 1 and every
-    assert tracker("rank", "--test", "nothing").exit_code == 0
+    every = listed()
+    assert set(every) == {"fall", "stand"}
+    for role in ("gate", "companion", "reported"):
+        assert listed("--role", role) == {test: roles for test, roles in every.items() if role in roles}
+    assert set(listed("--role", "gate")) == {"fall"}
+    assert set(listed("--kind", "ladder")) == {"fall"}
+    assert set(listed("--test", "s*")) == {"stand"}
+    assert listed("--test", "s*", "--role", "gate") == {}
+
+
+def test_rank_tells_of_the_tests_that_are_asked_for(two_versions, monkeypatch):
+    measure(monkeypatch, "--sweep", VERSION="1.2.0", HASH=BAD[::-1], PARENT=BAD)
+    every, fall, other = (tracker("rank", *asked) for asked in ((), ("--test", "f*"), ("--test", "stand")))
+
+    assert "fall" in every.output
+    assert fall.output == every.output
+    assert "fall" not in other.output
 
 
 def test_plain_letters_do_where_the_terminal_has_no_others(monkeypatch):
