@@ -18,6 +18,7 @@ from spook_tracker.engine import (
     Energy,
     Final,
     Hinge,
+    JointCoordinate,
     Lock,
     Material,
     MaximumAbsolute,
@@ -316,3 +317,30 @@ def set_going(
     held = (hinge, slide) if slides else (hinge,)
     scene = Scene(bodies=(turning, sliding, *bodies), constraints=(*held, *joints), gravity=(0.0, 0.0, 0.0))
     return simulate(scene, time_step=1e-3, steps=1, observe={"v": Trace(quantity=Velocity())})["v"]
+
+
+BRAKED = (1.5, 2.0, 2.0)  # m or rad: the way of `braked` after 2, 4 and 6 s
+
+
+def rough(kind: Any) -> Scene:
+    """A hinge or slide with dry friction 0.5 that moves with 1, and must move a moment of inertia or a mass of 2."""
+    moving: Any = {"angular_velocity" if kind is Hinge else "velocity": (0.0, 0.0, 1.0)}
+    body = RigidBody(name="b", mass=2.0, inertia=(2.0, 2.0, 2.0), position=(0.0, 0.0, 0.0), **moving)
+    joint = kind(
+        name="j",
+        between=("world", "b"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, 0.0, 1.0),
+        friction=0.5,
+        compliance=0.0,
+    )
+    return Scene(bodies=(body,), constraints=(joint,))
+
+
+def braked(simulate: Any, kind: Any) -> list[float]:
+    """Its way after 2, 4 and 6 s, in steps of 1 ms: slower by 1/4 a second, so it stands after four seconds."""
+    seen = {"way": Trace(quantity=JointCoordinate("j"), every=2000)}
+    return [
+        float(x)
+        for x in np.ravel(simulate(rough(kind), time_step=1e-3, duration=6.0, observe=seen)["way"])[1:]
+    ]

@@ -210,3 +210,12 @@ def test_what_it_lacks_is_not_supported_by_name() -> None:
     force = {"force": Final(quantity=ConstraintForce("joint"))}
     with pytest.raises(NotSupported, match="where contacts or loops act"):
         run("constraints")(peer_scenes.hung(Ball), time_step=STEP, steps=1, observe=force)
+
+
+@pytest.mark.parametrize("kind", [Hinge, Prismatic])
+def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(kind: Any) -> None:
+    assert peer_scenes.braked(find("dart").simulate, kind) == pytest.approx(peer_scenes.BRAKED, abs=5e-3)
+    with pytest.raises(NotSupported, match="friction in a joint"):
+        find("dart").simulate(
+            peer_scenes.rough(kind), configuration="constraints", time_step=1e-3, duration=1.0
+        )

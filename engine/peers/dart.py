@@ -18,7 +18,7 @@ import numpy as np
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal, frictions
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
 from spook_tracker.engine.peers.joint_tree import (
     Node,
@@ -60,6 +60,7 @@ class Dart:
         shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
         shows_force_of=frozenset({Distance, Ball, Hinge, Lock}),
         friction=True,
+        joint_friction=True,
         restitution=True,
     )
     configurations = (
@@ -75,6 +76,7 @@ class Dart:
             reason="free bodies held by constraints, solved by the same direct method. It has none of distance",
             expected_order=1.0,
             options={"joints": False},
+            lacks=("joint_friction",),
         ),
     )
 
@@ -183,6 +185,7 @@ class _Run:
             else made.createRevoluteJointAndBodyNodePair(parent)
         )
         joint.setAxis(axes[0])
+        joint.setCoulombFriction(0, max(frictions(tie)[0]))
         return joint, body
 
     def _fill(self, given: Particle | RigidBody, body: Any) -> None:
@@ -236,6 +239,8 @@ class _Run:
         """DART's constraints where no joint can be."""
         if isinstance(constraint, Distance):
             raise NotSupported("dart has no constraint of distance, only rods that joints can stand for")
+        if any(frictions(constraint)[0]):
+            raise NotSupported(f"dart has no friction in a constraint, as {constraint.name!r} would be")
         one, two = constraint.between
         if one == WORLD or fixed(self.nodes[one].body):
             one, two = two, one

@@ -45,6 +45,7 @@ class PyBullet:
         shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
         shows_force_of=frozenset({Distance, Ball, Hinge}),
         friction=True,
+        joint_friction=True,
         restitution=True,
     )
     configurations = (
@@ -61,6 +62,7 @@ class PyBullet:
             "where bodies are joined and parted. It has no constraint of distance",
             expected_order=1.0,
             options={"joints": False},
+            lacks=("joint_friction",),
         ),
     )
 

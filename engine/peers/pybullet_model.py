@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
 from spook_tracker.engine.peers.joint_tree import (
     Node,
     alone,
@@ -194,8 +194,15 @@ class Model:
                 if kind == bullet.JOINT_PRISMATIC:
                     speed = sliding(self.nodes, node, np.array(axis), turning[str(node.parent)])
                 bullet.resetJointState(made, link, 0.0, float(speed), physicsClientId=self.client)
+                # A motor that wants to stand still, of bounded force, is dry friction; without any it does nothing.
+                dry = max(frictions(node.tie)[0])
                 bullet.setJointMotorControl2(
-                    made, link, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=self.client
+                    made,
+                    link,
+                    bullet.VELOCITY_CONTROL,
+                    targetVelocity=0.0,
+                    force=dry,
+                    physicsClientId=self.client,
                 )
             if self.task.constraint_forces:
                 bullet.enableJointForceTorqueSensor(made, link, True, physicsClientId=self.client)
@@ -204,6 +211,8 @@ class Model:
         """A constraint where no joint can be."""
         if isinstance(constraint, Distance):
             raise NotSupported("pybullet has no constraint of distance, only rods that joints can stand for")
+        if any(frictions(constraint)[0]):
+            raise NotSupported(f"pybullet has no friction in a constraint, as {constraint.name!r} would be")
         at = joint_point(self.scene, constraint)
         points, kind = [at], bullet.JOINT_POINT2POINT
         if isinstance(constraint, Hinge):
