@@ -84,7 +84,8 @@ def rotation(owner: str, field: str, value: object) -> Rotation:
         if isinstance(error, SceneError):
             raise
         raise SceneError(f"{owner}: {field} must be a quaternion (w, x, y, z), not {value!r}") from None
-    length = math.sqrt(w * w + x * x + y * y + z * z)
+    square = w * w + x * x + y * y + z * z
+    length = math.sqrt(square) if 1e-280 < square < 1e280 else math.hypot(w, x, y, z)
     if length == 0.0:
         raise SceneError(f"{owner}: {field} must not be the zero quaternion")
     return (w / length, x / length, y / length, z / length)

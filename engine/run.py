@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType, TracebackType
@@ -41,6 +41,7 @@ from spook_tracker.engine.result import Array, Result, SimulationFailed
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.time_functions import at_start
 
+ROUNDING = 1e-12  # of the length of a quaternion that came out of a run
 NOTHING_READ: Mapping[str, Quantity] = MappingProxyType({})
 
 
@@ -372,13 +373,15 @@ def _flat(scene: Scene, state: Mapping[str, Array] | None) -> list[float]:
     for body in scene.bodies:
         if body.name not in state:
             raise MethodError(f"state: body {body.name!r} is missing; give all bodies of the scene")
-        given: Any = state[body.name]
-        if not isinstance(given, Iterable):
-            raise MethodError(f"state of {body.name!r} needs 13 numbers, not {given!r}")
+        given = check.entries(state[body.name])
+        if given is None:
+            raise MethodError(f"state of {body.name!r} needs 13 numbers, not {state[body.name]!r}")
         numbers = [check.number(f"state of {body.name!r}", "each entry", value) for value in given]
         if len(numbers) != 13:
             raise MethodError(f"state of {body.name!r} needs 13 numbers, not {len(numbers)}")
-        check.rotation(f"state of {body.name!r}", "orientation", numbers[3:7])
+        turn = check.rotation(f"state of {body.name!r}", "orientation", numbers[3:7])
+        if abs(math.hypot(*numbers[3:7]) - 1.0) > ROUNDING:  # else not a bit of it may change
+            numbers[3:7] = turn
         if isinstance(body, RigidBody) and body.motion == "static":
             own = [*body.position, *body.orientation, *[0.0] * 6]
             if not np.allclose(numbers, own, rtol=1e-12, atol=1e-12):

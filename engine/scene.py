@@ -228,14 +228,14 @@ class Scene:
 
     def body(self, name: str) -> Body:
         """The body of that name."""
-        for body in self.bodies:
+        for body in self.bodies if isinstance(name, str) else ():
             if body.name == name:
                 return body
         raise SceneError(f"there is no body named {name!r}")
 
     def constraint(self, name: str) -> Constraint:
         """The constraint of that name."""
-        for constraint in self.constraints:
+        for constraint in self.constraints if isinstance(name, str) else ():
             if constraint.name == name:
                 return constraint
         raise SceneError(f"there is no constraint named {name!r}")

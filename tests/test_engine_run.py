@@ -349,6 +349,16 @@ def hostile() -> dict[str, tuple[Any, type, str]]:
             SceneError,
             "'ghost'",
         ),
+        "a state of no size": (
+            lambda: start(driven, time_step=0.1, state={"block": np.array(3.0)}),
+            MethodError,
+            "13 numbers",
+        ),
+        "a name of numbers": (
+            on(driven, lambda run: run.set_velocity(np.zeros(3))),  # type: ignore[arg-type]
+            SceneError,
+            "no body named",
+        ),
         "half a state": (lambda: start(driven, time_step=0.1, state={}), MethodError, "'block' is missing"),
         "state of NaN": (
             lambda: start(driven, time_step=0.1, state={"block": np.full(13, np.nan)}),
@@ -364,6 +374,23 @@ def test_hostile_input_is_refused_with_one_sentence(name: str) -> None:
     with pytest.raises(kind, match=words) as caught:
         act()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("length", [2.0, 1.5, 0.1, 1e-3, 1e200, 1.0 + 1e-9])
+def test_a_state_may_say_its_turn_at_any_length(length: float) -> None:
+    """As the orientation of a body in a scene: scaled to a unit quaternion, and else to the bit as it is given."""
+    free = RigidBody(name="it", mass=1.0, inertia=(1.0, 2.0, 2.5), position=(0.0, 0.0, 0.0))
+    turn = np.array([0.8, 0.1, -0.5, 0.3])
+    turn /= np.linalg.norm(turn)
+    found = []
+    for scale in (1.0, length):
+        state = {"it": np.array([0.0, 0.0, 0.0, *(scale * turn), 0.0, 0.0, 0.0, 0.3, -1.0, 0.5])}
+        with start(Scene(bodies=(free,)), time_step=0.01, state=state) as run:
+            run.step(50)
+            found.append(run.state["it"])
+
+    np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=1e-14)
+    assert np.linalg.norm(found[1][3:7]) == pytest.approx(1.0, abs=1e-15)
 
 
 def test_traces_are_columns_of_a_dataframe() -> None:
