@@ -230,7 +230,7 @@ def heat(book: Book, *, folded: bool = False) -> dict[str, Any]:
         rows.append({"title": title, "address": where, "y": 22 + 22 * i, "runs": runs})
     every = max(1, math.ceil(46.0 / step))
     ticks = [
-        (round(left + j * step + step / 2.0 - 1.0, 2), day(night.started)[5:])
+        (round(max(left + j * step + step / 2.0 - 1.0, left + 17.0), 2), day(night.started)[5:])
         for j, night in reversed(list(enumerate(shown)))
         if (len(shown) - 1 - j) % every == 0
     ]
