@@ -8,15 +8,20 @@ import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.website import charts
 from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line
+from spook_tracker.tracker.website.diagrams import trend_chart
 from spook_tracker.tracker.website.figures import figure, grid_figure
+from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.svg import grid_picture, picture, sparkline
 from spook_tracker.tracker.website.templates import environment
+from tests.synthetic_history import DocumentHistory, document
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
 
@@ -171,3 +176,21 @@ def test_words_at_a_logarithmic_axis_leave_room_for_each_other(low: float, high:
     assert marks == sorted(marks)
     assert 1 <= len(marks) <= 8
     assert all(b - a >= room / 8.0 for a, b in pairwise(marks))
+
+
+def test_the_days_under_a_trend_say_the_year_where_there_are_several_and_the_newest_is_one_of_them() -> None:
+    runs = [
+        msgspec.structs.replace(document(n), started=f"{2024 + n // 12}-{n % 12 + 1:02d}-05T03:00:00+00:00")
+        for n in range(30)
+    ]
+
+    def days(nights: list[RunDocument]) -> list[str]:
+        told = book(DocumentHistory(nights))
+        trend = next(trend for test in told.tests for trend in test.gates())
+        return [words for _, words in trend_chart(trend, told.nights, ()).x_ticks]
+
+    over_years, in_one = days(runs), days(runs[:12])
+    assert over_years[-1] == "2026-06-05"
+    assert {words[:4] for words in over_years} == {"2024", "2025", "2026"}
+    assert in_one[-1] == "12-05"
+    assert 2 < len(in_one) <= len(over_years) <= 12
