@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-from typing import Any, ClassVar
+from collections.abc import Iterable
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import pytest
@@ -20,8 +20,10 @@ from spook_tracker.scalar_tests import (
     loaded_rods,
     pile,
     rolling_friction,
+    rope,
     scissor_lift,
     seams,
+    sorting,
     suspension,
 )
 from spook_tracker.scalar_tests.beam import scene as beam
@@ -30,6 +32,8 @@ from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Metric
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.chain import small_motion
+from spook_tracker.scalar_tests.inclined_plane import scene as inclined_plane
+from spook_tracker.scalar_tests.inclined_plane import slip_angle
 from spook_tracker.scalar_tests.n_pendulum import measure as chain
 from spook_tracker.scalar_tests.planetarium import scene as planetarium
 from tests import oracle_chain, oracle_rigid_simulate, oracle_simulate
@@ -323,11 +327,27 @@ def test_the_fall_read_a_sample_late_is_a_sum() -> None:
     assert metric("falling_object", "position_error_read_late").holds_set_point(abs(late)), late
 
 
-def test_the_slope_at_which_a_box_slips_is_as_well_known_as_it_is_searched() -> None:
-    assert (
-        metric("slip_angle", "slip_slope_error").limit == 2.0 * 1e-4
-    )  # one resolution, and the last step over it
-    assert metric("slip_angle", "bracket_held").limit == float(True) + float(True)
+def test_the_slope_at_which_a_box_slips_is_as_well_known_as_it_is_searched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Boxes that slip by Coulomb's law, and by one that is off by so much, without an engine."""
+
+    def errors(off: float) -> tuple[float, float]:
+        for module in (slip_angle, inclined_plane):
+            monkeypatch.setattr(
+                module, "slips", lambda simulate, slope, friction, **how: slope > friction + off
+            )
+        (slope,) = slip_angle._measure_slope(cast(Any, None)).values()
+        (held,) = slip_angle._measure_bracket(cast(Any, None)).values()
+        return slope, held
+
+    by_slope, by_bracket = metric("slip_angle", "slip_slope_error"), metric("slip_angle", "bracket_held")
+    for off in np.linspace(-0.9e-4, 0.9e-4, 7):
+        slope, held = errors(float(off))
+        assert by_slope.passes(slope) and by_bracket.passes(held), off
+    for off in (-3.2e-4, 3.2e-4, 1e-3, -1e-2):
+        slope, held = errors(off)
+        assert not by_slope.passes(slope) and not by_bracket.passes(held), off
 
 
 def test_parting_lifts_a_pile_by_less_than_it_has_fallen() -> None:
@@ -341,12 +361,52 @@ def test_parting_lifts_a_pile_by_less_than_it_has_fallen() -> None:
     assert metric("pile", "energy_rise").limit <= bound  # type: ignore[operator]
 
 
+def eliminated(neighbours: dict[int, set[int]], order: Iterable[int]) -> int:
+    """Blocks touched by a factorisation in that order: the pivot, those beside it, and what they change of each other."""
+    left, blocks = {node: set(beside) for node, beside in neighbours.items()}, 0
+    for node in order:
+        beside = left.pop(node)
+        blocks += 1 + len(beside) + len(beside) * (len(beside) + 1) // 2
+        for other in beside:
+            left[other] = (left[other] | beside) - {node, other}
+    return blocks
+
+
 def test_the_ends_of_a_rope_cost_a_link_in_125() -> None:
-    assert metric("rope", "cost_error").limit == 1.0 / 125.0
+    """Links and the joints between them, eliminated from one end to the other."""
+
+    def of_link(links: int) -> float:
+        nodes = range(2 * links - 1)  # links are even, joints odd
+        beside = {node: {node - 1, node + 1} & set(nodes) for node in nodes}
+        return eliminated(beside, nodes) / links
+
+    limit = metric("rope", "cost_error")
+    cost = of_link(rope.LONG) / of_link(rope.SHORT) - 1.0
+    assert limit.passes(cost)
+    assert 0.5 * float(limit.limit) < cost  # type: ignore[arg-type]
+    assert not limit.passes(math.log2(rope.LONG / rope.SHORT))  # work that grows as n log n
 
 
-def test_a_search_is_as_exact_as_its_resolution() -> None:
-    house = inspect.signature(card_house.least).parameters["resolution"].default
+def test_a_search_is_as_exact_as_its_resolution(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cards that stand by statics, and by statics that are off by so much, without an engine."""
 
-    assert metric("card_house", "least_error").limit == house
-    assert metric("sorting", "steps_late").limit == 0.5  # a whole number: none
+    def error(off: float) -> float:
+        enough = card_house.need(3) * (1.0 + off)
+        monkeypatch.setattr(card_house, "stands", lambda simulate, storeys, friction: friction >= enough)
+        return abs(card_house.least(cast(Any, None)).value / card_house.need(3) - 1.0)
+
+    limit = metric("card_house", "least_error")
+    assert limit.passes(error(0.0))
+    assert not any(limit.passes(error(off)) for off in (-0.0045, 0.0045, 0.02))
+
+
+def test_a_box_on_the_belt_is_late_by_a_whole_step_or_not_at_all() -> None:
+    """Friction takes h µ g of the slip in each step: steps counted one by one, and what is asked for."""
+    limit = metric("sorting", "steps_late")
+    for friction in sorting.SORTS:
+        slip, steps = abs(sorting.SLIP), 0
+        while slip > 1e-6:
+            slip, steps = slip - sorting.TIME_STEP * friction * sorting.GRAVITY, steps + 1
+        asked = math.ceil(abs(sorting.SLIP) / (friction * sorting.GRAVITY * sorting.TIME_STEP))
+        assert limit.passes(float(abs(steps - asked)))
+        assert not limit.passes(float(abs(steps + 1 - asked)))

@@ -6,6 +6,7 @@ import importlib
 import inspect
 import math
 import re
+from typing import Any
 
 import pytest
 
@@ -118,7 +119,7 @@ FOUND = {  # test: metric: what finds it again without the engine
     "robot_arm": {"driving_error": f"{M}.test_the_torques_of_a_driven_arm_are_two_steps_late_at_most"},
     "rolling_coin": dict.fromkeys(("rate_error", "lean_error", "centre_error", "energy_error"), COIN),
     "turntable": {"rate_error": f"{C}.test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn"},
-    "sorting": dict.fromkeys(("steps_late",), SEARCH),
+    "sorting": {"steps_late": f"{F}.test_a_box_on_the_belt_is_late_by_a_whole_step_or_not_at_all"},
     "masonry_arch": dict.fromkeys(("stands", "falls", "weight_error", "thrust"), ARCH),
     "stone_bridge": dict.fromkeys(("stands", "falls", "weight_error", "thrust", "stays"), BRIDGE),
     "suspension": {
@@ -145,11 +146,15 @@ def widths(metric: Metric) -> list[float]:
     """What of a metric is ours to derive: how far its limit and its set point let a value go (rad for degrees)."""
     found, unit = [], math.pi / 180.0 if metric.unit == "degrees" else 1.0
     if metric.limit is not None and not metric.every_engine:
-        ends = metric.limit if isinstance(metric.limit, tuple) else None
-        one_sided = ends is None and metric.better in ("larger", "smaller") and metric.reference != 0.0
-        found.append(
-            0.5 * (ends[1] - ends[0]) if ends else abs(metric.limit) - one_sided * round(abs(metric.limit))
-        )  # type: ignore[arg-type, operator]
+        if isinstance(metric.limit, tuple):
+            found.append(0.5 * (metric.limit[1] - metric.limit[0]))
+        elif metric.better in ("larger", "smaller") and metric.reference != 0.0:
+            whole = (
+                round(metric.limit) if metric.reference is None else metric.reference
+            )  # a count, or a share of one
+            found.append(abs(metric.limit - whole))
+        else:
+            found.append(abs(metric.limit))
     if metric.set_point is not None:
         found.append(0.5 * (metric.set_point[1] - metric.set_point[0]))
     return [unit * width for width in found]
@@ -164,6 +169,24 @@ OURS = sorted(
         if max(widths(metric), default=0.0) > ROUNDING
     }
 )
+
+
+def test_a_limit_on_one_side_is_as_wide_as_it_is_far_from_what_it_shall_be() -> None:
+    def wide(limit: Any, **facts: Any) -> float:
+        facts = {"unit": "1", "better": "smaller_magnitude"} | facts
+        return max(
+            widths(Metric(name="n", description="d", role="gate", limit=limit, limit_source="s", **facts))
+        )
+
+    assert wide(0.25) == 0.25
+    assert wide((-0.5, 1.5)) == 1.0
+    assert wide(180.0, unit="degrees") == pytest.approx(math.pi)
+    assert wide(0.6, better="larger", reference=1.0) == pytest.approx(0.4)
+    assert wide(1.4, better="smaller", reference=1.0) == pytest.approx(0.4)
+    assert wide(0.6, better="larger") > ROUNDING  # nobody says what it shall be
+    assert wide(3.0, better="larger") == 0.0  # a count: all of three
+    assert wide(1.0 + 1e-9, better="smaller") < ROUNDING
+    assert wide(0.0, set_point=(-0.1, 0.1), set_point_source="s") == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(("test", "name"), OURS)
