@@ -245,13 +245,15 @@ class _Run:
         m, d = self.model, self.data
         names = {int(self.ids[i]): body.name for i, body in enumerate(self.task.scene.bodies)}
         keep.contacts[place] = d.ncon
+        # All at once: one contact's own arrays are read wrong by releases before 3.3 beside a NumPy of today.
+        touching = d.contact
+        frames = np.reshape(touching.frame, (-1, 3, 3))
         wrench = np.zeros(6)
         for k in range(d.ncon):
-            contact = d.contact[k]
-            keep.depths[place] = max(keep.depths[place], -contact.dist)
+            keep.depths[place] = max(keep.depths[place], -touching.dist[k])
             mujoco.mj_contactForce(m, d, k, wrench)
-            force = np.reshape(contact.frame, (3, 3)).T @ wrench[:3]  # on the second, along the normal
-            first, second = (names[int(m.geom_bodyid[g])] for g in (contact.geom1, contact.geom2))
+            force = frames[k].T @ wrench[:3]  # on the second, along the normal
+            first, second = (names[int(m.geom_bodyid[g[k]])] for g in (touching.geom1, touching.geom2))
             keep.pair((first, second))[place] -= force
 
 
