@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import zlib
-from functools import lru_cache
 from pathlib import Path
 
 from spook_tracker.tracker.website.page_rows import Page
@@ -15,16 +14,14 @@ from spook_tracker.tracker.website.page_rows import Page
 MODULE = "live.wasm"  # under site/static
 
 
-def module_script(static: Path) -> bytes | None:
-    """The module as a script, which a page opened from a file may load; None if it is not built."""
+def built_module(static: Path) -> bytes | None:
+    """The module; None if it is not built."""
     built = static / MODULE
-    if not built.is_file():
-        return None
-    return _script(built.read_bytes())
+    return built.read_bytes() if built.is_file() else None
 
 
-@lru_cache(maxsize=1)  # one module, published again and again
-def _script(module: bytes) -> bytes:
+def module_script(module: bytes) -> bytes:
+    """The module as a script, which a page opened from a file may load."""
     return b'const LIVE_MODULE="' + base64.b64encode(zlib.compress(module, 9)) + b'";\n'
 
 

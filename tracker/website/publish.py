@@ -38,7 +38,7 @@ from spook_tracker.tracker.website.comparisons import (
 )
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
-from spook_tracker.tracker.website.live_module import module_script
+from spook_tracker.tracker.website.live_module import built_module, module_script
 from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_mutants import Mutant
@@ -128,9 +128,9 @@ def publish(
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
         module = ""
-        if (engine := module_script(static)) is not None:
+        if (engine := built_module(static)) is not None:
             module = f"assets/{_hashed('live-module.js', engine)}"
-            folder.add(module, digest(engine), partial(bytes, engine))
+            folder.add(module, digest(making.encode(), engine), partial(module_script, engine))
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
