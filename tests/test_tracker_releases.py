@@ -199,6 +199,21 @@ def test_every_change_is_told_with_its_release(tmp_path: Path) -> None:
     ]
 
 
+def test_a_page_names_the_releases_it_was_made_of_and_every_quantity_that_changed(tmp_path: Path) -> None:
+    """Three worse in four settings of one quantity do not hide another quantity of the same test."""
+    many = [f"falling_object/{setting}/position_error/h=0.0166667" for setting in ("a", "b", "c", "d")]
+    other = "falling_object/e/velocity_error/h=0.0166667"
+    before, after = dict.fromkeys([*many, other], 0.5), {**dict.fromkeys(many, 50.0), other: 0.51}
+    database = history(tmp_path, release("1.9", 1, before), release("1.10", 2, after))
+    told = CliRunner().invoke(main, ["releases", "other", "--markdown", "--db", database]).output
+
+    assert "tracker backfill --engine other 1.9 1.10 --limit 5 --test=falling_object" in " ".join(
+        told.split()
+    )
+    assert f"| `{other}` | 0.5 | 0.51 |" in told
+    assert "| … and 1 more of falling_object |" in told
+
+
 def test_a_changelog_is_found_missed_or_says_nothing(tmp_path: Path) -> None:
     other = "blow/rk4/change/h=0.0166667"
     database = history(

@@ -62,7 +62,8 @@ def page(
 ) -> str:
     """The same as a page in Markdown. Every number in it comes from the recorded runs."""
     names = sorted({series.partition("/")[0] for run in runs for series in history.samples(run.id)})
-    again = f"tracker backfill --engine {engine} --limit 5 {' '.join(f'--test={name}' for name in names)}"
+    versions = " ".join(run.engine.version for run in runs)
+    again = f"tracker backfill --engine {engine} {versions} --limit 5 {' '.join(f'--test={name}' for name in names)}"
     lines = [
         f"# What {len(runs)} releases of {engine} changed",
         "",
@@ -145,12 +146,22 @@ def _against(checked: Checked, changelog: Changelog) -> list[str]:
 def _change_table(changes: Sequence[Change]) -> list[str]:
     lines = ["| series | before | after | unit | |", "|---|---|---|---|---|"]
     for found in by_test(changes).values():
-        for change in found[:SHOWN]:
+        told = _worst_of_each(found)
+        for change in told:
             before, after = _words(change)
             lines.append(f"| `{change.series}` | {before} | {after} | {change.unit} | {change.word} |")
-        if len(found) > SHOWN:
-            lines.append(f"| … and {len(found) - SHOWN} more of {found[0].test} | | | | |")
+        if len(found) > len(told):
+            lines.append(f"| … and {len(found) - len(told)} more of {found[0].test} | | | | |")
     return lines
+
+
+def _worst_of_each(found: Sequence[Change]) -> list[Change]:
+    """The worst three, and the worst of every other quantity: none is named by its number alone."""
+    told = list(found[:SHOWN])
+    for change in found[SHOWN:]:
+        if change.series.split("/")[2] not in {one.series.split("/")[2] for one in told}:
+            told.append(change)
+    return told
 
 
 def values(change: Change) -> str:
