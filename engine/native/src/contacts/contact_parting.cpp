@@ -195,7 +195,9 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
 
 bool ContactStage::part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again) {
     const std::size_t joints = parting.rows.size();
+    std::vector<char> answered(joints, 1);  // where nothing overlaps, nothing is displaced
     for (const Point& lap : laps_) {
+        answered.push_back(!(parting_speed(lap, again) > 0.0));
         RowBlock block = row_block(lap, 1);
         block.right[0] = parting_speed(lap, again);
         block.state[0] = lap.push > 0.0 ? RowState::free : RowState::at_lower;
@@ -204,7 +206,7 @@ bool ContactStage::part_directly(MixedSystem& parting, std::vector<Islands::Tie>
     }
     parting.velocity.clear();
     std::vector<FrictionPoint> none;
-    if (!run(parting, none, parting_solver_, options_.friction).finite) return false;
+    if (!run(parting, none, parting_solver_, options_.friction, &answered).finite) return false;
     for (std::size_t k = joints; k < parting.rows.size(); ++k)
         if (parting.rows[k].multiplier[0] != 0.0)
             ties.push_back({parting.rows[k].first, parting.rows[k].second});

@@ -34,12 +34,25 @@ constexpr Twin sum(Twin a, Twin b) noexcept {
 
 constexpr double factorial(int n) noexcept { return n < 2 ? 1.0 : n * factorial(n - 1); }
 
+/// 1/n!, divided when this is compiled.
+template <int N> constexpr double over_factorial = 1.0 / factorial(N);
+
+/// The terms n, n − 4 … of a series, innermost first.
+template <int N> constexpr double sine_terms(double z, double p) noexcept {
+    p = z * (z * p + over_factorial<N>)-over_factorial<N - 2>;
+    if constexpr (N > 5) p = sine_terms<N - 4>(z, p);
+    return p;
+}
+template <int N> constexpr double cosine_terms(double z, double q) noexcept {
+    q = over_factorial<N - 2> - z * (over_factorial<N> - z * q);
+    if constexpr (N > 6) q = cosine_terms<N - 4>(z, q);
+    return q;
+}
+
 /// Taylor series on |r| <= pi/4; the first term left out is below 1e-19 of the value.
 SineCosine near_zero(Twin r) noexcept {
     const double x = r.high, z = x * x;
-    double p = 0.0, q = 0.0;
-    for (int n = 17; n >= 5; n -= 4) p = z * (z * p + 1.0 / factorial(n)) - 1.0 / factorial(n - 2);
-    for (int n = 18; n >= 6; n -= 4) q = 1.0 / factorial(n - 2) - z * (1.0 / factorial(n) - z * q);
+    const double p = sine_terms<17>(z, 0.0), q = cosine_terms<18>(z, 0.0);
     const double sine = x + (x * z * p + r.low);
     const double half = 0.5 * z,
                  rough = 1.0 - half;  // the cosine's largest error is that of z: carry it along
