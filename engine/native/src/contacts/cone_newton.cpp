@@ -28,6 +28,7 @@ constexpr double near_enough = 1e-6;             // a residual, of the speeds, t
 constexpr int max_jumps = 3;                     // without half the least they met
 constexpr int max_losses = 3;                    // of the path, sought again,
 constexpr double back = 10.0;                    //   so many blurs away
+constexpr double nearer = 0.1;                   //   and kept so much nearer to
 
 }  // namespace
 
@@ -54,10 +55,14 @@ void ConeNewton::read(const RowBlock& given, int row, const FrictionPoint* frict
     }
     unit.soft = unit.softness[0] > 0.0 || unit.softness[1] > 0.0;
     unit.root = own > 0.0 ? std::sqrt(unit.size / own) : 1.0;
+    unit.over = 1.0 / unit.root;
     unit.lower = given.lower[row] / unit.root;
     unit.upper = given.upper[row] / unit.root;
     unit.z[0] = std::clamp(unit.z[0], given.lower[row], given.upper[row]);
-    if (unit.size == 3) unit.friction = friction->coefficient;
+    if (unit.size == 3) {
+        unit.friction = friction->coefficient;
+        unit.along = unit.over / unit.friction;
+    }
 }
 
 void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& points) {
@@ -146,23 +151,27 @@ double* ConeNewton::block(const ConeUnit& unit, bool row_first, bool column_firs
     return row_first != unit.turned ? matrix_.forth(unit.edge) : matrix_.back(unit.edge);
 }
 
+/// The matrix gets what a unit of N rows adds: Gᵀ K G.
+template <int N> void ConeNewton::add(const ConeUnit& unit) {
+    Six image[N];
+    for (const bool column : {true, false}) {
+        if ((column ? unit.first : unit.second) < 0) continue;
+        stiffen<N>(unit.k, column ? unit.first_row : unit.second_row, image);
+        for (const bool row : {true, false}) {
+            if ((row ? unit.first : unit.second) < 0) continue;
+            add_stiffness<N>(row ? unit.first_row : unit.second_row, image, block(unit, row, column));
+        }
+    }
+}
+
 /// Newton's direction, by a factor of M + Σ Gᵀ K G.
 bool ConeNewton::step(const MixedSystem& system, double blur) {
     matrix_.clear();
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
     for (ConeUnit& unit : units_) {
         unit.linearise({blur, hold_});
-        for (const bool column : {true, false}) {
-            if ((column ? unit.first : unit.second) < 0) continue;
-            const Vec6* from = column ? unit.first_row : unit.second_row;
-            for (const bool row : {true, false}) {
-                if ((row ? unit.first : unit.second) < 0) continue;
-                const Vec6* to = row ? unit.first_row : unit.second_row;
-                double* out = block(unit, row, column);
-                if (unit.size == 3) add_stiffness<3>(unit.k, to, from, out);
-                else add_stiffness<1>(unit.k, to, from, out);
-            }
-        }
+        if (unit.size == 3) add<3>(unit);
+        else add<1>(unit);
     }
     ++factorisations_;
     block_operations_ += static_cast<std::uint64_t>(matrix_.operations());
@@ -373,7 +382,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         // Begin anew, further from the end and more carefully.
         jumps = -1, stalled = 0, hold_ = loosest_hold, ++losses;
         if (met > 0.0) {
-            near_ *= 0.3;
+            near_ *= nearer;
             blur = back * met;
             for (ConeUnit& unit : units_) unit.z = unit.met;
             measure(system);

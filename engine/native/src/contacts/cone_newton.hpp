@@ -80,6 +80,7 @@ private:
     void keep();
     bool step(const MixedSystem& system, double blur);
     double* block(const ConeUnit& unit, bool row_first, bool column_first);
+    template <int N> void add(const ConeUnit& unit);
 
     BlockLu matrix_;
     std::vector<std::pair<int, int>> pairs_, needed_;  // analysed, and those of this system

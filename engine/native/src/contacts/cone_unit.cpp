@@ -10,16 +10,15 @@ namespace spook {
 
 double ConeUnit::natural(const Vec& at_z, const Vec& at_u, const Aid& aid, double* out) const {
     const double blur = aid.blur, hold = aid.hold;
-    const double over = 1.0 / root;
     if (size == 1) {
         const double y = at_z[0] * over, w = root * at_u[0] + hold * (y - held[0]), a = y - w;
         double p = a;
         if (lower == upper) p = lower;
         else if (lower > -unbounded) {
-            p = lower + positive(a - lower, blur).value;
-            if (upper < unbounded) p -= positive(a - upper, blur).value;
+            p = lower + positive_part(a - lower, blur);
+            if (upper < unbounded) p -= positive_part(a - upper, blur);
         } else if (upper < unbounded) {
-            p = upper - positive(upper - a, blur).value;
+            p = upper - positive_part(upper - a, blur);
         }
         out[0] = y - p;
         if (lower == -unbounded && upper == unbounded) out[0] = w;
@@ -27,20 +26,22 @@ double ConeUnit::natural(const Vec& at_z, const Vec& at_u, const Aid& aid, doubl
     }
     const double mu = friction, w1 = root * mu * at_u[1], w2 = root * mu * at_u[2];
     const double rounded = kink(blur), slide = std::sqrt(w1 * w1 + w2 * w2 + rounded * rounded) - rounded;
-    const double y0 = at_z[0] * over, y1 = at_z[1] * over / mu, y2 = at_z[2] * over / mu;
+    const double y0 = at_z[0] * over, y1 = at_z[1] * along, y2 = at_z[2] * along;
     const double a0 = y0 - (root * at_u[0] + slide) - hold * (y0 - held[0]);
     const double a1 = y1 - w1 - hold * (y1 - held[1]), a2 = y2 - w2 - hold * (y2 - held[2]);
-    const Spectrum s = project(a0, a1, a2, blur);
-    out[0] = y0 - s.value[0];
-    out[1] = y1 - s.value[1] * s.t1;
-    out[2] = y2 - s.value[1] * s.t2;
+    const double reach = length(a1, a2);
+    const double one = positive_part(a0 - reach, blur), two = positive_part(a0 + reach, blur);
+    const double shrink = reach > 0.0 ? 0.5 * (two - one) / reach : 0.0;
+    out[0] = y0 - 0.5 * (one + two);
+    out[1] = y1 - shrink * a1;
+    out[2] = y2 - shrink * a2;
     return out[0] * out[0] + out[1] * out[1] + out[2] * out[2];
 }
 
 void ConeUnit::linearise_row(const Aid& aid) {
     const double blur = aid.blur, hold = aid.hold;
     slope[0] = 1.0, rest[0] = 0.0, bend[0] = 0.0;
-    const double y = z[0] / root, a = y - root * u[0] - hold * (y - held[0]);
+    const double y = z[0] * over, a = y - root * u[0] - hold * (y - held[0]);
     if (lower == upper) slope[0] = 0.0, rest[0] = 1.0;
     else if (lower > -unbounded) {
         const Positive low = positive(a - lower, blur);
@@ -54,7 +55,8 @@ void ConeUnit::linearise_row(const Aid& aid) {
         slope[0] = high.slope, rest[0] = high.rest, bend[0] = high.bend;
     }
     rest[0] += hold * slope[0];
-    const double stiffness = root * root * slope[0] / rest[0];
+    over_rest[0] = 1.0 / rest[0];
+    const double stiffness = root * root * slope[0] * over_rest[0];
     g[0] = 1.0 / (1.0 + stiffness * softness[0]);
     k[0] = g[0] * stiffness;
 }
@@ -65,11 +67,11 @@ void ConeUnit::linearise(const Aid& aid) {
         natural(z, u, aid, map.data());
         return linearise_row(aid);
     }
-    const double over = 1.0 / root, rho = root * root, mu = friction;
+    const double rho = root * root, mu = friction;
     const double w1 = root * mu * u[1], w2 = root * mu * u[2];
     const double rounded = kink(blur), sliding = std::sqrt(w1 * w1 + w2 * w2 + rounded * rounded);
     s1 = sliding > 0.0 ? w1 / sliding : 0.0, s2 = sliding > 0.0 ? w2 / sliding : 0.0;
-    const double y0 = z[0] * over, y1 = z[1] * over / mu, y2 = z[2] * over / mu;
+    const double y0 = z[0] * over, y1 = z[1] * along, y2 = z[2] * along;
     const double a0 = y0 - (root * u[0] + sliding - rounded) - hold * (y0 - held[0]);
     const Spectrum s = project(a0, y1 - w1 - hold * (y1 - held[1]), y2 - w2 - hold * (y2 - held[2]), blur);
     t1 = s.t1, t2 = s.t2;
@@ -77,13 +79,18 @@ void ConeUnit::linearise(const Aid& aid) {
     double ratio[3], image[3];
     for (int i = 0; i < 3; ++i) {
         slope[i] = s.slope[i], rest[i] = s.rest[i] + hold * s.slope[i];
-        ratio[i] = slope[i] / rest[i];
+        over_rest[i] = 1.0 / rest[i];
+        ratio[i] = slope[i] * over_rest[i];
     }
-    for (int j = 0; j < 3; ++j) {  // K = rho E (1 − D)⁻¹ D E', column by column
-        const double e[3] = {j == 0 ? 1.0 : mu * (j == 1 ? s1 : s2), j == 1 ? mu : 0.0, j == 2 ? mu : 0.0};
-        spectral(ratio, e, image);
-        for (int i = 0; i < 3; ++i) k[3 * i + j] = rho * (i == 0 ? 1.0 : mu) * image[i];
-    }
+    // K = rho E (1 − D)⁻¹ D E': Q is the middle, by its eigenvalues, and E' adds mu s of its first column to the others.
+    const double even = 0.5 * (ratio[0] + ratio[1]), odd = 0.5 * (ratio[1] - ratio[0]),
+                 cross = even - ratio[2];
+    const double q01 = odd * t1, q02 = odd * t2, q12 = cross * t1 * t2;
+    const double q11 = even * t1 * t1 + ratio[2] * t2 * t2, q22 = even * t2 * t2 + ratio[2] * t1 * t1;
+    const double rho_mu = rho * mu, rho_mu2 = rho_mu * mu;
+    k[0] = rho * even, k[1] = rho_mu * (s1 * even + q01), k[2] = rho_mu * (s2 * even + q02);
+    k[3] = rho_mu * q01, k[4] = rho_mu2 * (s1 * q01 + q11), k[5] = rho_mu2 * (s2 * q01 + q12);
+    k[6] = rho_mu * q02, k[7] = rho_mu2 * (s1 * q02 + q12), k[8] = rho_mu2 * (s2 * q02 + q22);
     const double by_blur = blur > 0.0 ? blur * (blur + 2.0 * load) / ((blur + load) * (blur + load)) : 0.0;
     const double push[3] = {sliding > 0.0 ? by_blur * (1.0 - rounded / sliding) : 0.0, 0.0, 0.0};
     spectral(slope, push, image);
@@ -116,30 +123,29 @@ void ConeUnit::soften() {
 /// Σ fᵢ eᵢ eᵢᵀ x, with eᵢ = (1, −t)/√2, (1, t)/√2, (0, t⊥).
 void ConeUnit::spectral(const double* f, const double* x, double* y) const {
     const double even = 0.5 * (f[0] + f[1]), odd = 0.5 * (f[1] - f[0]);
-    const double along = t1 * x[1] + t2 * x[2], across = f[2] * (t1 * x[2] - t2 * x[1]);
-    const double forth = odd * x[0] + even * along;
-    y[0] = even * x[0] + odd * along;
+    const double radial = t1 * x[1] + t2 * x[2], across = f[2] * (t1 * x[2] - t2 * x[1]);
+    const double forth = odd * x[0] + even * radial;
+    y[0] = even * x[0] + odd * radial;
     y[1] = forth * t1 - across * t2;
     y[2] = forth * t2 + across * t1;
 }
 
 void ConeUnit::respond(const Vec& missing) {
     if (size == 1) {
-        c[0] = g[0] * root * missing[0] / rest[0];
+        c[0] = g[0] * root * missing[0] * over_rest[0];
         return;
     }
-    double share[3], image[3];
-    for (int i = 0; i < 3; ++i) share[i] = 1.0 / rest[i];
-    spectral(share, missing.data(), image);
+    double image[3];
+    spectral(over_rest, missing.data(), image);
     for (int i = 0; i < 3; ++i) image[i] *= root * (i == 0 ? 1.0 : friction);
     for (int i = 0; i < 3; ++i)
         c[i] = soft ? g[3 * i] * image[0] + g[3 * i + 1] * image[1] + g[3 * i + 2] * image[2] : image[i];
 }
 
 ConeUnit::Vec ConeUnit::law(const Vec& change_z, const Vec& change_u) const {
-    const double over = 1.0 / root, mu = friction;
+    const double mu = friction;
     if (size == 1) return {rest[0] * change_z[0] * over + slope[0] * root * change_u[0], 0.0, 0.0};
-    const double dy[3] = {change_z[0] * over, change_z[1] * over / mu, change_z[2] * over / mu};
+    const double dy[3] = {change_z[0] * over, change_z[1] * along, change_z[2] * along};
     const double dw[3] = {root * (change_u[0] + mu * (s1 * change_u[1] + s2 * change_u[2])),
                           root * mu * change_u[1], root * mu * change_u[2]};
     double one[3], two[3];

@@ -19,6 +19,7 @@ struct ConeUnit {
     bool turned = false;               // its first body is the edge's second
     double friction = -1.0;            // mu
     double root = 1.0;                 // √rho
+    double over = 1.0, along = 0.0;    // 1/root, and over mu
     double lower = 0.0, upper = 0.0;   // of a single row, scaled
     Vec6 first_row[3], second_row[3];  // G
     Vec softness{}, right{};           // Sig, r
@@ -31,6 +32,7 @@ struct ConeUnit {
     Vec tz{}, tu{};                    // along the path, for the whole blur
     Vec map{}, bend{};  // of linearise(): the smoothed natural map, its derivative by the blur,
     double slope[3] = {}, rest[3] = {};  //   D's eigenvalues and those of 1 − D + hold D,
+    double over_rest[3] = {};            //   the latter inverted,
     double t1 = 1.0, t2 = 0.0;           //   the direction of their frame,
     double s1 = 0.0, s2 = 0.0;           //   that of the slip,
     double k[9] = {}, g[9] = {};         //   K = −dz/d(G v), and (1 + K₀ Sig)⁻¹
@@ -52,10 +54,7 @@ struct ConeUnit {
     void respond(const Vec& missing);
 
     /// y: z as the map takes it.
-    Vec scaled() const noexcept {
-        const double over = 1.0 / root, along = size == 1 ? 0.0 : over / friction;
-        return {z[0] * over, z[1] * along, z[2] * along};
-    }
+    Vec scaled() const noexcept { return {z[0] * over, z[1] * along, z[2] * along}; }
 
     /// What changes of z and u change in the law: (1 − D) dy + D dw.
     Vec law(const Vec& change_z, const Vec& change_u) const;

@@ -15,9 +15,15 @@ struct Positive {
 inline Positive positive(double lambda, double b) noexcept {
     const double root = std::sqrt(lambda * lambda + 4.0 * b * b);
     if (root == 0.0) return {0.0, 0.5, 0.5, 1.0};
-    const double large = 0.5 * (std::abs(lambda) + root), small = b * b / large, bend = 2.0 * b / root;
-    return lambda > 0.0 ? Positive{large, large / root, small / root, bend}
-                        : Positive{small, small / root, large / root, bend};
+    const double large = 0.5 * (std::abs(lambda) + root), small = b * b / large, over = 1.0 / root;
+    const double more = large * over, less = small * over, bend = 2.0 * b * over;
+    return lambda > 0.0 ? Positive{large, more, less, bend} : Positive{small, less, more, bend};
+}
+
+/// Its value alone.
+inline double positive_part(double lambda, double b) noexcept {
+    const double large = 0.5 * (std::abs(lambda) + std::sqrt(lambda * lambda + 4.0 * b * b));
+    return lambda > 0.0 ? large : large > 0.0 ? b * b / large : 0.0;
 }
 
 /// P_b on L and its derivative by eigenvalues: along (1, −t), (1, t) and across.
@@ -43,8 +49,8 @@ inline Spectrum project(double a0, double a1, double a2, double b) noexcept {
         s.slope[2] = std::clamp((two.value - one.value) / (2.0 * reach), 0.0, 1.0);
         s.rest[2] = 1.0 - s.slope[2];
         if (s.rest[2] < 0.25) {  // without cancellation: max(0, λ) − max(0, −λ) = λ
-            const Positive un_one = positive(reach - a0, b), un_two = positive(-a0 - reach, b);
-            s.rest[2] = std::max(0.0, (un_one.value - un_two.value) / (2.0 * reach));
+            const double un_one = positive_part(reach - a0, b), un_two = positive_part(-a0 - reach, b);
+            s.rest[2] = std::max(0.0, (un_one - un_two) / (2.0 * reach));
         }
     } else {
         s.slope[2] = 0.5 * (one.slope + two.slope);

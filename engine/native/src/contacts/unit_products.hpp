@@ -18,13 +18,16 @@ inline Mat6 inverse_six(const Mat6& factor) noexcept {
     return inverse;
 }
 
-/// out += Gᵀ K G' of a unit of N rows.
-template <int N> void add_stiffness(const double* k, const Vec6* to, const Vec6* from, double* out) noexcept {
-    Six image[N];  // K G'
+/// K G' of a unit of N rows.
+template <int N> void stiffen(const double* k, const Vec6* from, Six* image) noexcept {
     for (int i = 0; i < N; ++i) {
         image[i] = Six::zero();
         for (int j = 0; j < N; ++j) image[i].add(k[N * i + j], Six::load(from[j].data()));
     }
+}
+
+/// out += Gᵀ of N rows times what stiffen() gave.
+template <int N> void add_stiffness(const Vec6* to, const Six* image, double* out) noexcept {
     for (int a = 0; a < 6; ++a) {
         Six row = Six::load(out + 6 * a);
         for (int i = 0; i < N; ++i) row.add(to[i][a], image[i]);
