@@ -51,6 +51,12 @@ std::vector<char> Detection::balls() const {
     return ball;
 }
 
+bool Detection::single_points() const noexcept {
+    return std::all_of(colliders_.begin(), colliders_.end(), [](const Collider& c) {
+        return c.shape.kind == ShapeKind::sphere || c.shape.kind == ShapeKind::plane;
+    });
+}
+
 bool Detection::may_touch(int i, int j) const noexcept {
     const int a = colliders_[i].body, b = colliders_[j].body;
     if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;

@@ -60,6 +60,9 @@ public:
     /// Per body: whether a sphere round its centre is all its surface, so that its orientation does not matter.
     std::vector<char> balls() const;
 
+    /// Whether every surface is a sphere's or a plane's: two of them touch at one point, wherever they turn.
+    bool single_points() const noexcept;
+
 private:
     bool may_touch(int i, int j) const noexcept;
     void add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const;

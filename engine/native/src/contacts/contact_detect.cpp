@@ -33,14 +33,13 @@ bool ContactStage::is_closed(const Contact& contact) const noexcept {
     return contact.point.gap <= closed * size(contact);
 }
 
-void ContactStage::set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other) {
-    const double h = options_.time_step;
-    const std::vector<double>& radius = detection_.radius();
-    for (std::size_t b = 0; b < margin_.size(); ++b) {
-        const double speed = std::max(norm(linear(velocity[b])), norm(linear(other[b])));
-        const double spin = std::max(norm(angular(velocity[b])), norm(angular(other[b])));
-        margin_[b] = h * (speed + spin * radius[b]) + closed * radius[b];
-    }
+/// How far a body may get in the step with either velocity, m.
+double ContactStage::margin_of(std::size_t b, const std::vector<Vec6>& velocity,
+                               const std::vector<Vec6>& other) const {
+    const double radius = detection_.radius()[b];
+    const double speed = std::max(norm(linear(velocity[b])), norm(linear(other[b])));
+    const double spin = std::max(norm(angular(velocity[b])), norm(angular(other[b])));
+    return options_.time_step * (speed + spin * radius) + closed * radius;
 }
 
 /// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
@@ -77,7 +76,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     impact_needed_ = false;
     impact_rounds_ = 0;
 
-    set_margins(velocity, free_velocity);
+    for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
     search_ = margin_;
     if (options_.solver == SolverKind::iterative) {  // room for those that are only pushed in this step
         double squares = 0.0;
@@ -235,6 +234,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         return pose;
     };
     std::erase_if(open_, [&](const OpenPair& open) {
+        if (late && !changed_[open.first] && !changed_[open.second]) return false;
         if (passes(open, velocity)) return false;
         const IndexPair pair = open.pair;
         const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);

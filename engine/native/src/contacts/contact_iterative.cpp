@@ -48,10 +48,18 @@ void ContactStage::hand_over() {
 
 /// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
 bool ContactStage::find_more() {
+    const bool first = next_.empty();  // look of this step
     next_.resize(unknown_.size());
-    for (std::size_t b = 0; b < unknown_.size(); ++b)
-        next_[b] = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
-    if (outrun(next_)) find_open();
+    changed_.resize(unknown_.size());
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        const Vec6& now = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
+        changed_[b] = first || next_[b] != now;
+        next_[b] = now;
+    }
+    if (outrun(next_)) {
+        changed_.assign(unknown_.size(), 1);
+        find_open();
+    }
     const std::size_t known = points_.size();
     const bool turned = find_turned(next_);
     const std::size_t taken = points_.size();
@@ -94,6 +102,7 @@ bool ContactStage::is_settled(MixedSystem& system) {
 
 bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     sweeps_.start(system, options_.friction);
+    next_.clear();
     handed_over_ = 0;
     hand_over();
     FrictionReport report;

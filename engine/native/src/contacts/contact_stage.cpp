@@ -45,6 +45,7 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     lead_.assign(bodies, 0.0);
     event_time_.assign(bodies, -1.0);
     ball_ = detection_.balls();
+    swings_ = !detection_.single_points();
     for (const auto& [a, b] : joints_)
         for (const int body : {a, b})
             if (body >= 0) jointed_[body] = 1;
@@ -258,6 +259,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();
+        changed_.assign(next.size(), 1);
         if (outrun(next)) find_open();
         const bool turned = find_turned(next);
         const std::size_t taken = points_.size();
@@ -347,12 +349,12 @@ void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
 
 /// Whether some body goes further than the search for pairs allowed for; if so, the search is widened.
 bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
-    before_ = margin_;
-    set_margins(velocity, velocity);
     bool faster = false;
     for (std::size_t b = 0; b < margin_.size(); ++b) {
-        faster = faster || margin_[b] > search_[b] * (1.0 + 1e-9);
-        margin_[b] = std::max(margin_[b], before_[b]);
+        if (!changed_[b]) continue;
+        const double margin = margin_of(b, velocity, velocity);
+        faster = faster || margin > search_[b] * (1.0 + 1e-9);
+        margin_[b] = std::max(margin_[b], margin);
     }
     if (faster)
         for (std::size_t b = 0; b < margin_.size(); ++b) search_[b] = std::max(search_[b], margin_[b]);

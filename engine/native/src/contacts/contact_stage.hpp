@@ -59,6 +59,7 @@
 #include "contacts/contact_sweeps.hpp"
 #include "contacts/friction_direct.hpp"
 #include "contacts/friction_sweeps.hpp"
+#include "linear/large_array.hpp"
 #include "run/named_enum.hpp"
 
 namespace spook {
@@ -252,7 +253,8 @@ private:
     void find_events();
     void order_points();
     void measure_points();
-    void set_margins(const std::vector<Vec6>& velocity, const std::vector<Vec6>& other);
+    double margin_of(std::size_t body, const std::vector<Vec6>& velocity,
+                     const std::vector<Vec6>& other) const;
     bool reachable(const Contact& contact) const;
     RowBlock row_block(const Point& point, int rows) const;
     void add_turning_rows(const Point& point, RowBlock& block) const;
@@ -316,31 +318,34 @@ private:
     bool conveys_ = false;       // some surface moves along itself
     bool oriented_ = false;      // some surface has a friction that differs with the direction
     bool resists_turning_ = false;
+    bool swings_ =
+        false;  // some surface is neither a sphere's nor a plane's: what turns on it may meet elsewhere
     std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
     ContactSweeps sweeps_, parting_sweeps_;
     MixedSystem parting_system_;
     Parting parting_;
     std::vector<char> yielding_;
-    std::vector<Point> laps_;                // points of the step's pairs where it ends
+    LargeArray<Point> laps_;                 // points of the step's pairs where it ends
     std::map<std::uint64_t, double> given_;  // by pair: overlap the scene began with, as far as it is left, m
     bool begun_ = false;                     // whether it is known
     std::vector<Vec6> next_;                 // velocities between sweeps, per body of the scene
+    std::vector<char> changed_;  // who has another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
-    std::vector<OpenPair> open_;
+    LargeArray<OpenPair> open_;
     std::vector<char> supported_;  // bodies with a closed contact
     std::vector<double> depth_;    // of a body's closed contacts, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
     std::vector<double> lead_, event_time_;
-    std::vector<Point> points_, strikes_;
-    std::vector<Touch> touches_;                    // of the last step until the end of solve()
-    std::vector<double> margin_, search_, before_;  // where bodies may get, and where they are looked for, m
-    std::vector<char> held_;                        // moving bodies with rows, by unknown
+    LargeArray<Point> points_, strikes_;
+    std::vector<Touch> touches_;           // of the last step until the end of solve()
+    std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
+    std::vector<char> held_;               // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;

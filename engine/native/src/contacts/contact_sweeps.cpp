@@ -12,8 +12,9 @@ namespace spook {
 
 namespace {
 
-constexpr int late_rounds = 3;  // of sweeps for contacts found after the last one
-constexpr int cold = -2;        // before every sweep
+constexpr int late_rounds = 3;                       // of sweeps for contacts found after the last one
+constexpr int cold = -2;                             // before every sweep
+constexpr int bodies_ahead = 2, contacts_ahead = 4;  // asked for while others are swept
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
@@ -59,6 +60,7 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
         velocity[bodies_] = Vec6{};
     }
     contacts_.clear();
+    slips_.clear();
     parent_.resize(bodies_ + 1);
     std::iota(parent_.begin(), parent_.end(), 0);
     head_.assign(bodies_ + 1, -1);
@@ -118,10 +120,11 @@ int ContactSweeps::add(const SweepContact& given) {
     c.coupling[1] = part(2, 0);
     const double along = c.stretched ? dot(c.tangent, c.tangent) : 1.0,
                  across = c.stretched ? dot(c.across, c.across) : 1.0;
-    c.slip[0] = inverse_mass * along + part(1, 1) + c.slip_softness;
-    c.slip[1] = part(1, 2);
-    c.slip[2] = inverse_mass * across + part(2, 2) + c.slip_softness;
-    const double largest = 0.5 * (c.slip[0] + c.slip[2]) + length(0.5 * (c.slip[0] - c.slip[2]), c.slip[1]);
+    double* const slip = slips_.emplace_back().own;
+    slip[0] = inverse_mass * along + part(1, 1) + c.slip_softness;
+    slip[1] = part(1, 2);
+    slip[2] = inverse_mass * across + part(2, 2) + c.slip_softness;
+    const double largest = 0.5 * (slip[0] + slip[2]) + length(0.5 * (slip[0] - slip[2]), slip[1]);
     c.step = largest > 0.0 ? 1.0 / largest : 0.0;
     if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
@@ -216,14 +219,15 @@ double ContactSweeps::update(Contact& c) noexcept {
         if (model_ == FrictionModel::cone) {
             double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
             const double reach = length(z1, z2);
-            if (c.stretched) least_on_disc(c.slip, b1, b2, s1, s2, bound, z1, z2);
+            if (c.stretched) least_on_disc(slip(c), b1, b2, s1, s2, bound, z1, z2);
             else if (reach > bound) z1 *= bound / reach, z2 *= bound / reach;
             d1 = z1 - b1, d2 = z2 - b2;
             change = larger(change, length(d1, d2) / c.step);
         } else {
-            d1 = std::clamp(b1 - s1 / c.slip[0], -bound, bound) - b1;
-            d2 = std::clamp(b2 - (s2 + c.slip[1] * d1) / c.slip[2], -bound, bound) - b2;
-            change = larger(change, larger(std::abs(d1) * c.slip[0], std::abs(d2) * c.slip[2]));
+            const double* const own = slip(c);
+            d1 = std::clamp(b1 - s1 / own[0], -bound, bound) - b1;
+            d2 = std::clamp(b2 - (s2 + own[1] * d1) / own[2], -bound, bound) - b2;
+            change = larger(change, larger(std::abs(d1) * own[0], std::abs(d2) * own[2]));
         }
         c.impulse[1] = b1 + d1;
         c.impulse[2] = b2 + d2;
@@ -239,17 +243,15 @@ void ContactSweeps::fetch(int item) const noexcept {
         const char* const at = reinterpret_cast<const char*>(&what);
         for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
     };
-    const int next = next_[item];
-    if (next < 0) return;
-    if (next >= joint_count_) {
-        const Contact& c = contacts_[next - joint_count_];
-        for (const int body : {c.first, c.second}) {
+    // Items follow each other, but where islands grew together: a guess that costs nothing where it is wrong.
+    const int items = static_cast<int>(bodies_of_.size());
+    if (const int soon = item + bodies_ahead; soon >= joint_count_ && soon < items)
+        for (const int body : {bodies_of_[soon].first, bodies_of_[soon].second}) {
             ask(joints_.velocity()[body]);
             ask(inertia_[body]);
         }
-    }
-    const int after = next_[next];
-    if (after >= joint_count_) ask(contacts_[after - joint_count_]);
+    if (const int later = item + contacts_ahead; later >= joint_count_ && later < items)
+        ask(contacts_[later - joint_count_]);
 }
 
 double ContactSweeps::sweep_island(int island) noexcept {

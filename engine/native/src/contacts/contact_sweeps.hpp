@@ -6,6 +6,7 @@
 
 #include "contacts/friction_point.hpp"
 #include "contacts/sweep_rows.hpp"
+#include "linear/large_array.hpp"
 #include "linear/vec.hpp"
 
 namespace spook {
@@ -61,9 +62,12 @@ private:
         double right[3], softness, slip_softness, friction, normal_before, impulse[3];
         double own, own_inverse;  // of the normal, with Sig
         double coupling[2];       // between normal and tangents
-        double slip[3];           // (t, t), (t, u), (u, u), with gamma/h
         double step;              // 1/lambda_max of the tangents' part
         bool stretched;
+    };
+    static_assert(sizeof(Contact) == 256);  // what every sweep reads of every contact: four lines of a cache
+    struct Slip {                           // what only boxes and stretched friction read
+        double own[3];                      // (t, t), (t, u), (u, u), with gamma/h
     };
     struct Inertia {
         double inverse_mass = 0.0;
@@ -74,6 +78,9 @@ private:
     };
     void begin(MixedSystem& system, FrictionModel model);
     double update(Contact& contact) noexcept;
+    const double* slip(const Contact& contact) const noexcept {
+        return slips_[static_cast<std::size_t>(&contact - contacts_.data())].own;
+    }
     void push(const Contact& contact, Vec3 impulse) noexcept;
     int root(int body) noexcept;
     void link(int item, int first, int second);
@@ -88,7 +95,8 @@ private:
     Sweeper joints_;
     int joint_count_ = 0, bodies_ = 0;
     std::vector<Inertia> inertia_;
-    std::vector<Contact> contacts_;
+    LargeArray<Contact> contacts_;
+    LargeArray<Slip> slips_;  // of each
     // Islands: bodies joined by union-find; the items of one, joints first, are a chain in the order they came.
     std::vector<int> parent_, head_, tail_, next_;
     std::vector<Both> bodies_of_;

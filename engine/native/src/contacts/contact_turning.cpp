@@ -44,6 +44,7 @@ bool ContactStage::is_known(const Contact& contact, std::size_t from, std::size_
 
 /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
 bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
+    if (!swings_) return false;
     const double h = options_.time_step;
     const std::size_t known = points_.size();
     for (std::size_t from = 0, end = 0; from < ordered_; from = end) {
