@@ -211,7 +211,7 @@ def test_a_page_names_the_releases_it_was_made_of_and_every_quantity_that_change
         told.split()
     )
     assert f"| `{other}` | 0.5 | 0.51 |" in told
-    assert "| … and 1 more of falling_object |" in told
+    assert "| … and 1 more of " in told
 
 
 def test_a_changelog_is_found_missed_or_says_nothing(tmp_path: Path) -> None:
