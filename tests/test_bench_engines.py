@@ -65,17 +65,17 @@ def test_a_place_is_won_reached_alone_or_nobody_elses_to_win(
 ) -> None:
     """Ours within an error in half a millisecond; the other a little sooner, not at all, or never asked."""
     races = (tracker_race((468e-6, "rival"), (500e-6, "spook")), tracker_race((500e-6, "spook")))
-    place = engines.Place(
+    place = engines.engine_places.Place(
         races[theirs != "value"], frozenset({"spook"} if theirs == "not_supported" else {"spook", "rival"})
     )
 
     assert place.how == how
-    lines = engines._first([place])
+    lines = engines.engine_places.first([place])
     assert any(told in line.replace("\u202f", " ") for line in lines), lines
     score = {"won": "first of several in 1: rival 1", "alone": "the only one so near in 1: spook 1",
              "unasked": "the only one asked in 1: spook 1"}[how]  # fmt: skip
     assert lines[-2] == f"Of 1 places (a scene at an error): {score}."
-    ours = next(line for line in engines._choice([place]) if line.startswith("| spook |"))
+    ours = next(line for line in engines.engine_places.choice([place]) if line.startswith("| spook |"))
     assert ours.split(" | ")[1:5] == ["1", "0", str(int(how == "alone")), str(int(how == "unasked"))]
 
 
@@ -145,10 +145,12 @@ def test_the_page_names_the_questions_that_are_newer_than_it(engines: Any, tmp_p
 def test_an_engine_of_single_precision_is_said_to_end_where_it_ends(engines: Any) -> None:
     fine = Race(test="grasp", ladder="held", unit="m", error=1e-6, order=((1e-4, "spook"), (2e-4, "jolt")))
     coarse = Race(test="pendulum", ladder="angle", unit="rad", error=1e-6, order=((1e-4, "spook"),))
-    both = [engines.Place(race, frozenset({"spook", "jolt"})) for race in (fine, coarse)]
+    both = [engines.engine_places.Place(race, frozenset({"spook", "jolt"})) for race in (fine, coarse)]
 
-    assert "within 1e-06 comes jolt 1 of 2 scenes (grasp, held)." in " ".join(engines._single(both))
-    assert engines._single([engines.Place(coarse, frozenset({"spook"}))]) == []
+    assert "within 1e-06 comes jolt 1 of 2 scenes (grasp, held)." in " ".join(
+        engines.engine_places.single(both)
+    )
+    assert engines.engine_places.single([engines.engine_places.Place(coarse, frozenset({"spook"}))]) == []
 
 
 def test_a_page_without_a_run_of_ours_is_refused(engines: Any, tmp_path: Path) -> None:
