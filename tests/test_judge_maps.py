@@ -27,7 +27,7 @@ from spook_tracker.tracker.store.retention import drop_old_figures
 from spook_tracker.tracker.website.causes import anchor, causes_of
 from spook_tracker.tracker.website.feed import atom
 from spook_tracker.tracker.website.nights import book
-from spook_tracker.tracker.website.page_index import health
+from spook_tracker.tracker.website.page_index import health, index
 from tests.synthetic_history import DocumentHistory, document
 
 KEY = "pendulum/plain/map:damping-compliance"
@@ -241,3 +241,22 @@ def test_retention_keeps_a_map_of_each_machine_and_the_command_tells_the_loss(tm
     (only,) = json.loads(told.output)
     assert (only["series"], only["word"], only["stands"]) == (KEY, "missing", "fail")
     assert (only["last_good"], only["first_bad"]) == (ours.engine.git_hash, mine.engine.git_hash)
+
+
+def test_a_map_with_worse_cells_is_red_on_the_page_as_in_the_night() -> None:
+    """And only there and then: the next night, as good as the one before, is told no more."""
+    before, after = run(0), run(1)
+    worse = msgspec.structs.replace(
+        before.maps[0], cells=tuple(tuple("growing" for _ in row) for row in before.maps[0].cells)
+    )
+    after = msgspec.structs.replace(after, maps=(worse, *after.maps[1:]))
+    records = DocumentHistory([before, after])
+    assert [(f.series, f.stands) for f in tonight(records, after) if f.red] == [(KEY, "watch")]
+    told = book(records)
+    assert health(told)[0] == "watch"
+    assert [test.state for test in told.tests] == ["watch"]
+    assert "red" in index(told, causes_of(told)).context["headline"]
+    later = msgspec.structs.replace(run(2), maps=after.maps)
+    records = DocumentHistory([before, after, later])
+    assert not [f for f in tonight(records, later) if f.red]
+    assert health(book(records))[0] == health(book(DocumentHistory([before])))[0]

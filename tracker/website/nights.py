@@ -127,10 +127,15 @@ class TestHistory:
         return tuple(told for told in self.told_maps if told.stands == "fail")
 
     @property
+    def red_maps(self) -> tuple[ToldMap, ...]:
+        """Those of which the newest night tells that they are gone, or that cells became worse."""
+        return tuple(told for told in self.told_maps if told.tonight and told.verdict.red)
+
+    @property
     def state(self) -> Class:
-        """The worst of its series and of maps that are gone; none where nothing was judged."""
-        states: list[Class] = [t.state for t in self.trends]
-        return worst([*states, "fail"] if self.lost_maps else states)
+        """The worst of its series and of maps that are gone or worse; none where nothing was judged."""
+        maps = [*self.lost_maps, *self.red_maps]
+        return worst([*(t.state for t in self.trends), *(told.stands for told in maps)])
 
 
 @dataclass

@@ -11,6 +11,7 @@ from typing import Any
 from spook_tracker.tracker.document.run_document import Point, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
 from spook_tracker.tracker.judge.causes import Cause
+from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
 from spook_tracker.tracker.website.causes import ToldCause, lasting, told
@@ -38,9 +39,7 @@ def health(book: Book) -> tuple[Class, Count]:
     """What the newest night stands for, and how many limits and set points hold."""
     found = counted(book)
     states: list[Class] = [t.state for t in tonight(book)]
-    if _maps_missing(book):
-        states.append("fail")
-    state = worst(states)
+    state = worst([*states, *(told.stands for told in _red_maps(book))])
     return "none" if state == "followed" and not found.expected else state, found
 
 
@@ -61,7 +60,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     step = steps.pop() if len(steps) == 1 else None
     context = {
         "state": state,
-        "headline": _headline(state, found, tonight(book), _maps_missing(book)),
+        "headline": _headline(state, found, tonight(book), _red_maps(book)),
         "summary": summary(book),
         "new": new,
         "old": old[:MOST_OLD],
@@ -95,9 +94,9 @@ def _nearest(test: TestHistory, book: Book) -> Row:
     return shown
 
 
-def _maps_missing(book: Book) -> int:
-    """Stability maps that the newest night was asked for and has not."""
-    return sum(told.tonight for test in book.tests for told in test.lost_maps)
+def _red_maps(book: Book) -> list[ToldMap]:
+    """Stability maps that the newest night was asked for and has not, and those with worse cells."""
+    return [told for test in book.tests for told in test.red_maps]
 
 
 def counts_by_night(book: Book, most: int) -> dict[int, Count]:
@@ -114,7 +113,7 @@ def counts_by_night(book: Book, most: int) -> dict[int, Count]:
     return {night: count_points(found) for night, found in pairs.items()}
 
 
-def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: int) -> str:
+def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: Sequence[ToldMap]) -> str:
     if state == "none":
         return "No limit was tested tonight"
     if found.broken:
@@ -130,11 +129,12 @@ def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: int) -> 
             if lost == 1
             else f"Every limit is kept; {lost} values are missing"
         )
-    if maps:
+    gone = sum(told.gone for told in maps)
+    if gone:
         return "Every limit is kept; " + (
-            "one stability map is missing" if maps == 1 else f"{maps} stability maps are missing"
+            "one stability map is missing" if gone == 1 else f"{gone} stability maps are missing"
         )
-    red = sum(t.state == "watch" for t in fresh)
+    red = sum(t.state == "watch" for t in fresh) + len(maps)
     if red:
         others = "one other series is red" if red == 1 else f"{red} other series are red"
         return f"Every limit is kept; {others}"
