@@ -256,3 +256,28 @@ def test_what_cannot_be_composed_is_refused() -> None:
     ):
         with pytest.raises(MethodError, match=culprit):
             simulate(scene, time_step=0.01, steps=1, method=Method(composition="order4"))
+
+
+@pytest.mark.parametrize("steps", [1, 2, 25])
+def test_what_cannot_be_read_is_no_answer(steps: int) -> None:
+    """Two rows of ten million kilometres from places next to each other are the same to rounding: what they share between
+    them has no answer, and a run that is asked for it says so instead of giving none."""
+    far = Particle(
+        name="far",
+        mass=3.0093846376260265,
+        position=(0.44243727823566315, -11430029772.51713, 0.27432970785687516),
+        velocity=(-0.9244847027246674, 0.7160325333241468, 2.0856026730339603),
+    )
+    places = (
+        (0.41470853996604123, 0.5773027204846336, -0.17204804581774602),
+        (1.317965792477156, 0.9979624139949076, 1.5489124201358133),
+    )
+    rows = (
+        Distance(name="one", between=("far", places[0]), compliance=0.0),
+        Distance(name="other", between=(places[1], "far")),
+    )
+    scene = Scene(bodies=(far,), constraints=rows, gravity=(0.0, 0.0, -9.81))
+    observe = {"f": Trace(quantity=ConstraintForce()), "e": Trace(quantity=Energy())}
+    run = simulate(scene, time_step=1e-9, steps=steps, method=Method(composition="order4"), observe=observe)
+
+    assert run.status == "not_finite" and "'far'" in run.failure

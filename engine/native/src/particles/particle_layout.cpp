@@ -116,6 +116,7 @@ void ParticleSystem::reset(StageClock* clock) {
     std::fill(seen_.lambda.begin(), seen_.lambda.end(), 0.0);
     seen_.v = nodes_.v;
     if (stiff_strings_) find_tensions();
+    unread_ = -1;
     if (composition_) composition_->start(clock);
     else if (half_step_) half_kick_back();
     save();

@@ -13,7 +13,7 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
         seen_.lambda[k] = sample > 0 ? rows_.link[k].lambda : 0.0;
     seen_.v = nodes_.v;
     if (composition_) {
-        if (sample > 0) composition_->read(seen_);
+        if (sample > 0) read_composition();
     } else if (half_step_) {
         velocity_stage<false>();
         velocity_ready_ = true;
@@ -27,7 +27,15 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (clock_) clock_->mark(Stage::observe);
 }
 
+/// Rows that cannot be told apart may leave the velocities at the sample no numbers, where the steps go on.
+void ParticleSystem::read_composition() {
+    composition_->read(seen_);
+    for (int body = bodies() - 1; body >= 0; --body)
+        if (!finite(seen_.v[nodes_.of_body[body]])) unread_ = body;
+}
+
 Health ParticleSystem::health() const noexcept {
+    if (unread_ >= 0) return {Status::not_finite, unread_};
     if (parts_.saddle.contradicted() >= 0)
         return {Status::diverged, parts_.saddle.contradicted(),
                 "is held by rows that contradict each other; give one of them a compliance"};
@@ -61,6 +69,7 @@ void ParticleSystem::go_back(const Memory& memory) {
     parts_.sweeps.work = memory.sweeps;
     parts_.saddle.restore(memory.redundancy);
     if (composition_) composition_->go_back(memory.composition);
+    unread_ = -1;
 }
 
 void ParticleSystem::place(std::span<const double> state) {

@@ -82,6 +82,7 @@ private:
 
     template <bool Timed> void advance_by(std::int64_t steps);
     template <bool Timed> void velocity_stage();
+    void read_composition();
     template <bool Timed> void mark(Stage stage) noexcept {
         if constexpr (Timed) clock_->mark(stage);
     }
@@ -111,6 +112,7 @@ private:
     std::vector<double> first_rhs_;  // of the rows, before the curvature ahead
     std::vector<Vec3> trial_;        // velocities the curvature ahead is found with
     std::optional<ParticleComposition> composition_;
+    int unread_ = -1;  // a body whose velocity at a sample was no number
 
     bool velocity_ready_ = false;  // the velocity stage of the coming step is already done
     std::int64_t block_ = 1024;

@@ -67,6 +67,11 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
                 return;
             }
             if (recorder.next_wanted(step) == step) system.observe(recorder, step);
+            health = system.health();  // what is read may be what has no answer
+            if (health.status != Status::completed) {
+                report.failed_step = step;
+                return;
+            }
             done = step;
         }
     };
