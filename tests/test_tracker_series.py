@@ -196,3 +196,4 @@ def test_samples_of_some_tests_over_some_runs_are_those_of_each_run(session, now
         whole = history.samples(run_id)
         assert some[run_id] == {key: pair for key, pair in whole.items() if key.startswith("t/")}
         assert history.samples_of([run_id])[run_id] == whole
+        assert history.answered(ids)[run_id] == {(d.test, d.kind) for d, _ in whole.values()} != set()
