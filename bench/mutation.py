@@ -60,7 +60,9 @@ MUTANTS = (
     mutant("no-memory", "shifts", "return min(strongest, 0.98)", "return 0.0"),
     mutant("no-permutations", "shifts", "if probability < enough else None", "if probability < 1.0 else None"),
     mutant("no-t-test", "shifts", "rise <= standard_error(base, len(last))", "False"),
-    mutant("small-shifts-count", "shifts", "LEAST = 0.01", "LEAST = 0.0"),
+    mutant(
+        "small-shifts-count", "shifts", "from spook_tracker.tracker.judge.slower import LEAST", "LEAST = 0.0"
+    ),
     mutant("bounded-is-growing", "verdict", '"bounded": 1, "growing": 2', '"bounded": 1, "growing": 1'),
     mutant("unknown-cell-is-best", "verdict", "CELL_RANK.get(cell, len(CELL_RANK))", "CELL_RANK.get(cell, 0)"),
     mutant("diverged-is-not-finite", "verdict", '"diverged": 4,\n    "crashed"', '"diverged": 3,\n    "crashed"'),
@@ -89,13 +91,16 @@ def applied(found: Mutant, text: str) -> str:
 
 
 def copied(folder: Path) -> None:
-    """The sources and tests, with the engine that is built."""
+    """The sources and tests, with the engine that is built and the pages that tests hold to the judge."""
     from spook_tracker.engine import _core
 
     only = shutil.ignore_patterns("native", "__pycache__", "*.so")
     for name in ("engine", "scalar_tests", "tracker", "migrations", "site", "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=only)
     shutil.copytree(ROOT / "spook_tracker", folder / "spook_tracker", symlinks=True)
+    (folder / "docs").mkdir()
+    for page in (ROOT / "docs").glob("*.md"):
+        shutil.copy(page, folder / "docs")
     shutil.copy(str(_core.__file__), folder / "engine")
     shutil.copy(ROOT / "pyproject.toml", folder)
 
