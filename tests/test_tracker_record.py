@@ -100,6 +100,10 @@ def test_text_that_databases_refuse_is_made_storable(session):
         ({"samples": (sample(value="nan", outcome="value"),)}, "called good"),
         ({"samples": (sample(counters={"steps": 2**64}),)}, "64 bits"),
         ({"trigger": "whim"}, "trigger"),
+        (
+            {"workers": (document.Worker(fingerprint="a", processor="b", operating_system="c", pieces=0),)},
+            r"workers.*pieces",
+        ),
     ],
 )
 def test_a_document_that_makes_no_sense_is_refused_and_nothing_is_stored(session, changes, words):

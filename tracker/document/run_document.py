@@ -66,7 +66,7 @@ class Worker(Struct, frozen=True, kw_only=True):
     fingerprint: Name
     processor: Text
     operating_system: Text
-    pieces: int
+    pieces: Annotated[int, msgspec.Meta(ge=1)]
 
 
 class SeriesDefinition(Struct, frozen=True, kw_only=True):
