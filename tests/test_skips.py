@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import skips
+
 TESTS = """
 import pytest
 
@@ -45,3 +47,13 @@ def test_a_file_that_cannot_even_be_read_for_want_of_something_fails_too(tmp_pat
     done = subprocess.run(command, env=ALONE | {"CI": "true"}, cwd=root, capture_output=True, text=True)
 
     assert "1 error" in done.stdout
+
+
+@pytest.mark.parametrize(("system", "said"), [("linux", True), ("darwin", False)])
+def test_what_only_linux_does_is_skipped_elsewhere_and_never_there(
+    system: str, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", system)
+
+    assert skips.unlawful("Skipped: only Linux ends a process with its parent") is said
+    assert skips.unlawful("Skipped: no node here")
