@@ -121,7 +121,7 @@ mutants-tonight: develop
 	$(BIN)/python bench/mutants.py --tonight 4
 
 past: develop
-	$(BIN)/python bench/past.py
+	$(BIN)/python bench/past.py --page docs/past.md
 
 mutation: develop
 	$(BIN)/python bench/mutation.py
