@@ -64,6 +64,7 @@ def night(
     **asked: Any,
 ) -> None:  # fmt: skip
     """`tracker nightly` between the history that was kept and the history to keep."""
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.cli.main import nightly
     from spook_tracker.tracker.cli.report_ci import commands_of, night_markdown
@@ -77,7 +78,7 @@ def night(
         run = kept.resolve("latest")
         findings = judge(kept, run.id, accepted_levels(accepted))
         written = export_months(kept, history)
-    click.echo(f"history: {', '.join(path.name for path in written) or 'nothing new'} in {history}")
+    say(f"history: {', '.join(path.name for path in written) or 'nothing new'} in {history}")
     _tell(night_markdown(run, findings, site), commands_of(findings))
     context.exit(code)
 

@@ -57,14 +57,16 @@ def width() -> int:
     return max(60, shutil.get_terminal_size((PIPE_WIDTH, 24)).columns)
 
 
-def is_terminal(stream: TextIO) -> bool:
-    """Whether somebody is looking at the stream."""
-    return stream.isatty() and os.environ.get("TERM") != "dumb"
+def is_terminal(stream: TextIO | None) -> bool:
+    """Whether somebody is looking at the stream; one that was closed from the start is None."""
+    return stream is not None and stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def say(text: str = "", err: bool = False) -> None:
     """Print, in plain letters where the stream's encoding has no others, without colour in a pipe."""
     stream = sys.stderr if err else sys.stdout
+    if stream is None:  # closed before we began, as some do to be rid of what is printed
+        return
     text = outside.inert(text)
     try:
         text.encode(stream.encoding or "utf-8")
@@ -183,6 +185,6 @@ def watching(title: str) -> Iterator[Callable[[int, int, str, bool, tuple[str, .
         def step(done: int, total: int, test: str, finished: bool, failed: tuple[str, ...]) -> None:
             shown.update(bar, completed=done, total=total, test=test)
             for key in failed:
-                shown.console.print(f"✗ {key}", style="red", markup=False, highlight=False)
+                shown.console.print(f"✗ {outside.clean(key)}", style="red", markup=False, highlight=False)
 
         yield step

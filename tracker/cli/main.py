@@ -107,6 +107,7 @@ def run_command(
     database: str,
 ) -> None:
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.measure.questions import EngineUnavailable
     from spook_tracker.tracker.measure.run import Request
 
@@ -129,7 +130,7 @@ def run_command(
         except EngineUnavailable as reason:
             if len(names) == 1:
                 raise
-            click.echo(f"left out: {reason}", err=True)
+            say(f"left out: {reason}", err=True)
             kept = False
             continue
         _print_run(document, everything)
@@ -211,7 +212,7 @@ def nightly(
         try:
             _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
         except EngineUnavailable as reason:
-            click.echo(f"left out: {reason}", err=True)
+            say(f"left out: {reason}", err=True)
 
     measured: list[Any] = []
     judged: list[Any] = []
@@ -365,6 +366,7 @@ def serve(folder: Path, port: int) -> None:
     from functools import partial
     from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.document.errors import TrackerError
 
     if not (folder / "index.html").is_file():
@@ -377,7 +379,7 @@ def serve(folder: Path, port: int) -> None:
         raise TrackerError(
             f"port {port} cannot be used ({error.strerror}); choose another with --port"
         ) from None
-    click.echo(f"http://127.0.0.1:{server.server_address[1]}/ shows {folder}; stop with Ctrl-C")
+    say(f"http://127.0.0.1:{server.server_address[1]}/ shows {folder}; stop with Ctrl-C")
     with server:
         try:
             server.serve_forever()
@@ -449,7 +451,7 @@ def _say_published(report: Any, out: Path) -> None:
 
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
     for sentence in report.failed:
-        click.echo(f"not made: {sentence}", err=True)
+        say(f"not made: {sentence}", err=True)
 
 
 def _json(document: Any) -> str:

@@ -296,5 +296,5 @@ def complain(sentence: str) -> None:
     """One line on standard error, which repeats only so much of what it was given."""
     import spook_tracker.tracker.document.outside as outside
 
-    line = outside.clean(" ".join(sentence.split()))
+    line = outside.inert(outside.clean(" ".join(sentence.split())))
     click.echo("tracker: " + (line if len(line) <= MOST else f"{line[: MOST - 1]}…"), err=True)

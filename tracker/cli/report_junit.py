@@ -29,8 +29,8 @@ class Case(NamedTuple):
 
 
 def legal(text: str) -> str:
-    """Text that XML 1.0 can hold, with nothing in it that cannot be seen."""
-    return ILLEGAL.sub("\N{REPLACEMENT CHARACTER}", outside.clean(text))
+    """Text that XML 1.0 can hold, with nothing in it that cannot be seen, or is run where it is printed."""
+    return ILLEGAL.sub("\N{REPLACEMENT CHARACTER}", outside.inert(outside.clean(text)))
 
 
 def junit_of_run(run: RunDocument) -> str:

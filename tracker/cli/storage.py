@@ -30,6 +30,7 @@ from spook_tracker.tracker.cli.options import database_option, example
 @database_option
 def export(versions: tuple[str, ...], out: Path | None, form: str, database: str) -> None:
     """Write runs (all, or those named) as JSON documents, or all values as one table."""
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.store.transfer import encoded, export_runs
 
@@ -41,16 +42,16 @@ def export(versions: tuple[str, ...], out: Path | None, form: str, database: str
         if form == "months":
             from spook_tracker.tracker.store.months import export_months
 
-            click.echo(f"{len(export_months(history, Path(str(out))))} files written in {out}")
+            say(f"{len(export_months(history, Path(str(out))))} files written in {out}")
             return
         if form in ("csv", "parquet"):
             from spook_tracker.tracker.store.table import write_table
 
             count = write_table(history.to_dataframe(versions), Path(str(out)), form)
-            click.echo(f"{count} values in {out}")
+            say(f"{count} values in {out}")
             return
         if out is not None:
-            click.echo(f"{len(export_runs(history, out, versions))} runs in {out}")
+            say(f"{len(export_runs(history, out, versions))} runs in {out}")
             return
         for run in [history.resolve(name) for name in versions] or history.runs():
             click.echo(encoded(history.document(run.id)), nl=False)
@@ -133,6 +134,7 @@ def upgrade(database: str) -> None:
 @database_option
 def check(database: str) -> None:
     """Read everything and say what is wrong; exit code 1 if anything is."""
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.options import RED
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.database_check import check as faults_of
@@ -143,8 +145,8 @@ def check(database: str) -> None:
     finally:
         opened.dispose()
     for fault in faults:
-        click.echo(f"✗ {fault}")
-    click.echo(f"{len(faults)} faults" if faults else "✓ nothing is wrong")
+        say(f"✗ {fault}")
+    say(f"{len(faults)} faults" if faults else "✓ nothing is wrong")
     if faults:
         click.get_current_context().exit(RED)
 
@@ -178,6 +180,7 @@ def partition(kind: Any) -> None:
 @database_option
 def stats(as_json: bool, database: str) -> None:
     """Say how much is stored."""
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.storage_counts import statistics
@@ -193,13 +196,13 @@ def stats(as_json: bool, database: str) -> None:
 
         click.echo(stats_json(found))
         return
-    click.echo(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
+    say(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
     for engine, runs in found.engines.items():
-        click.echo(f"  {runs} runs of {engine}")
+        say(f"  {runs} runs of {engine}")
     if found.first and found.last:
-        click.echo(f"  from {found.first:%Y-%m-%d %H:%M} to {found.last:%Y-%m-%d %H:%M} UTC")
+        say(f"  from {found.first:%Y-%m-%d %H:%M} to {found.last:%Y-%m-%d %H:%M} UTC")
     for table, rows in found.rows.items():
-        click.echo(f"  {rows:>9} {table}")
+        say(f"  {rows:>9} {table}")
 
 
 @db.command(epilog=example("tracker db remove 3f2a91c0"))
@@ -207,6 +210,7 @@ def stats(as_json: bool, database: str) -> None:
 @database_option
 def remove(run: str, database: str) -> None:
     """Take one run out of the history for good: by its id, the start of it, or a version."""
+    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.document.wording import clean, clock, version
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
@@ -216,6 +220,4 @@ def remove(run: str, database: str) -> None:
         found = History(session).resolve(run)
         samples = take_out(session, found)
     engine = f"{clean(found.engine.name)} {version(found.engine)}"
-    click.echo(
-        f"removed run {clean(found.id)} of {engine}, {clock(found.started)} UTC, with {samples} values"
-    )
+    say(f"removed run {clean(found.id)} of {engine}, {clock(found.started)} UTC, with {samples} values")

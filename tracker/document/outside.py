@@ -9,12 +9,22 @@ from __future__ import annotations
 import re
 import unicodedata
 
-INVISIBLE = {"Cc", "Cf", "Cs", "Co"}  # control, format (direction overrides), surrogate, private use
+INVISIBLE = {
+    "Cc",
+    "Cf",
+    "Cs",
+    "Co",
+    "Zl",
+    "Zp",
+}  # control, direction, surrogate, private use, other ends of lines
 UNSEEN = re.compile(
     "[\x7f-\x9f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f]"
 )
 COLOUR = re.compile("(\x1b\\[(?:0|1|2|3[0-7]|9[0-7])m)")  # what we write ourselves
-COMMAND = re.compile(r"(?m)^((?:\s|\x1b\[\d+m)*)(?=::|##\[)")  # a line that a CI service would run
+# What a CI service would run: GitHub a line that begins with ::, and anywhere in a line ##[…, as Azure Pipelines
+# does with ##vso[… and TeamCity with ##teamcity[…. Colours do not break it: they are taken out for a pipe.
+COMMAND = re.compile(r"(?m)^((?:\s|\x1b\[\d+m)*)(?=:(?:\x1b\[\d+m)*:)")
+MARK = re.compile(r"#((?:\x1b\[\d+m)*)#(?=(?:[\w.-]|\x1b\[\d+m)*\[)")
 
 
 class _Seen(dict[int, str]):
@@ -38,7 +48,7 @@ def inert(text: str) -> str:
     if not text.isprintable():
         lines = text.split("\n")  # most of many lines hold nothing that a colour or a trap needs
         text = "\n".join(line if line.isprintable() else _seen(line) for line in lines)
-    return COMMAND.sub("\\1\N{REPLACEMENT CHARACTER}", text)
+    return MARK.sub("#\\1#\N{REPLACEMENT CHARACTER}", COMMAND.sub("\\1\N{REPLACEMENT CHARACTER}", text))
 
 
 def _seen(line: str) -> str:
@@ -46,7 +56,7 @@ def _seen(line: str) -> str:
 
 
 def escaped(json: str) -> str:
-    """The same JSON, with characters that cannot be seen as escapes: a reader of the file is not misled."""
+    """The same JSON, with escapes for what cannot be seen, and for what a CI service would run where it is printed."""
 
     def escape(found: re.Match[str]) -> str:
         code = ord(found[0])
@@ -55,4 +65,4 @@ def escaped(json: str) -> str:
         code -= 0x10000
         return f"\\u{0xD800 + (code >> 10):04x}\\u{0xDC00 + (code & 0x3FF):04x}"
 
-    return UNSEEN.sub(escape, json)
+    return MARK.sub(r"#\\u0023", UNSEEN.sub(escape, json))
