@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from spook_tracker.tracker.judge import shifts
+from spook_tracker.tracker.judge import noise, shifts
 from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.shifts import permutation_probability, remembered, standard_error, student
 from tests import noise_battery as battery
@@ -128,6 +128,26 @@ def test_a_shift_that_several_nights_found_is_blamed_on_its_first_and_ends_where
             assert told[found[0]].verdict.name == "slower"
             assert "by chance once in" in told[found[0]].verdict.sentence
         assert told[-1].state == "green"
+
+
+@pytest.mark.parametrize("series", range(4))
+def test_what_is_remembered_from_night_to_night_is_what_a_look_at_all_nights_tells(series: int) -> None:
+    draws = battery.generator("remembered", series)
+    values = battery.heavy(draws, 320) * np.where(
+        draws.random(320) < 0.02, draws.choice([0.9, 1.1, np.nan], 320), 1.0
+    )
+    values[250:260] *= 1.2
+    walk = noise._Walk([float(value) for value in values], larger_is_better=False)
+    for night in range(len(values)):
+        walk.night(night, False, False)
+        held = [value for i in walk.usual if math.isfinite(value := walk.values[i])]
+
+        assert walk._outermost() == sorted(walk.reached, reverse=True)[:2]
+        assert walk._known()[2] == len(held)
+        if walk.level_since and held:
+            last = [i for i in walk.level_since if math.isfinite(walk.values[i])][-min(shifts.SPANS) :]
+            off = [walk.values[i] / walk._spread()[0] - 1.0 for i in last]
+            assert walk._nearby(walk._spread()[0], ()) == sum(off) / len(off)
 
 
 def test_a_rate_that_fell_is_told_as_the_time_that_rose() -> None:

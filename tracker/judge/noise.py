@@ -17,6 +17,7 @@ import math
 from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
@@ -114,7 +115,8 @@ class _Walk:
         [],
     )  # since when and off which level, until when, in order
     _told: tuple[list[int], Usual] | None = None  # what was asked last, of which nights
-    _known_spread: tuple[list[int], tuple[float, float]] | None = None
+    _known_spread: tuple[list[int], tuple[float, float], int] | None = None
+    _known_outermost: tuple[list[float], list[float]] | None = None
     _known_anchor: tuple[list[int], float | None] | None = None
 
     def __post_init__(self) -> None:
@@ -123,7 +125,7 @@ class _Walk:
     def usual_now(self) -> Usual:
         """The level, and what stands clear of it for the worse."""
         if self._told is None or self._told[0] is not self.usual:
-            self._told = self.usual, self._clear(_outermost(self.reached))
+            self._told = self.usual, self._clear(self._outermost())
         return self._told[1]
 
     def night(self, place: int, release: bool, accepted: bool) -> Noisy:
@@ -207,10 +209,9 @@ class _Walk:
 
         The noise is what the nights that hold show about the level, or have reached, whichever is more.
         """
-        level, noise = self._spread()
+        _, (level, noise), count = self._known()
         off = [worse_by(level, self.values[i], self.larger_is_better) for i in nights]
-        count = sum(math.isfinite(self.values[i]) for i in self.usual)
-        reached = _outermost(self.reached)
+        reached = self._outermost()
         noise = max(noise, reached[1] / SECOND) if len(reached) > 1 else noise
         if count < FEWEST:
             noise = max(noise, FEW_NIGHTS_FLOOR / SIGMAS)
@@ -329,9 +330,23 @@ class _Walk:
         level, _ = self._spread()
         if len(self.usual) >= FEWEST:
             off = [worse_by(level, self.values[i], self.larger_is_better) for i in places]
-            self.reached = [*self.reached, *(x for x in off if math.isfinite(x))][-REACHED:]
+            self._reach([x for x in off if math.isfinite(x)])
         self.usual = [*self.usual, *places][-WINDOW:]
         self.level_since = [*self.level_since, *places][-BASE - max(SPANS) :]
+
+    def _reach(self, more: list[float]) -> None:
+        """Remember how far these nights lay off; the largest two of all are known again without a look at each."""
+        outermost = self._outermost()
+        every = [*self.reached, *more]
+        gone, self.reached = every[:-REACHED], every[-REACHED:]
+        if len(outermost) == 2 and len(self.reached) >= 2 and all(x < outermost[1] for x in gone):
+            self._known_outermost = self.reached, sorted((*outermost, *more), reverse=True)[:2]
+
+    def _outermost(self) -> list[float]:
+        """The largest two deviations that nights which hold have reached."""
+        if self._known_outermost is None or self._known_outermost[0] is not self.reached:
+            self._known_outermost = self.reached, _outermost(self.reached)
+        return self._known_outermost[1]
 
     def _shift(self, suspects: Sequence[int] = ()) -> Noisy | None:
         """Red if the last nights together, suspects among them, lie above those of the level before them.
@@ -341,11 +356,10 @@ class _Walk:
         level, deviation = self._spread()
         if not 0.0 < level < math.inf:
             return None
-        nights = [i for i in (*self.level_since, *suspects) if math.isfinite(self._cost(self.values[i]))]
-        last = nights[-min(SPANS) :]
-        near = sum(worse_by(level, self.values[i], self.larger_is_better) for i in last) / len(last)
+        near = self._nearby(level, suspects)
         if near < LEAST:
             return None  # most nights: nothing to count
+        nights = [i for i in (*self.level_since, *suspects) if math.isfinite(self._cost(self.values[i]))]
         found = shift([self._cost(self.values[i]) for i in nights], clusters_only=near < deviation)
         if found is None or found.change <= self._tolerates(level):
             return None
@@ -364,6 +378,16 @@ class _Walk:
             Verdict(word="regressed", sentence=words, name="slower", decades=math.log10(1.0 + found.change))
         )
 
+    def _nearby(self, level: float, suspects: Sequence[int]) -> float:
+        """How far the last few nights of the level lie off, suspects among them."""
+        off: list[float] = []
+        for i in chain(reversed(suspects), reversed(self.level_since)):
+            if math.isfinite(self._cost(self.values[i])):
+                off.append(worse_by(level, self.values[i], self.larger_is_better))
+                if len(off) == min(SPANS):
+                    break
+        return sum(reversed(off)) / len(off)
+
     def _cost(self, value: float) -> float:
         """A value of which larger is worse, and a change as many per cent: a rate gives the time of one."""
         if not self.larger_is_better:
@@ -372,9 +396,14 @@ class _Walk:
 
     def _spread(self) -> tuple[float, float]:
         """Level and noise of the nights that are usual."""
+        return self._known()[1]
+
+    def _known(self) -> tuple[list[int], tuple[float, float], int]:
+        """The nights that are usual, their level and noise, and how many of them have a value."""
         if self._known_spread is None or self._known_spread[0] is not self.usual:
-            self._known_spread = self.usual, _level_and_noise([self.values[i] for i in self.usual])
-        return self._known_spread[1]
+            values = [self.values[i] for i in self.usual]
+            self._known_spread = self.usual, _level_and_noise(values), sum(map(math.isfinite, values))
+        return self._known_spread
 
     def _clear(self, outermost: Sequence[float]) -> Usual:
         """The level, and what stands clear of it: of its noise, and of what its definition tolerates."""
@@ -388,10 +417,9 @@ class _Walk:
 
     def _clear_of_noise(self, outermost: Sequence[float]) -> Usual:
         """The level, and what stands clear of it on the side where nights that hold have reached so far."""
-        level, noise = self._spread()
+        _, (level, noise), count = self._known()
         if not math.isfinite(level):
             return math.inf, FLOOR
-        count = sum(map(math.isfinite, [self.values[i] for i in self.usual]))
         if (count < FEWEST and len(self.reached) < FEWEST) or level == 0.0:
             return level, FEW_NIGHTS_FLOOR
         clear = max(FLOOR, SIGMAS * noise)
