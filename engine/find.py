@@ -86,10 +86,16 @@ def find(name: str) -> Any:
     here = str(Path.cwd())
     if here not in sys.path:  # the console script does not look where one stands
         sys.path.insert(0, here)
-    found = _loaded(name, lambda: importlib.import_module(module))
+    found = _loaded(name, lambda: _module(module))
     if attribute:
         found = _loaded(name, lambda: getattr(found, attribute))
     return _faced(getattr(found, "ENGINE", found))
+
+
+def _module(name: str) -> Any:
+    if not all(name.split(".")) or "\0" in name:
+        raise ImportError(f"{name!r} is no name of a module")
+    return importlib.import_module(name)
 
 
 def known() -> tuple[str, ...]:

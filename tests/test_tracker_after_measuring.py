@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
 from tests.test_tracker_cli import tracker
@@ -99,3 +100,41 @@ def test_the_memory_of_a_piece_is_bounded_by_an_option(monkeypatch: pytest.Monke
 
     assert (bounded.exit_code, free.exit_code, said.exit_code) == (1, 0, 1)
     assert "ran out of memory" in bounded.stdout
+
+
+@pytest.mark.parametrize(
+    ("lost", "error", "code"),
+    [("history", "0", 2), ("history", "5", 1), ("summary", "0", 0), ("summary", "5", 1)],
+)
+def test_a_red_night_in_ci_is_red_though_what_it_leaves_cannot_be_written(
+    monkeypatch: pytest.MonkeyPatch, lost: str, error: str, code: int
+) -> None:
+    """The history's file, the job's summary: both are tried, and neither takes the verdict along."""
+    assert tracker("ci", "night", "--quick", "--workers", "0").exit_code == 0
+    for name, value in {"ERROR": error, "HASH": "b" * 40, "PARENT": "a" * 40}.items():
+        monkeypatch.setenv(f"TOY_{name}", value)
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", "no/such.md" if lost == "summary" else "summary.md")
+
+    def no_space(*_: object) -> None:
+        raise DocumentError("history cannot be written: No space left on device")
+
+    if lost == "history":
+        monkeypatch.setattr("spook_tracker.tracker.store.months._write", no_space)
+    done = tracker("ci", "night", "--quick", "--workers", "0")
+
+    assert done.exit_code == code, done.stderr
+    assert "cannot be written" in done.stderr
+    assert runs() == 2
+    assert Path("summary.md").exists() == (lost == "history")
+
+
+def test_a_red_run_judged_again_is_red_though_its_junit_cannot_be_written(
+    monkeypatch: pytest.MonkeyPatch, full: None
+) -> None:
+    monkeypatch.setenv("TOY_ERROR", "5")
+    tracker("run", "--workers", "0")
+
+    done = tracker("judge", "latest", "--junit", "made.xml")
+
+    assert done.exit_code == 1
+    assert "made.xml cannot be written: No space left on device" in done.stderr

@@ -36,6 +36,9 @@ OUTPUTS = [
     (("--junit", "."), "is a folder; name a file"),
     (("--out", "theirs"), "theirs"),
     (("--out", "file/public"), "no folder one may write to|not a folder"),
+    (("--json", "loop"), "loop is a link that leads back to itself"),
+    (("--junit", "pipe"), "pipe is a pipe that nobody may read; name a file"),
+    (("--json", "old.db"), "old.db is a database; name another file"),
 ]
 
 
@@ -44,11 +47,16 @@ def test_where_results_cannot_be_written_nothing_is_measured(option: tuple[str, 
     Path("theirs").mkdir()
     Path("theirs", "precious.txt").write_text("do not touch")
     Path("file").write_text("a file")
+    Path("loop").symlink_to("loop")
+    os.mkfifo("pipe")
+    tracker("db", "upgrade", "--db", "old.db")
+    kept = Path("old.db").read_bytes()
 
     refused(tracker("nightly", "--workers", "0", *option), words)
 
     assert not Path("tracker.db").exists()
     assert not Path("public").exists()
+    assert Path("old.db").read_bytes() == kept
 
 
 def test_a_run_asks_for_its_files_first_as_well() -> None:
@@ -59,6 +67,51 @@ def test_a_run_asks_for_its_files_first_as_well() -> None:
 @pytest.mark.parametrize("named", ["os:environ", "os:getcwd", "math:pi", "toy_questions:FALL"])
 def test_what_is_no_catalogue_is_named(named: str) -> None:
     refused(tracker("run", "--no-record", "--workers", "0", "--catalogue", named), "is no catalogue")
+
+
+@pytest.mark.parametrize("named", [":", "::x", " ", ",", "toy_questions:CATALOGUE,", "..:x", ".", "a\0b:c"])
+def test_a_name_of_nothing_is_no_catalogue_and_no_engine(named: str) -> None:
+    """A stray comma is found before the first engine is measured."""
+    measured = ("run", "--no-record", "--workers", "0")
+    refused(tracker(*measured, "--catalogue", named), "there is no catalogue")
+    engines = named.replace("toy_questions:CATALOGUE", "toy_engine")
+    done = tracker(*measured, "--engine", engines)
+    refused(done, "there is no engine")
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "named", ["", ":", ":x", "nosuch:x", "os:nosuch", "os:getcwd", "math:pi", "..:x", "dask://"]
+)
+def test_what_is_no_executor_is_named(named: str) -> None:
+    measured = ("run", "--no-record", "--workers", "1")
+    refused(tracker(*measured, "--executor", named), "executor|Dask|dask")
+
+
+URLS = [
+    ("sqlite:///tracker.db?mode=ro", "takes no options"),
+    ("sqlite+aiosqlite:///tracker.db", "is not supported"),
+    ("sqlite+pysqlcipher:///tracker.db", "is not supported"),
+    ("postgresql+asyncpg://host/name", "is not supported"),
+    ("postgresql://who:pass@word@host/name", "%40"),
+    ("postgresql://who:pass#word?@host@x/name", "%40|cannot be read"),
+    ("\udcff.db", "not UTF-8"),
+    ("sqlite:///\udcff.db", "not UTF-8"),
+    ("a\0b.db", "holds a character that no file can have"),
+]
+
+
+@pytest.mark.parametrize(("url", "words"), URLS)
+@pytest.mark.parametrize("command", [("db", "stats"), ("run", "--workers", "0")])
+def test_an_address_that_means_something_else_is_refused(
+    url: str, words: str, command: tuple[str, ...]
+) -> None:
+    """What would be ignored, tried with another driver, or give the end of a password away."""
+    done = tracker(*command, "--db", url)
+
+    refused(done, words)
+    assert "damaged" not in done.stderr
+    assert "word" not in done.stderr.partition("password")[0]
 
 
 def test_a_link_to_itself_and_a_pipe_are_no_databases() -> None:
@@ -83,3 +136,22 @@ def test_a_number_of_four_hundred_digits_is_refused(place: str) -> None:
     Path("big.json").write_text(text)
 
     refused(tracker("import", "big.json"), "big.json")
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("ci", "night", "--history", "file"), "the folder file cannot be made"),
+        (("ci", "night", "--history", "file/deeper"), "the folder file/deeper cannot be made"),
+        (("ci", "change", "--comment", "file/comment.md"), "file is not a folder"),
+        (("judge", "latest", "--junit", "no/such.xml"), "the folder of no/such.xml does not exist"),
+        (("report", "--html", "no/such.html"), "the folder of no/such.html does not exist"),
+    ],
+)
+def test_every_command_asks_for_its_places_first(command: tuple[str, ...], words: str) -> None:
+    Path("file").write_text("a file")
+
+    refused(tracker(*command), words)
+
+    assert not Path("tracker.db").exists()
+    assert Path("file").read_text() == "a file"

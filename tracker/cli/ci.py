@@ -15,16 +15,20 @@ import click
 from spook_tracker.tracker.cli.options import (
     GREEN,
     RED,
+    UNUSABLE,
     accepted_option,
+    complain,
     database_option,
     documents_option,
     example,
     executor_option,
     limit_option,
     mutants_option,
+    refuse_unwritable,
     source_options,
     website_options,
     workers_option,
+    write,
 )
 
 HISTORY = click.option(
@@ -68,18 +72,28 @@ def night(
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.cli.main import nightly
     from spook_tracker.tracker.cli.report_ci import commands_of, night_markdown
+    from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.library import judge
     from spook_tracker.tracker.store.months import export_months
 
+    try:
+        history.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TrackerError(f"the folder {history} cannot be made: {error.strerror}") from None
+    refuse_unwritable(history / "month.jsonl.xz")  # a file like those that a night writes
     _bring_in(history, database)
     same = {"json_file": None, "junit_file": None, "with_database": False}
     code = _code_of(context, nightly, out=out, accepted=accepted, database=database, **same, **asked)
     with history_of(database) as kept:
         run = kept.resolve("latest")
         findings = judge(kept, run.id, accepted_levels(accepted))
-        written = export_months(kept, history)
+        _tell(night_markdown(run, findings, site), commands_of(findings))
+        try:
+            written = export_months(kept, history)
+        except TrackerError as error:
+            complain(str(error))  # a red night stays red
+            context.exit(code or UNUSABLE)
     say(f"history: {', '.join(path.name for path in written) or 'nothing new'} in {history}")
-    _tell(night_markdown(run, findings, site), commands_of(findings))
     context.exit(code)
 
 
@@ -118,22 +132,23 @@ def change(
     from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
     from spook_tracker.tracker.library import compare
 
+    refuse_unwritable(comment_file)
     if comment_file:
         comment_file.write_text("", encoding="utf-8")
-    known = _bring_in(history, database)
+    known, kept = _bring_in(history, database), True
     same: dict[str, Any] = {"tests": (), "json_file": None, "junit_file": None}
     same |= dict.fromkeys(("sweep", "stability", "figures", "no_record", "everything"), False)
     code = _code_of(context, run_command, database=database, **same, **asked)
     if not known:
         _tell("No history yet: this run has nothing to be compared with.\n", [])
         context.exit(code)
-    with history_of(database) as kept:
-        document = compare(kept, base, "latest", accepted_levels(accepted))
+    with history_of(database) as recorded:
+        document = compare(recorded, base, "latest", accepted_levels(accepted))
     say(compare_table(document))
     if comment_file and (words := comment(document)):
-        comment_file.write_text(words + "\n", encoding="utf-8")
+        kept = write(comment_file, words + "\n")
     _tell(compare_markdown(document), workflow_commands(document).splitlines())
-    context.exit(document.exit_code)
+    context.exit(document.exit_code or (GREEN if kept else UNUSABLE))
 
 
 def _bring_in(folder: Path, database: str) -> int:
@@ -162,8 +177,11 @@ def _code_of(context: click.Context, command: click.Command, **arguments: Any) -
 def _tell(markdown: str, commands: list[str]) -> None:
     """To the service, where there is one that listens."""
     if summary := os.environ.get("GITHUB_STEP_SUMMARY"):
-        with Path(summary).open("a", encoding="utf-8") as file:
-            file.write(markdown + "\n")
+        try:
+            with Path(summary).open("a", encoding="utf-8") as file:
+                file.write(markdown + "\n")
+        except OSError as error:
+            complain(f"the summary {summary} cannot be written: {error.strerror}")
     if os.environ.get("GITHUB_ACTIONS") == "true":
         for command in commands:
             click.echo(command)

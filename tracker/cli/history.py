@@ -18,10 +18,13 @@ from spook_tracker.tracker.cli.options import (
     ACCEPTED,
     NOT_COMPARABLE,
     RED,
+    UNUSABLE,
     accepted_option,
     database_option,
     example,
+    refuse_unwritable,
     source_options,
+    write,
 )
 from spook_tracker.tracker.cli.settings import present
 
@@ -174,6 +177,8 @@ def judge_command(
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import idle_entries, judge
 
+    refuse_unwritable(junit_file)
+    kept = True
     choice = Choice(tests=tests, kinds=kinds, roles=roles)
     levels, run = accepted_levels(accepted), of_engine(engine, run)
     with history_of(database) as history:
@@ -184,7 +189,7 @@ def judge_command(
     if junit_file:
         from spook_tracker.tracker.cli.report_junit import junit_of_night
 
-        junit_file.write_text(junit_of_night(findings, then), encoding="utf-8")
+        kept = write(junit_file, junit_of_night(findings, then))
     if as_json:
         click.echo(findings_json(findings, then))
     else:
@@ -195,6 +200,8 @@ def judge_command(
         click.get_current_context().exit(RED)
     if not findings or any(old.open for old in then):
         click.get_current_context().exit(NOT_COMPARABLE)
+    if not kept:
+        click.get_current_context().exit(UNUSABLE)
 
 
 def _by_old_questions(history: Any, run: Any, findings: Any, choice: Any) -> Any:

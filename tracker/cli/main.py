@@ -31,6 +31,7 @@ from spook_tracker.tracker.cli.options import (
     website_options,
     with_database_option,
     workers_option,
+    write,
 )
 from spook_tracker.tracker.cli.settings import present
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
@@ -135,11 +136,11 @@ def run_command(
             continue
         _print_run(document, everything)
         if json_file:
-            kept &= _write(_of_engine(json_file, name, names), _json(document))
+            kept &= write(_of_engine(json_file, name, names), _json(document))
         if junit_file:
             from spook_tracker.tracker.cli.report_junit import junit_of_run
 
-            kept &= _write(_of_engine(junit_file, name, names), junit_of_run(document))
+            kept &= write(_of_engine(junit_file, name, names), junit_of_run(document))
         red = red or _red(document)
     _end(red, kept)
 
@@ -231,12 +232,12 @@ def nightly(
             if junit_file:
                 from spook_tracker.tracker.cli.report_junit import junit_of_night
 
-                kept &= _write(junit_file, junit_of_night(news))
+                kept &= write(junit_file, junit_of_night(news))
             return
         recorded(news.id)
         measured.append(news)
         if json_file:
-            kept &= _write(json_file, _json(news))
+            kept &= write(json_file, _json(news))
 
     try:
         with watching("measuring") as step, terminated_is_interrupted():
@@ -342,9 +343,10 @@ def report(
 
     if pdf is None and html is None:
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
+    refuse_unwritable(pdf, html)
     with History.open(database) as history:
         text = one_file(history, accepted_levels(accepted), title, home_page, colour)
-    kept = html is None or _write(html, text)
+    kept = html is None or write(html, text)
     if html is not None and kept:
         say(f"wrote {html}")
     if pdf is not None:
@@ -458,16 +460,6 @@ def _json(document: Any) -> str:
     from spook_tracker.tracker.document.json_form import readable
 
     return readable(document) + "\n"
-
-
-def _write(file: Path, text: str) -> bool:
-    """Whether it could be written; if not, that is said, and takes nothing from what was measured."""
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        complain(f"{file} cannot be written: {error.strerror}; what was measured stands")
-        return False
-    return True
 
 
 def _end(red: bool, kept: bool) -> None:

@@ -6,6 +6,7 @@ no data, unreadable database; 3 not comparable. Only click is imported here, so 
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -21,6 +22,7 @@ import spook_tracker.tracker.cli.settings as tracker_toml
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+SQLITE = b"SQLite format 3\0"  # a file that holds a history begins so
 MOST = 600  # characters of a complaint
 MEMORY = 4096  # MB for one piece of work, unless something else is said
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
@@ -46,6 +48,13 @@ def with_database_option(command: Command) -> Command:
     )(command)
 
 
+def _each_named(context: click.Context, option: click.Parameter, names: str) -> str:
+    """A stray comma is said before the first of several engines is measured."""
+    if not all(name.strip() for name in names.split(",")):
+        raise click.BadParameter(f"there is no {option.name} without a name: {names!r}")
+    return names
+
+
 def source_options(command: Command) -> Command:
     """Which questions are put to which engine."""
     for option in (
@@ -54,6 +63,7 @@ def source_options(command: Command) -> Command:
             metavar="NAME[,NAME]",
             envvar="TRACKER_ENGINE",
             default="spook",
+            callback=_each_named,
             help="spook, mujoco, … (see: tracker engines) or module:NAME; also TRACKER_ENGINE.",
         ),
         click.option(
@@ -61,6 +71,7 @@ def source_options(command: Command) -> Command:
             metavar="NAME[,NAME]",
             envvar="TRACKER_CATALOGUE",
             default="standard",
+            callback=_each_named,
             help="Other tables of scalar tests: module:NAME, with commas between; also TRACKER_CATALOGUE.",
         ),
     ):
@@ -286,10 +297,38 @@ def refuse_unwritable(*files: Path | None) -> None:
         folder = file.absolute().parent
         if file.is_dir():
             raise TrackerError(f"{file} is a folder; name a file")
+        if file.is_symlink() and _leads_back(file):
+            raise TrackerError(f"{file} is a link that leads back to itself; name a file")
+        if file.is_fifo() and not file.is_relative_to("/dev"):  # there a shell has a reader behind it
+            raise TrackerError(f"{file} is a pipe that nobody may read; name a file")
+        if folder.exists() and not folder.is_dir():
+            raise TrackerError(f"{folder} is not a folder; choose another place")
         if not folder.is_dir():
             raise TrackerError(f"the folder of {file} does not exist; make it first")
         if not os.access(file if file.exists() else folder, os.W_OK):
             raise TrackerError(f"{file} cannot be written; check its permissions")
+        if file.is_file():
+            with file.open("rb") as there:
+                if there.read(len(SQLITE)) == SQLITE:
+                    raise TrackerError(f"{file} is a database; name another file")
+
+
+def _leads_back(link: Path) -> bool:
+    try:
+        link.stat()
+    except OSError as error:
+        return error.errno == errno.ELOOP
+    return False
+
+
+def write(file: Path, text: str) -> bool:
+    """Whether it could be written; if not, that is said, and takes nothing from what was measured."""
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        complain(f"{file} cannot be written: {error.strerror}; what was measured stands")
+        return False
+    return True
 
 
 def complain(sentence: str) -> None:

@@ -68,6 +68,8 @@ def _loaded(name: str) -> Any:
         if point.name == name:
             return point.load()
     module, _, attribute = name.partition(":")
+    if not all(module.split(".")) or "\0" in module:
+        raise ImportError(f"{module!r} is no name of a module")
     here = str(Path.cwd())
     if not module.startswith("spook_tracker.") and here not in sys.path:
         sys.path.insert(0, here)  # the console script does not look where one stands

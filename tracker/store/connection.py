@@ -23,12 +23,17 @@ from spook_tracker.tracker.store.reader import LOCK_TIMEOUT, SAFE, address
 
 DEFAULT = "sqlite:///tracker.db"
 ONE_WRITER = 5755  # number of the lock that who writes to PostgreSQL holds
+DRIVERS = frozenset({"sqlite", "sqlite+pysqlite", "postgresql", "postgresql+psycopg", "postgresql+psycopg2"})
 NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "9p", "ceph", "lustre", "fuse.sshfs"})
 
 
 def database_url(given: str | None = None) -> URL:
     """The URL meant: `given`, else TRACKER_DB, else tracker.db here. A plain path means a SQLite file."""
     chosen = given or os.environ.get("TRACKER_DB") or DEFAULT
+    if not chosen.isprintable() and any("\ud800" <= c <= "\udfff" for c in chosen):
+        raise DatabaseError("the name of the database is not UTF-8; give it one that is")
+    if "\0" in chosen:
+        raise DatabaseError("the name of the database holds a character that no file can have")
     if "://" not in chosen:
         return URL.create("sqlite", database=chosen)
     try:
@@ -41,6 +46,12 @@ def database_url(given: str | None = None) -> URL:
         raise DatabaseError("a PostgreSQL URL begins with postgresql://, not with postgres://")
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         raise DatabaseError(f"{url.get_backend_name()} is not supported; use sqlite or postgresql")
+    if url.drivername not in DRIVERS:
+        raise DatabaseError(f"{url.drivername} is not supported; write {url.get_backend_name()}:// alone")
+    if "@" in (url.host or ""):  # the end of a password, which is not repeated
+        raise DatabaseError("the database URL has more than one @; in a password it is written %40")
+    if url.get_backend_name() == "sqlite" and url.query:
+        raise DatabaseError("a SQLite URL takes no options: what stands behind its ? would be ignored")
     return url
 
 
