@@ -29,6 +29,18 @@ LIMITS = {
 }  # ns for falling, else ratio
 CORRECTIONS = {"one correction": 2.5, "two corrections": 3.3}  # times plain: a pass down and one up for each
 
+METHODS = {
+    "plain": Method(),
+    "half-step velocities": Method(half_step_velocities=True),
+    "one correction": Method(corrections=1),
+    "two corrections": Method(corrections=2),
+    "composition of order 4": Method(composition="order4"),
+    "composition of order 8": Method(composition="order8"),
+    "general solver forced in": Method(force_stages=("solve_block",)),
+    "string stiffness": Method(string_stiffness=True),
+    "iterative, 50 sweeps": Method(solver="iterative", iterations=50, residual_tolerance=0.0),
+}
+
 
 def chain(links: int) -> Scene:
     """A horizontal line of unit links, the first end fixed."""
@@ -138,17 +150,7 @@ def against_methods() -> bool:
     kept = True
     print(f"\n{'chain of 26':<36}{'ns/step':>10}{'times plain':>14}{'limit':>8}")
     plain = 0.0
-    for name, method in (
-        ("plain", Method()),
-        ("half-step velocities", Method(half_step_velocities=True)),
-        ("one correction", Method(corrections=1)),
-        ("two corrections", Method(corrections=2)),
-        ("composition of order 4", Method(composition="order4")),
-        ("composition of order 8", Method(composition="order8")),
-        ("general solver forced in", Method(force_stages=("solve_block",))),
-        ("string stiffness", Method(string_stiffness=True)),
-        ("iterative, 50 sweeps", Method(solver="iterative", iterations=50, residual_tolerance=0.0)),
-    ):
+    for name, method in METHODS.items():
         program = compile(chain(26), time_step=1e-3, method=method)
         steps = 500 if method.solver == "direct" else 50
         cost = min(program.run(steps).seconds for _ in range(100)) / steps * 1e9

@@ -76,16 +76,19 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
         }
     };
     std::int64_t length = 1;
+    double now = watch.elapsed();
+    bool weighed =
+        true;  // whether keeping is timed apart: of short blocks even a look at the clock would be felt
     while (done < steps && health.status == Status::completed) {
-        if (watch.over()) {
+        if (watch.over(now)) {
             stop(done);
             break;
         }
-        const double before = watch.elapsed();
+        const double before = now;
         system.save();
         recorder.save();
         const std::int64_t from = done;
-        const double began = watch.elapsed(), enough = 50.0 * (began - before);
+        const double began = weighed ? watch.elapsed() : before, enough = 50.0 * (began - before);
         try {
             run_block(std::min(done + length, steps));
         } catch (const Stopped&) {
@@ -95,9 +98,11 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
             stop(done);
             break;
         }
-        const double took = watch.elapsed() - began;
+        now = watch.elapsed();
+        const double took = now - began;
+        const bool apart = std::exchange(weighed, took > 0.1 * Watch::patience);
         if (took < std::max(0.5 * Watch::patience, enough)) length = std::min(2 * length, system.block());
-        else if (took > std::max(Watch::patience, 2.0 * enough))
+        else if (apart && took > std::max(Watch::patience, 2.0 * enough))
             length = std::max<std::int64_t>(1, length / 2);
     }
     if (health.status != Status::completed) {

@@ -44,8 +44,8 @@ public:
     double processor() const noexcept { return processor_seconds() - processor_begin_; }
 
     /// Whether the run is to end.
-    bool over() {
-        const double now = elapsed();
+    bool over() { return over(elapsed()); }
+    bool over(double now) {
         if (limit_ > 0.0 && now > limit_) return true;
         if (interrupted == nullptr || now <= asked_ + 0.1) return false;
         asked_ = now;
