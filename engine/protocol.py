@@ -346,4 +346,5 @@ def _result(task: Task, recording: Recording, observe: Mapping[str, Observable])
         state_hash=hashlib.sha256(np.ascontiguousarray(final).tobytes()).hexdigest()[:16],
         stages=(),
         stage_seconds={"setup": recording.setup_seconds},
+        cpu_seconds=recording.cpu_seconds,
     )

@@ -59,6 +59,7 @@ class Recording:
     steps: int  # done
     seconds: float  # of the engine's own loop; setting up not counted
     setup_seconds: float = 0.0  # building the engine's model
+    cpu_seconds: float = 0.0  # of the processor, for the same as `seconds`; 0 where it cannot be told
     constraint_forces: Mapping[str, Array] = field(default_factory=dict)  # (s,) N, tension; or (s, 6) N, N m
     contact_forces: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (s, 3) N, on the first
     contact_count: Array | None = None  # (s,)

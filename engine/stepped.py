@@ -73,14 +73,14 @@ class Stepped(ABC):
         began = time.perf_counter()
         world = self.world(task)
         setup = time.perf_counter() - began
-        kept, states, done, seconds, block = [0], [_whole(world.state())], 0, 0.0, 1
+        kept, states, done, seconds, cpu, block = [0], [_whole(world.state())], 0, 0.0, 0.0, 1
         out_of_time = False
         while done < task.steps and not out_of_time:
             count = 1 if task.every_step else min(block, task.steps - done)
-            began = time.perf_counter()
+            worked, began = time.process_time(), time.perf_counter()
             world.step(count)
             took = time.perf_counter() - began
-            done, seconds = done + count, seconds + took
+            done, seconds, cpu = done + count, seconds + took, cpu + time.process_time() - worked
             block = 2 * block if took < LOOK else max(1, block // 2)
             if task.every_step or done == task.steps:
                 kept.append(done)
@@ -95,6 +95,7 @@ class Stepped(ABC):
             angular_velocities=parts[3],
             steps=done,
             seconds=seconds,
+            cpu_seconds=cpu,
             setup_seconds=setup,
             status="timed_out" if out_of_time else "completed",
             failure=f"{task.time_limit:g} s were over after step {done}" if out_of_time else "",

@@ -169,3 +169,8 @@ def test_what_it_lacks_is_not_supported_by_name() -> None:
     force = {"force": Final(quantity=ContactForce("box"))}
     with pytest.raises(NotSupported, match="the observable contact force"):
         JOLT.simulate(peer_scenes.box_on_ground(0.0), time_step=STEP, steps=1, observe=force)
+
+
+@pytest.mark.parametrize("kind", [Hinge, Prismatic])
+def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(kind: Any) -> None:
+    assert peer_scenes.braked(JOLT.simulate, kind) == pytest.approx(peer_scenes.BRAKED, abs=5e-3)

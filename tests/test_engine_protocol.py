@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from spook_tracker import engine
@@ -27,8 +29,9 @@ from spook_tracker.engine import (
     Scene,
     Spring,
 )
-from spook_tracker.engine.find import EngineMissing, Peer, find
-from spook_tracker.engine.protocol import Capabilities, NotSupported, run, unsupported
+from spook_tracker.engine.find import BUILT, EXTRAS, NODE, EngineMissing, Peer, find
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, run, unsupported
+from spook_tracker.engine.stepped import Stepped
 from tests.stepping_engine import ENGINE
 
 WEIGHT = Particle(name="weight", mass=2.0, position=(1.0, 0.0, 0.0))
@@ -155,3 +158,40 @@ def test_a_library_that_is_not_built_is_answered_with_what_builds_it(
 
     with pytest.raises(EngineMissing, match=r"no libspook_box3d\.so in .*; build it with: \.ci/box3d"):
         find("box3d")
+
+
+class Drowsy(Stepped):
+    """A world that waits in each step and works in none."""
+
+    name = "drowsy"
+    configurations = (Configuration(name="slow", reason="it sleeps"),)
+
+    def world(self, task: Task) -> Drowsy:
+        return self
+
+    def step(self, count: int) -> None:
+        time.sleep(0.02 * count)
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros((1, 3)), np.zeros((1, 3))
+
+
+def test_processor_time_leaves_out_what_an_engine_waited() -> None:
+    answer = run(Drowsy(checkout=__file__), FALL, time_step=0.1, steps=3)
+
+    assert answer.seconds >= 0.06
+    assert 0.0 < answer.cpu_seconds < 0.5 * answer.seconds
+
+
+@pytest.mark.parametrize("name", [*EXTRAS, *NODE, *BUILT])
+def test_every_engine_tells_its_processor_time(name: str) -> None:
+    try:
+        engine_of_name = find(name)
+    except EngineMissing as reason:
+        pytest.skip(str(reason))
+    body = RigidBody(name="weight", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+    scene = Scene(bodies=(body,), gravity=(0.0, 0.0, -10.0))
+    answer = engine_of_name.simulate(scene, time_step=1e-3, steps=4000)
+
+    assert answer.seconds > 0.0
+    assert answer.cpu_seconds > 0.0

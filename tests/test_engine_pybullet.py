@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    AngularVelocity,
     Ball,
     Capsule,
     CentralGravity,
@@ -34,7 +35,9 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.find import find
+from spook_tracker.engine.peers.surfaces import shares
 from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.scalar_tests import rolling_friction
 from tests import peer_scenes
 
 pytest.importorskip(
@@ -245,3 +248,44 @@ def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(kin
         find("pybullet").simulate(
             peer_scenes.rough(kind), configuration="constraints", time_step=1e-3, duration=1.0
         )
+
+
+def test_rolling_and_spinning_are_braked_as_their_coefficients_say() -> None:
+    """Steady torques: each step but the first takes the same speed, and what stands stays. Its contacts want 1/240 s."""
+    h, last = 1 / 240, {"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("ball"))}
+    rolled = run("joints")(rolling_friction.scene(), time_step=h, duration=3.0, observe=last)
+    spun = run("joints")(rolling_friction.scene(0.0, 6.0), time_step=h, duration=2.0, observe=last)
+    t = h * np.arange(721)
+
+    speed = np.hypot(rolled["v"][:, 0], rolled["v"][:, 1])
+    assert speed[2:] == pytest.approx(np.maximum(0.0, 0.5 - rolling_friction.BRAKE * t)[2:], abs=1e-9)
+    spin = np.maximum(0.0, 6.0 - rolling_friction.SLOWING * t[:481])
+    assert spun["w"][2:, 2] == pytest.approx(spin[2:], abs=1e-9)
+
+
+def test_a_pair_has_the_larger_rolling_friction_or_is_not_supported() -> None:
+    def balls(*of_rolling: float) -> Scene:
+        def rough(rolling: float) -> Material:
+            return Material(friction=0.25, rolling_friction=rolling)
+
+        floor = RigidBody(
+            name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough(0.02)
+        )
+        made = [
+            RigidBody(
+                name=f"{k}",
+                mass=1.0,
+                shape=Sphere(0.5),
+                position=(2.0 * k, 0.0, 0.5),
+                material=rough(rolling),
+            )
+            for k, rolling in enumerate(of_rolling)
+        ]
+        return Scene(bodies=(floor, *made))
+
+    found = shares(balls(0.01, 0.02), "rolling", "pybullet")
+    for a, b in (("floor", "0"), ("floor", "1"), ("0", "1")):
+        assert 0.5 * (found[a] + found[b]) == pytest.approx(0.02, rel=1e-9)
+    assert shares(balls(0.0), "torsional", "pybullet") == {}
+    with pytest.raises(NotSupported, match="different rolling friction"):
+        shares(balls(0.01, 0.1, 0.1), "rolling", "pybullet")

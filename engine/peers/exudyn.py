@@ -167,8 +167,8 @@ class _Run:
         settings.solution.sensors.writePeriod = every
         if len(task.scene.bodies) > 20:
             settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
-        began = time.perf_counter()
-        end = math.inf if task.time_limit is None else time.process_time() + task.time_limit
+        worked, began = time.process_time(), time.perf_counter()
+        end = math.inf if task.time_limit is None else worked + task.time_limit
         self.system.SetPreStepUserFunction(lambda system, t: time.process_time() < end)
         try:
             solved = self.system.SolveDynamic(
@@ -177,12 +177,12 @@ class _Run:
             failure = "" if solved else "its solver did not converge"
         except Exception as error:  # what the solver could not do is an outcome
             failure = " ".join(str(error).split())[:200]
-        seconds = time.perf_counter() - began
+        self.seconds, self.cpu_seconds = time.perf_counter() - began, time.process_time() - worked
         if late := time.process_time() >= end:
             failure = f"the time limit of {task.time_limit:g} s was reached"
-        return self._read(seconds, failure, "timed_out" if late else "diverged")
+        return self._read(failure, "timed_out" if late else "diverged")
 
-    def _read(self, seconds: float, failure: str, bad: Any) -> Recording:
+    def _read(self, failure: str, bad: Any) -> Recording:
         task, bodies = self.task, self.task.scene.bodies
         stored = {name: [self._stored(s) for s in sensors] for name, sensors in self.sensors.items()}
         count = min((len(rows) for series in stored.values() for rows in series), default=1)
@@ -206,7 +206,8 @@ class _Run:
             velocities=speeds,
             angular_velocities=spins,
             steps=int(steps[-1]),
-            seconds=seconds,
+            seconds=self.seconds,
+            cpu_seconds=self.cpu_seconds,
             setup_seconds=self.setup,
             constraint_forces=tensions,
             status=bad if failure else "completed",

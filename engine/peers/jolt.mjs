@@ -93,10 +93,12 @@ serve(async (task) => {
     if (one.kind === "hinge") {
       joint.mHingeAxis1 = joint.mHingeAxis2 = vec(one.axis);
       joint.mNormalAxis1 = joint.mNormalAxis2 = vec(across);
+      joint.mMaxFrictionTorque = one.friction;
     }
     if (one.kind === "prismatic") {
       joint.mSliderAxis1 = joint.mSliderAxis2 = vec(one.axis);
       joint.mNormalAxis1 = joint.mNormalAxis2 = vec(across);
+      joint.mMaxFrictionForce = one.friction;
     }
     return [joint, type];
   }

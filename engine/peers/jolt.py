@@ -11,7 +11,7 @@ from typing import Any
 from spook_tracker.engine.bodies import WORLD
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
 from spook_tracker.engine.observe import ConstraintForce, Penetration
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.peers.described import described as common
@@ -38,6 +38,7 @@ class Jolt:
         shows=frozenset({ConstraintForce, Penetration}),
         shows_force_of=frozenset({Distance, Ball, Hinge}),
         friction=True,
+        joint_friction=True,
         restitution=True,
         kinematic=True,
     )
@@ -99,6 +100,7 @@ def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str
         "ends": ends,
         "at": list(joint_point(scene, constraint)),
         "axis": list(getattr(constraint, "axis", (0.0, 0.0, 1.0))),
+        "friction": max(frictions(constraint)[0]),
     }
 
 

@@ -45,6 +45,7 @@ function run(task, { step, state }, began) {
   const started = performance.now();
   const worked = processor();
   let spent = 0;
+  let cpu = 0;
   let block = 1;
   let done = 0;
   let status = "completed";
@@ -52,10 +53,12 @@ function run(task, { step, state }, began) {
   keep();
   while (done < task.steps && status === "completed") {
     const stop = task.every_step ? done + 1 : Math.min(done + block, task.steps);
+    const busy = processor();
     const from = performance.now();
     for (; done < stop; done += 1) step();
     const now = performance.now();
     spent += now - from;
+    cpu += processor() - busy;
     block = now - from < LOOK ? Math.min(2 * block, BLOCK) : Math.max(block >> 1, 1);
     if (task.every_step || done === task.steps) keep();
     if (!state().every(Number.isFinite)) {
@@ -66,7 +69,7 @@ function run(task, { step, state }, began) {
       failure = `the time limit of ${task.time_limit} s was reached before step ${done + 1}`;
     }
   }
-  const seconds = { seconds: spent / 1000, setup_seconds: (started - began) / 1000 };
+  const seconds = { seconds: spent / 1000, cpu_seconds: cpu / 1000, setup_seconds: (started - began) / 1000 };
   const bytes = 8 * kept * width;
   const head = JSON.stringify({ kept, steps: done, status, failure, bytes, ...seconds });
   answer(Buffer.concat([Buffer.from(`${head}\n`), Buffer.from(states.buffer, 0, bytes)]));

@@ -205,6 +205,7 @@ def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Rec
         angular_velocities=whole[:, :, 10:],
         steps=head["steps"],
         seconds=head["seconds"],
+        cpu_seconds=head["cpu_seconds"],
         setup_seconds=head["setup_seconds"],
         constraint_forces={
             name: rows[:, 0] if forces[name] == 1 else rows for name, rows in zip(forces, forced, strict=True)
@@ -225,6 +226,7 @@ def _nothing(task: dict[str, Any], failure: str) -> Recording:
         "status": "timed_out",
         "failure": failure,
         "seconds": 0.0,
+        "cpu_seconds": 0.0,
         "setup_seconds": 0.0,
     }
     return _recording(task, head, start)

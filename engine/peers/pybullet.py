@@ -45,6 +45,7 @@ class PyBullet:
         shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
         shows_force_of=frozenset({Distance, Ball, Hinge}),
         friction=True,
+        rolling_friction=True,
         joint_friction=True,
         restitution=True,
     )

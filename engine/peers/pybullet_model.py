@@ -24,7 +24,7 @@ from spook_tracker.engine.peers.joint_tree import (
 )
 from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import quiet
-from spook_tracker.engine.peers.surfaces import one_restitution, pairs_apart
+from spook_tracker.engine.peers.surfaces import one_restitution, pairs_apart, shares
 from spook_tracker.engine.protocol import NotSupported, Task
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
 from spook_tracker.engine.result import Array
@@ -50,6 +50,7 @@ class Model:
         self.nodes = grown(scene) if task.configuration.options["joints"] else alone(scene)
         self.normal = plane_of_motion(scene)
         self.restitution = one_restitution(scene, "pybullet")
+        self.rolling = {kind: shares(scene, kind, "pybullet") for kind in ("rolling", "torsional")}
         self.ids: dict[str, tuple[int, int]] = {}  # body -> tree and link
         self.held: dict[str, tuple[int, ...]] = {}  # constraint -> Bullet's constraints
         self.children = {node.tie.name: name for name, node in self.nodes.items() if node.tie is not None}
@@ -157,6 +158,8 @@ class Model:
             # Bullet multiplies two coefficients; the scene wants the geometric mean and the larger restitution.
             told["lateralFriction"] = math.sqrt(body.material.friction)
             told["restitution"] = math.sqrt(self.restitution)
+            told["rollingFriction"] = self.rolling["rolling"].get(name, 0.0)
+            told["spinningFriction"] = self.rolling["torsional"].get(name, 0.0)
         bullet.changeDynamics(made, link, physicsClientId=self.client, **told)
         # In calls of their own: a bound of speeds and a mass in one call free a base that is fixed.
         bullet.changeDynamics(made, link, maxJointVelocity=NO_BOUND, physicsClientId=self.client)

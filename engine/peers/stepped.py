@@ -68,14 +68,14 @@ def stepped(
     """
     samples = [int(sample) for sample in task.samples]
     kept = Kept(len(samples), len(task.scene.bodies))
-    done, failure, status, spent, block = 0, "", "completed", 0.0, 1
+    done, failure, status, spent, worked, block = 0, "", "completed", 0.0, 0.0, 1
     entered = time.process_time()
     read(kept, 0, 0)
     kept.count = 1
     for row, sample in enumerate(samples[1:], start=1):
         while done < sample and status == "completed":
             taken = min(block, sample - done)
-            began = time.perf_counter()
+            since, began = time.process_time(), time.perf_counter()
             try:
                 step(taken)
             except RuntimeError as error:  # what the engine could not do is an outcome
@@ -83,6 +83,7 @@ def stepped(
                 break
             took = time.perf_counter() - began
             spent += took
+            worked += time.process_time() - since
             done += taken
             block = min(2 * block, BLOCK) if took < LOOK else max(block // 2, 1)
             failure = health()
@@ -107,6 +108,7 @@ def stepped(
         angular_velocities=kept.spins[:count],
         steps=done,
         seconds=spent,
+        cpu_seconds=worked,
         setup_seconds=setup,
         constraint_forces={name: np.array(values) for name, values in kept.forces.items()},
         contact_forces={pair: kept.pair(pair)[:count] for pair in kept.pairs},

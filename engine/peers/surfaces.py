@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import combinations_with_replacement
+import math
+from itertools import combinations, combinations_with_replacement
+
+import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.joints import Joint
@@ -51,3 +54,28 @@ def one_friction(scene: Scene, engine: str) -> float:
     if len(found) > 1:
         raise NotSupported(f"{engine} does not support surfaces of different friction in one scene")
     return found.pop() if found else 0.0
+
+
+def shares(scene: Scene, kind: str, engine: str) -> dict[str, float]:
+    """What each surface gives to "rolling" or "torsional" friction [m] where an engine adds for two of them
+    √µ_b share_a + √µ_a share_b, and we take the larger coefficient of the two.
+
+    Raises NotSupported where no shares give every pair its own.
+    """
+    bodies = solid(scene) if scene.contacts else []
+    own = [float(getattr(body.material, f"{kind}_friction")) for body in bodies]
+    if not any(own):
+        return {}
+    root = [math.sqrt(body.material.friction) for body in bodies]
+    pairs = [
+        (a, b)
+        for a, b in combinations(range(len(bodies)), 2)
+        if "dynamic" in (bodies[a].motion, bodies[b].motion)
+    ]
+    sums, wanted = np.zeros((len(pairs), len(bodies))), np.array([max(own[a], own[b]) for a, b in pairs])
+    for row, (a, b) in zip(sums, pairs, strict=True):
+        row[a], row[b] = root[b], root[a]
+    found = np.clip(np.linalg.lstsq(sums, wanted, rcond=None)[0], 0.0, None)
+    if not np.allclose(sums @ found, wanted, rtol=1e-9, atol=1e-12 * wanted.max()):
+        raise NotSupported(f"{engine} does not support surfaces of different {kind} friction in one scene")
+    return {body.name: float(share) for body, share in zip(bodies, found, strict=True)}
