@@ -198,6 +198,26 @@ def test_todays_questions_are_put_to_the_engine_of_then(tmp_path: Path) -> None:
     assert not (package / "scalar_tests").resolve().is_relative_to(tmp_path)
 
 
+def test_a_commit_from_before_the_package_answers_its_own_questions(tmp_path: Path) -> None:
+    """Its rooms lie side by side at the top, and its tracker is called by its own name."""
+    from spook_tracker.tracker.document.json_form import encode
+
+    place = tmp_path / "abcdef123456"
+    for room in ("engine", "tracker"):
+        (place / room).mkdir(parents=True)
+        (place / room / "__init__.py").write_text(
+            "import engine  # as they did\n" if room == "tracker" else ""
+        )
+    (place / "answers.json").write_bytes(encode(night(0, one(0.1))))
+    (place / "tracker" / "__main__.py").write_text(
+        "import shutil, sys\nshutil.copy('answers.json', sys.argv[sys.argv.index('--json') + 1])\n"
+    )
+    document, whose = commits.ask_commit(place, ["t"])
+
+    assert whose == "its own questions"
+    assert [sample.value for sample in document.samples] == [0.1]
+
+
 def test_what_a_changed_definition_hides_is_told_by_the_old_one(tmp_path: Path) -> None:
     """The questions of an old commit, where the fall lasts half as long, are put to the engine of today."""
     import shutil

@@ -165,7 +165,10 @@ def call(search: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     # -S leaves out the finder of an editable install, here and in the worker processes it starts.
     path = os.pathsep.join([str(search), sysconfig.get_path("purelib")])
     environment = {**os.environ, "PYTHONPATH": path}
-    return _run([sys.executable, "-S", "-m", PACKAGE, *arguments], cwd=search, env=environment)
+    module = (
+        PACKAGE if (search / PACKAGE).exists() else "tracker"
+    )  # before the package its rooms lay at the top
+    return _run([sys.executable, "-S", "-m", module, *arguments], cwd=search, env=environment)
 
 
 def _with_todays_questions(place: Path) -> Path:
