@@ -40,7 +40,11 @@ _SEEN = _Seen()
 
 def clean(text: str) -> str:
     """Text from outside with what cannot be seen made visible: control and direction characters."""
-    return text if text.isprintable() else text.translate(_SEEN)
+    if text.isprintable():
+        return text
+    if text.replace("\n", "").replace("\N{NARROW NO-BREAK SPACE}", "").isprintable():
+        return text  # most of what else is not printable to Python
+    return text.translate(_SEEN)
 
 
 def inert(text: str) -> str:

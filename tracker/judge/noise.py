@@ -16,9 +16,11 @@ from __future__ import annotations
 import math
 from bisect import insort
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from msgspec.structs import replace
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.shifts import (

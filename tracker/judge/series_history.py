@@ -13,11 +13,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from functools import lru_cache
 
 import msgspec
+from msgspec.structs import replace
 
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
@@ -132,6 +133,12 @@ def judge_history(
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
+    versions, machines = (
+        {night.test_version for night in history},
+        {id(night.run.machine) for night in history},
+    )
+    if len(versions) == len(machines) == 1:
+        return [list(range(len(history)))]
     known: dict[
         tuple[str, int], list[int]
     ] = {}  # few machines and definitions: a name each, not one each night
@@ -191,7 +198,8 @@ def _judge_values(
     calm: Class | None = None  # what the night before stood for, if it can be repeated without a look
     gone: set[float] = set()  # bad values that had been mended
     lent: tuple[Point, Accepted] | None = None  # the level before one that is accepted until a day
-    for night in history:
+    looked = 0  # from here on nights were repeated without a look whether they are releases
+    for place, night in enumerate(history):
         if lent is not None and lent[1].over(night_of(night.run)):
             level, lent, calm = lent[0], None, None  # what was lent is due: the old level counts again
             release = settled = level
@@ -203,9 +211,9 @@ def _judge_values(
         ):
             yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
             level = night
-            if is_release(night.run):
-                release = night
             continue
+        release = next((old for old in reversed(history[looked:place]) if is_release(old.run)), release)
+        looked = place + 1
         own = standing(definition, night.sample)
         if own == "none":  # the engine cannot be asked this: nothing became of the level that holds
             unasked = Verdict(word="not_comparable", sentence="not supported by this engine")
@@ -301,7 +309,6 @@ def _repeats(before: Point, after: Point) -> bool:
         and old.outcome == new.outcome
         and old.set_point_held == new.set_point_held
         and (old.state_hash == new.state_hash or "" in (old.state_hash, new.state_hash))
-        and _comparable(before, after)
     )
 
 

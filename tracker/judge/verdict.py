@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+import msgspec
 
 from spook_tracker.tracker.document.run_document import (
     MapData,
@@ -45,8 +46,7 @@ NEW_DEFINITION = "the definition of the test changed"
 CELL_RANK = {"settled": 0, "bounded": 1, "growing": 2, "diverged": 3, "not_finite": 4}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     """What became of a value, in a word and a sentence; `name` is what to call a regression."""
 
     word: Word
@@ -229,7 +229,9 @@ def _rounding(definition: SeriesDefinition) -> float:
 
 def same_bits(a: float, b: float) -> bool:
     """Equal as stored: the sign of zero counts, every NaN equals every other."""
-    return struct.pack("<d", a) == struct.pack("<d", b) or (math.isnan(a) and math.isnan(b))
+    if a == b:
+        return a != 0.0 or math.copysign(1.0, a) == math.copysign(1.0, b)
+    return a != a and b != b
 
 
 def ulp_distance(a: float, b: float) -> int | None:

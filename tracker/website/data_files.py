@@ -114,6 +114,11 @@ def history_csv(book: Book, test: TestHistory) -> bytes:
 def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list[str]]:
     """The cells of each night in which any of these has a value; column by column, for there are many."""
     facts = {n.index: [inert(n.started), inert(n.engine.version), inert(n.engine.git_hash)] for n in nights}
+    every = list(facts)
+    if trends and all(t.nights == every for t in trends):  # nothing was left out: whole columns
+        columns = (map(repr, t.values) for t in trends)
+        yield from map(list, zip(*zip(*facts.values(), strict=True), *columns, strict=True))
+        return
     values = [dict(zip(t.nights, map(repr, t.values), strict=True)) for t in trends]
     shown = set().union(*values)
     for place, night in facts.items():

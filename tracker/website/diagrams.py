@@ -112,7 +112,8 @@ def trend_chart(
     turned = {i for i, now in enumerate(outcomes) if i and now != outcomes[i - 1]}
     places = sorted({*turning(values), *turned})  # a class may change where the value stands still
     places = [places[i] for i in thinned(len(places), MOST_NIGHTS)]
-    notes = tuple(_at_night(nights[at[i]], values[i], definition.unit, outcomes[i]) for i in places)
+    told = {pair: _told(*pair, definition.unit) for pair in {(values[i], outcomes[i]) for i in places}}
+    notes = tuple(f"{nights[at[i]].label}\n{told[values[i], outcomes[i]]}" for i in places)
     x = tuple(float(at[i]) for i in places)
     y = tuple(values[i] for i in places)
     lines = [Line(name="measured", x=x, y=y, style="both", notes=notes)]
@@ -123,7 +124,7 @@ def trend_chart(
                 Line(
                     name=name, style="broken", colour=1, x=tuple(float(at[i]) for i in broken),
                     y=tuple(values[i] for i in broken),
-                    notes=tuple(_at_night(nights[at[i]], values[i], definition.unit, outcome) for i in broken),
+                    notes=tuple(f"{nights[at[i]].label}\n{told[values[i], outcome]}" for i in broken),
                 )
             )  # fmt: skip
     began = [e for e in events if e.definition.key == trend.definition.key and e.first.index in at]
@@ -228,11 +229,11 @@ def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
     return "linear", [limit], ""
 
 
-def _at_night(night: Night, value: float, unit: str, outcome: str) -> str:
-    """What a point of a trend says."""
+def _told(value: float, outcome: str, unit: str) -> str:
+    """What a point of a trend says of its value."""
     shown = quantity(value, unit, 7) if math.isfinite(value) else ""
     word = WORDS.get(outcome, outcome)
-    return f"{night.label}\n{shown + ' · ' if shown else ''}{word}"
+    return f"{shown + ' · ' if shown else ''}{word}"
 
 
 def figure_chart(data: FigureData, prefix: str = "") -> Chart:

@@ -44,6 +44,13 @@ def plain(text: str) -> str:
     return clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
+def _all_plain(texts: Sequence[str]) -> list[str]:
+    """Many texts as Plotly shows them, ends of lines kept: in one go, where nothing in them is the mark between."""
+    between = "⁂|"
+    found = plain(between.join(texts)).replace("\n", "<br>").split(between)
+    return found if len(found) == len(texts) else [plain(text).replace("\n", "<br>") for text in texts]
+
+
 def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
     """Traces and layout of a chart, colours as slots in `meta`; `shown` is what can be drawn of it, where known."""
     chart = flattened(shown or drawable(chart))
@@ -217,5 +224,5 @@ def _trace(line: Line) -> dict[str, Any]:
         trace["error_x"] = {"type": "data", "symmetric": False, "array": far, "arrayminus": [0.0] * len(far),
                             "thickness": 1, "width": 0}  # fmt: skip
     if line.notes:
-        trace |= {"text": [plain(note).replace("\n", "<br>") for note in line.notes], "hoverinfo": "text"}
+        trace |= {"text": _all_plain(line.notes), "hoverinfo": "text"}
     return trace

@@ -7,6 +7,7 @@ picture has a title and a description and is drawn in fixed units that scale wit
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -27,6 +28,8 @@ WIDTH, HEIGHT = 640.0, 360.0
 LEFT, RIGHT, TOP, BOTTOM = 74.0, 14.0, 14.0, 50.0
 LETTER = 6.4  # width of a letter of the legend
 MOST_POINTS = 600  # of one line; more cannot be seen at this size
+MOST_MARKERS = 80  # of a line that is drawn itself
+WHOLE = re.compile(r"\.0(?![0-9])")  # what `_n` leaves out
 CELL_WORDS = ("settled", "bounded", "growing", "diverged", "not_finite")
 
 
@@ -242,6 +245,10 @@ def _mark(line: Line, x_of: Callable[[float], float], y_of: Callable[[float], fl
     mark = Mark(clean(line.name), f"{line.style} c{line.colour % 8}")
     pieces, pen, before = [], "M", 0.0
     places = thinned(len(line.x), MOST_POINTS)
+    if line.style == "both" and len(places) > MOST_MARKERS and all(map(math.isfinite, line.y)):
+        points = [f"{x_of(line.x[i]):.1f} {y_of(line.y[i]):.1f}" for i in places]
+        mark.path = WHOLE.sub("", f"M{'L'.join(points)}")
+        return mark
     for i in places:
         if not math.isfinite(line.y[i]):
             pen = "M"
@@ -253,7 +260,7 @@ def _mark(line: Line, x_of: Callable[[float], float], y_of: Callable[[float], fl
             pieces.append(f"{pen}{_n(x)} {_n(y)}")
             pen, before = "L", y
         if line.style in ("points", "both", "failed", "broken") and (
-            len(places) <= 80 or line.style != "both"
+            len(places) <= MOST_MARKERS or line.style != "both"
         ):
             mark.markers.append(
                 (
