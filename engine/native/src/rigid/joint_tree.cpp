@@ -14,6 +14,11 @@ constexpr int MOST_IN_A_TREE = 12;  // coordinates: beyond it blocks of bodies a
 constexpr int MOST_ROWS = 200;      // that close loops
 constexpr int FARTHEST = 24;        // off the diagonal: wider bands cost more than blocks
 
+/// Whether the joint holds both bodies where they are at the start.
+bool at_one_place(const JointConstants& joint) noexcept {
+    return norm(joint.span) <= 1e-12 * (norm(joint.first_arm) + norm(joint.second_arm));
+}
+
 /// What a joint lets its bodies do. False: not known here.
 bool freedom(const JointConstants& joint, bool backwards, int& turns, int& slides, Vec3* slide_axes) {
     const JointHolds holds = joint.holds;
@@ -34,7 +39,8 @@ void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet
     constants_ = constants;
     joints_ = &joints;
     coordinates_ = 0;
-    if (hang(tied) && close(start) && order()) return;
+    plane_.clear();
+    if (hang(tied) && close(start) && order()) return flatten();
     coordinates_ = 0;
 }
 
@@ -65,9 +71,7 @@ bool JointTree::hang(std::span<const int> tied) {
                 int turns = 0, slides = 0;
                 Vec3 axes[3];
                 const JointConstants& joint = joints_->constants(block.joint);
-                if (norm(joint.span) > 1e-12 * (norm(joint.first_arm) + norm(joint.second_arm)) ||
-                    !freedom(joint, backwards, turns, slides, axes))
-                    continue;
+                if (!at_one_place(joint) || !freedom(joint, backwards, turns, slides, axes)) continue;
                 hung[body] = static_cast<int>(found.size());
                 found.push_back({body, static_cast<int>(k), parent});
             }
@@ -325,6 +329,61 @@ bool JointTree::order() {
             loop.places.push_back(place_of_[nodes_[column.node].first + column.coordinate]);
     system_.prepare(coordinates_ + rows_, reach);
     return reach <= FARTHEST;
+}
+
+/// Takes the scene into a plane if nothing in it leaves one that two axes of the world span.
+void JointTree::flatten() {
+    constexpr double ROUNDING = 4e-16;  // of a unit vector
+    int normal = -1;
+    for (const Node& node : nodes_)
+        for (int i = 0; i < 3 && normal < 0 && node.turns == 1; ++i)
+            if (std::fabs(node.axis[i]) > 0.9) normal = i;
+    if (normal < 0) return;
+    const Plane3 flat{normal};
+    const auto lies = [&](Vec3 axis) { return std::fabs(axis[normal]) <= ROUNDING; };
+    const auto stands = [&](Vec3 axis) {
+        return std::fabs(axis[flat.first()]) <= ROUNDING && std::fabs(axis[flat.second()]) <= ROUNDING;
+    };
+    std::vector<PlaneTree::Node> nodes;
+    for (const Node& node : nodes_) {
+        if (node.coordinates() != 1 || !(node.turns == 1 ? stands(node.axis) : lies(node.slide_axes[0])))
+            return;
+        const BodyConstants& body = constants_[node.body];
+        const Vec3 axis{body.start_rotation(normal, 0), body.start_rotation(normal, 1),
+                        body.start_rotation(normal, 2)};
+        const Vec3 spin{body.inertia.x * axis.x, body.inertia.y * axis.y, body.inertia.z * axis.z};
+        const double inertia = dot(axis, spin);
+        if (!(norm(spin - inertia * axis) <= 4.0 * ROUNDING * inertia)) return;  // it would wobble
+        const Vec3 from_parent =
+            node.parent < 0 ? Vec3{} : body.start - constants_[nodes_[node.parent].body].start;
+        nodes.push_back({node.body, node.parent, node.end, node.slides == 1, place_of_[node.first],
+                         flat(node.parent_arm), flat(node.arm), flat(node.slide_axes[0]), flat(body.start),
+                         flat(from_parent), node.mass, inertia, node.extent});
+    }
+    std::vector<PlaneTree::Closing> closings;
+    for (const Closing& loop : loops_) {
+        const JointBlock& block = joints_->blocks()[loop.block];
+        const JointConstants& joint = joints_->constants(block.joint);
+        if (loop.kept != 2 || loop.row[1] >= joint.holds.linear() || !at_one_place(joint)) return;
+        for (int r = 0; r < 2; ++r)
+            if (!lies(joint.axes[joint.holds.linear_first + loop.row[r]])) return;
+        const auto end = [&](int node, int body, Vec3 arm) -> PlaneTree::Closing::End {
+            const Vec3 start = body < 0 ? Vec3{} : constants_[body].start;
+            return {node, body, flat(arm), flat(start + arm)};
+        };
+        PlaneTree::Closing closing;
+        closing.first = end(loop.first, block.first, joint.first_arm);
+        closing.second = end(loop.second, block.second, joint.second_arm);
+        closing.at = loop.at;
+        for (int r = 0; r < 2; ++r) closing.places[r] = place_of_[coordinates_ + loop.at + r];
+        for (const Closing::Column& column : loop.columns) {
+            const Node& node = nodes_[column.node];
+            closing.columns.push_back(
+                {column.node, place_of_[node.first], loop.second >= column.node && loop.second < node.end});
+        }
+        closings.push_back(closing);
+    }
+    plane_.take(flat, std::move(nodes), std::move(closings), system_.reach(), scale_);
 }
 
 bool JointTree::holds(const LargeArray<BodyState>& bodies) {

@@ -18,6 +18,7 @@
 
 #include "linear/band_lu.hpp"
 #include "rigid/joint_set.hpp"
+#include "rigid/plane_tree.hpp"
 
 namespace spook {
 
@@ -31,6 +32,8 @@ public:
     int coordinates() const noexcept { return coordinates_; }
     /// Rows that close loops.
     int rows() const noexcept { return rows_; }
+    /// The axis of the world that all hinges turn about and all slides lie across (0: x), if numbers of a plane do; −1.
+    int across() const noexcept { return plane_.empty() ? -1 : plane_.normal(); }
     /// Whether the joints of the forest hold where the bodies are, as joint coordinates take for granted.
     bool holds(const LargeArray<BodyState>& bodies);
 
@@ -94,6 +97,7 @@ private:
     void drop_fulfilled_rows();
     bool independent(const LargeArray<BodyState>& start);
     bool order();
+    void flatten();
     void take(const LargeArray<BodyState>& bodies) noexcept;
     bool look_at(const double* increments) noexcept;
     void move(double tau) noexcept;
@@ -122,6 +126,7 @@ private:
     std::vector<double> right_, step_;
     std::vector<Vec3> pushes_, twists_;
     BandLu system_;
+    PlaneTree plane_;
     int coordinates_ = 0, rows_ = 0, trees_ = 0;
     double scale_ = 1.0;  // kg m²: of the inertias that coordinates feel
 };

@@ -10,11 +10,7 @@ namespace spook {
 
 namespace {
 
-constexpr int MOST_ROUNDS = 20;
-constexpr double FARTHEST = 0.5;   // rad or sizes of a joint: a first step beyond it leads to other solutions
-constexpr double SETTLED = 1e-13;  // of a step: rounding
-constexpr double NEAR = 3e-9;      // from where on one more step is beyond rounding
-constexpr double FRESH = 0.05;     // left by a step: beyond it a new derivative is cheaper than more steps
+using Rounds = JointRounds;
 
 Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 Vec3 vector_of(Quat q) noexcept { return {q.x, q.y, q.z}; }
@@ -306,6 +302,7 @@ void JointTree::fill_loops(bool derivatives) noexcept {
 
 bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
                       std::int64_t& rounds) noexcept {
+    if (!plane_.empty()) return plane_.stage(tau, bodies, increments, rounds);
     take(bodies);
     if (!look_at(increments)) return false;
     for (const Closing& loop : loops_) {
@@ -339,7 +336,7 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
                 step_[node.first + i] = step;
                 if (!(off <= size)) size = off;
             }
-        if (!(size < FARTHEST) || round == MOST_ROUNDS) return false;
+        if (!(size < Rounds::FARTHEST) || round == Rounds::MOST) return false;
         turn_by(step_.data());
         for (int row = 0; row < rows_; ++row) multiplier_[row] += right_[place_of_[coordinates_ + row]];
         for (const Course& course : courses_)
@@ -347,8 +344,10 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
         // What a step leaves: the share of it that the last one left; with a fresh derivative the square of it.
         const double rate = round > 0 ? size / before : loops_.empty() ? size : 1.0;
         const double left = rate * (fresh && round > 0 ? rate * size : size);
-        if (size < SETTLED || (size < NEAR && left < 1e-17 * moved) || (size < NEAR && rate > 0.5)) break;
-        fresh = (round > 0 ? rate : size) > FRESH;
+        if (size < Rounds::SETTLED || (size < Rounds::NEAR && left < 1e-17 * moved) ||
+            (size < Rounds::NEAR && rate > 0.5))
+            break;
+        fresh = (round > 0 ? rate : size) > Rounds::FRESH;
         before = size;
     }
     for (const Course& course : courses_)
