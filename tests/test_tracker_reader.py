@@ -67,6 +67,21 @@ assert not heavy, heavy
     assert done.returncode == 0, done.stderr[-2000:]
 
 
+def test_a_website_a_trend_and_a_verdict_are_made_without_sqlalchemy(database: str, tmp_path: Path) -> None:
+    asked = [["publish", "--out", str(tmp_path / "site")], ["trend", "pendulum"], ["judge", "two"]]
+    script = f"""
+import sys
+from click.testing import CliRunner
+from spook_tracker.tracker.cli.main import main
+for command in {asked!r}:
+    result = CliRunner().invoke(main, [*command, "--db", {database!r}])
+    assert result.exit_code in (0, 1), result.output + result.stderr
+    assert "sqlalchemy" not in sys.modules, command
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
 @pytest.mark.parametrize(
     "statement",
     [

@@ -228,11 +228,14 @@ def publish(
     `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links. `mutants` is the record that `make mutants` writes.
     `documents` is a folder of HTML files that is published with it, as docs/.
     """
-    from spook_tracker.tracker.store.offered import database_file
     from spook_tracker.tracker.website.page_mutants import read_mutants
     from spook_tracker.tracker.website.publish import publish as build
 
-    offered = database_file(database) if database else None
+    offered = None
+    if database:
+        from spook_tracker.tracker.store.offered import database_file
+
+        offered = database_file(database)
     wrong = read_mutants(mutants) if mutants else ()
     return build(history, out, accepted, offered, title, home_page, wrong, colour, documents)
 
