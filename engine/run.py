@@ -56,9 +56,10 @@ def start(
     """Hold a scene at its start, or at `state`: bodies by name, (13,) each, as `Result.final_state` has them.
 
     `observe` names quantities that `run["name"]` reads whenever asked. Stepping in pieces gives the bits of one
-    `simulate` over all steps. A run continued from a `state` gives them only where the state says it all: turns of
-    hinges count from the angle within ±π, contacts and iterative solvers start cold, and with mid-step velocities
-    the start is made anew; `Run.save` and `Run.restore` keep every bit.
+    `simulate` over all steps. A run continued from a `state` gives them where the state says it all, as of particles
+    whose rows are solved directly. Rigid bodies go on to rounding: they keep how far they moved, turned and what spins
+    them. Turns of hinges count from the angle within ±π, contacts and iterative solvers start cold, and with mid-step
+    velocities the start is made anew; `Run.save` and `Run.restore` keep every bit.
     """
     if not isinstance(observe, Mapping):
         raise MethodError(f"observe must map names to quantities, not {observe!r}")

@@ -11,6 +11,7 @@ from spook_tracker.engine import (
     AngularMomentum,
     CentralGravity,
     Energy,
+    Final,
     Load,
     Method,
     Momentum,
@@ -165,3 +166,27 @@ def test_half_steps_bring_the_planet_from_2e_4_to_below_1e_6_m() -> None:
     for method, error in ((Method(), 2.51e-4), (HALF_STEPS, 5.25e-7)):
         t, x, _ = traced(planet(), 1 / 60, 72_000, method)
         assert np.linalg.norm(x[-1, :2] - kepler(t[-1:])[0]) == pytest.approx(error, rel=0.01)
+
+
+@pytest.mark.parametrize(("viscosity", "order"), [(0.0, 2.0), (1.5, 1.0)])
+def test_half_steps_are_of_order_2_but_where_a_force_follows_the_velocity(
+    viscosity: float, order: float
+) -> None:
+    """m x'' = −k x − c x' against its closed form; the force of a step sees the velocity of half a step before."""
+    k, mass, end = 20.0, 1.0, 1.0
+    decay = 0.5 * viscosity / mass
+    pace = math.sqrt(k / mass - decay**2)
+    exact = 0.5 * math.exp(-decay * end) * (math.cos(pace * end) + decay / pace * math.sin(pace * end))
+    spring = Spring(
+        name="s", between=((0.0, 0.0, 0.0), "p"), stiffness=k, rest_length=1.0, viscosity=viscosity
+    )
+    scene = Scene(bodies=(Particle(name="p", mass=mass, position=(1.5, 0.0, 0.0)),), forces=(spring,))
+    seen = {"x": Final(quantity=Position("p"))}
+    errors = [
+        float(simulate(scene, time_step=h, duration=end, method=HALF_STEPS, observe=seen)["x"][0])
+        - 1.0
+        - exact
+        for h in (1 / 400, 1 / 800)
+    ]
+
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.02)

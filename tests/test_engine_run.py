@@ -429,3 +429,13 @@ def test_a_hinge_that_is_held_counts_its_turns() -> None:
         run.step(500)
 
         assert float(run["angle"]) == pytest.approx(25.0, abs=0.05)
+
+
+def test_particles_on_rows_go_on_from_a_final_state_with_the_same_bits() -> None:
+    scene = particle_scenes.chain(rng())
+    whole = simulate(scene, time_step=0.01, steps=80)
+    half = simulate(scene, time_step=0.01, steps=33)
+    with start(scene, time_step=0.01, state=half.final_state) as run:
+        run.step(47)
+
+        assert run.result().state_hash == whole.state_hash
