@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -121,6 +122,15 @@ def _peer(name: str) -> Any:
         else:
             how = f"install it with: pip install 'spook-tracker[{name}]'"
         raise EngineMissing(f"engine {name!r} is not installed ({error}); {how}") from None
+    except Exception as error:
+        raise EngineMissing(f"engine {name!r} does not load: {thrown(error)}") from None
+
+
+def thrown(error: Exception) -> str:
+    """What a module of somebody else raised while it was imported, and where, in a line."""
+    *_, last = traceback.extract_tb(error.__traceback__)
+    told = " ".join(str(error).split())
+    return f"{type(error).__name__}: {told} ({last.filename}, line {last.lineno})"
 
 
 def _loaded(name: str, load: Any) -> Any:
@@ -131,3 +141,5 @@ def _loaded(name: str, load: Any) -> Any:
         raise EngineMissing(
             f"there is no engine {name!r} ({error}); name one of {names}, or a module, or module:attribute"
         ) from None
+    except Exception as error:
+        raise EngineMissing(f"engine {name!r} does not load: {thrown(error)}") from None

@@ -17,6 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from spook_tracker.engine.find import thrown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
@@ -57,6 +58,8 @@ def _one(name: str) -> Mapping[str, ScalarTest]:
                 "or name tests of your own with --catalogue or in tracker.toml"
             ) from None
         raise CatalogueError(f"there is no catalogue {name!r} ({error}); name one as module:NAME") from None
+    except Exception as error:
+        raise CatalogueError(f"catalogue {name!r} does not load: {thrown(error)}") from None
     if not fit:
         raise CatalogueError(f"{name!r} is no catalogue: a mapping from name to ScalarTest")
     catalogue: Mapping[str, ScalarTest] = found
