@@ -57,7 +57,7 @@ def test_an_engine_and_a_catalogue_that_are_announced_are_asked_by_name(tracker:
 def test_one_that_does_not_load_is_named_in_a_sentence(tracker: Any) -> None:
     with pytest.raises(EngineMissing, match=r"'torn' .*RuntimeError: its library is of another age"):
         find("torn")
-    with pytest.raises(EngineMissing, match="'gone' .*of_a_team.gone"):
+    with pytest.raises(EngineMissing, match=r"'gone' .*of_a_team\.gone"):
         find("gone")
     done = tracker("run", "--engine", "ours", "--catalogue", "torn", "--no-record", "--workers", "0")
     assert done.exit_code == 2
