@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,8 @@ try:
     JOLT = find("jolt")
 except EngineMissing as reason:
     pytest.skip(str(reason), allow_module_level=True)
+
+import spook_tracker.engine.peers.jolt as jolt
 
 STEP = 1.0 / 60.0  # s
 
@@ -174,3 +177,19 @@ def test_what_it_lacks_is_not_supported_by_name() -> None:
 @pytest.mark.parametrize("kind", [Hinge, Prismatic])
 def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(kind: Any) -> None:
     assert peer_scenes.braked(JOLT.simulate, kind) == pytest.approx(peer_scenes.BRAKED, abs=5e-3)
+
+
+def test_where_the_package_shows_no_fixed_body_one_of_ours_holds_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Packages before 1.1.0: played by a script that does not look for it."""
+    text = jolt.SCRIPT.read_text(encoding="utf-8")
+    shown = "J.JoltInterface.prototype.sGetFixedToWorldBody?.()"
+    assert text.count(shown) == 1
+    (tmp_path / "jolt.mjs").write_text(text.replace(shown, "undefined"), encoding="utf-8")
+    (tmp_path / "loop.mjs").write_bytes(jolt.SCRIPT.with_name("loop.mjs").read_bytes())
+    held = [JOLT.simulate(peer_scenes.hung(kind), time_step=STEP, steps=30) for kind in (Ball, Hinge)]
+    monkeypatch.setattr(jolt, "SCRIPT", tmp_path / "jolt.mjs")
+    alone = [JOLT.simulate(peer_scenes.hung(kind), time_step=STEP, steps=30) for kind in (Ball, Hinge)]
+
+    assert [run.state_hash for run in held] == [run.state_hash for run in alone]

@@ -73,7 +73,13 @@ serve(async (task) => {
 
   const bodies = task.bodies.map(bodyOf);
   system.OptimizeBroadPhase();
-  const world = J.Body.prototype.sFixedToWorld ?? J.JoltInterface.prototype.sGetFixedToWorldBody();
+  // What constraints to the world hold on to; packages before 1.1.0 have none, so a body without a shape stands for it.
+  const world =
+    J.Body.prototype.sFixedToWorld ??
+    J.JoltInterface.prototype.sGetFixedToWorldBody?.() ??
+    interface_.CreateBody(
+      new J.BodyCreationSettings(new J.EmptyShape(), place([0, 0, 0]), quat([1, 0, 0, 0]), J.EMotionType_Static, 0),
+    );
 
   function settingsOf(one) {
     if (one.kind === "distance") {
