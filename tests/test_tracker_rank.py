@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from spook_tracker.tracker.cli.main import main
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
+from spook_tracker.tracker.document.run_document import Asked, Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.judge.rank import leads, standings
 from spook_tracker.tracker.library import record
 from tests.run_documents import definition as any_definition
@@ -153,3 +153,83 @@ def test_a_ladder_without_a_rung_there_is_not_an_engine_that_failed() -> None:
     (one,) = standings({"a": rungs("euler", {1 / 1000: (1e-3, 1.0)})})  # type: ignore[dict-item]
 
     assert (one.error, one.outcome) == (None, "no such step")
+
+
+def asked(tests: tuple[str, ...], *, whole: bool = False, families: Any = ("values", "sweep")) -> Asked:
+    return Asked(tests=tests, families=families, whole=whole)
+
+
+def of_test(name: str, found: dict[str, Any]) -> dict[str, Any]:
+    """The same ladder as one of another test."""
+    renamed = {}
+    for key, (definition, sample) in found.items():
+        key = key.replace("scene/", f"{name}/", 1)
+        renamed[key] = (
+            msgspec.structs.replace(definition, key=key, test=name),
+            msgspec.structs.replace(sample, series=key),
+        )
+    return renamed
+
+
+def night(found: dict[str, Any], day: int, of: Asked, version: str = "4.0", place: str = "one") -> Any:
+    return run(
+        engine=engine("", name="mujoco", version=version, commit_time="", parents=()),
+        machine=machine(fingerprint=place),
+        series=tuple(definition for definition, _ in found.values()),
+        samples=tuple(sample for _, sample in found.values()),
+        asked=of,
+        started=f"2026-11-{day:02}T03:00:00Z",
+        finished=f"2026-11-{day:02}T04:00:00Z",
+    )
+
+
+def test_of_tests_that_the_latest_run_was_not_asked_the_one_before_answers(tmp_path: Path) -> None:
+    """Of the same version and machine, back to the first that was asked everything with ladders."""
+    database = f"sqlite:///{tmp_path}/history.db"
+    plain, fine = both().values()
+    other, third = of_test("other", plain), of_test("third", plain)
+    everything = ("scene", "other", "third")
+    for one in (
+        night(third, 1, asked(everything, whole=True)),  # before the whole one: forgotten
+        night({**plain, **other}, 2, asked(everything, whole=True)),
+        night(third, 3, asked(("third",)), version="3.9"),  # of another version
+        night(third, 4, asked(("third",)), place="elsewhere"),  # on another machine
+        night({}, 5, asked(everything, whole=True, families=("values",))),  # whole, but no ladders
+        night(fine, 6, asked(("scene",))),
+    ):
+        record(one, database)
+
+    done = CliRunner().invoke(main, ["rank", "mujoco", "--db", database])
+    alone = CliRunner().invoke(main, ["rank", "mujoco@4.0", "--db", database])
+
+    lines = [" ".join(line.split()) for line in done.output.splitlines()]
+    assert done.exit_code == 0, done.output
+    assert "scene path [m] mujoco 0.001 (rk4) 5 ms 8.9 ms 28 ms" in lines
+    assert "other path [m] mujoco 0.1 (euler) 1 ms - -" in lines
+    assert "third" not in done.output
+    assert "other" not in alone.output and "scene" in alone.output
+
+
+def test_two_engines_are_compared_on_the_tests_that_are_named(tmp_path: Path) -> None:
+    plain, fine = both().values()
+    both_tests = ({**found, **of_test("other", found)} for found in (plain, fine))
+    keys = (("spook", "1.0"), ("mujoco", "3.4.0"))
+    database = recorded(tmp_path, dict(zip(keys, both_tests, strict=True)))
+
+    done = CliRunner().invoke(main, ["compare", "spook", "mujoco", "--test", "other", "--db", database])
+
+    assert done.exit_code == 0
+    assert "other path" in done.output and "scene path" not in done.output
+
+
+def test_an_engine_that_is_not_recorded_is_said_to_be_that(tmp_path: Path) -> None:
+    database = recorded(tmp_path, {("spook", "1.0"): both()["plain 1"]})
+
+    ranked = CliRunner().invoke(main, ["rank", "drake", "--db", database])
+    compared = CliRunner().invoke(main, ["compare", "drake", "spook", "--db", database])
+    mixed = CliRunner().invoke(main, ["compare", "1.0", "spook", "--db", database])
+
+    assert (ranked.exit_code, compared.exit_code, mixed.exit_code) == (2, 2, 2)
+    assert "no run of an engine 'drake' is recorded, only of spook" in ranked.stderr
+    assert compared.stderr == ranked.stderr
+    assert "'spook' is an engine: compare it with another one that is recorded" in mixed.stderr

@@ -83,11 +83,13 @@ def compare(
 ) -> None:
     """Say what changed between two versions.
 
-    V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green.
+    V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green; or V1 and
+    V2 are two engines by name, which are ranked: at equal error, who is ahead where and by what factor.
     Previous to the latest is the run before it on its own branch.
     V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
     annotations are for pull requests, and empty when nothing became worse.
     """
+    from spook_tracker.engine.find import known
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import FORK_POINT
@@ -95,10 +97,11 @@ def compare(
 
     levels, choice = accepted_levels(accepted), Choice(tests=tests, kinds=kinds, roles=roles)
     with history_of(database) as history:
-        if form == "table" and {before, after} <= {run.engine.name for run in history.runs()}:
+        engines = {run.engine.name for run in history.runs()} | set(known())
+        if form == "table" and {before, after} <= engines:
             import spook_tracker.tracker.cli.rank as ranking
 
-            say("\n".join(ranking.table_lines(history, (before, after))))  # two engines: nobody regressed
+            say("\n".join(ranking.table_lines(history, (before, after), tests)))  # nobody regressed
             return
         old = before if before == FORK_POINT else of_engine(engine, before)
         document = compared(history, old, of_engine(engine, after), levels)

@@ -19,7 +19,8 @@ from spook_tracker.tracker.cli.options import database_option, example
 def rank(engines: tuple[str, ...], tests: tuple[str, ...], database: str) -> None:
     """Table of engines and scenes: error at h = 1/60, run time to reach 1e-2, 1e-4 and 1e-6.
 
-    ENGINE is a name (its latest run) or name@version; without any, every engine that is recorded.
+    ENGINE is a name or name@version; without any, every engine that is recorded. Of a name it is the latest run, and for
+    tests that it was not asked those before it on the same machine: of the same version, or of earlier commits.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import history_of
@@ -43,9 +44,10 @@ def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -
 
     runs = {name: history.resolve(name if "@" in name else f"{name}@latest") for name in names}
     titles = _titles([run.engine for run in runs.values()])
-    found = ranks.standings(
-        {title: history.samples(run.id) for title, run in zip(titles, runs.values(), strict=True)}
-    )
+    answered = [
+        history.samples(run.id) if "@" in name else _newest(history, run) for name, run in runs.items()
+    ]
+    found = ranks.standings(dict(zip(titles, answered, strict=True)))
     if tests:
         found = [one for one in found if any(fnmatchcase(one.test, pattern) for pattern in tests)]
     if not found:
@@ -73,6 +75,25 @@ def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -
     if len(titles) == 2:
         lines += _ahead(ranks.leads(found, *titles), ranks.ERRORS)
     return lines
+
+
+def _newest(history: Any, latest: Any) -> dict[str, Any]:
+    """The ladders of a run, and of tests it was not asked those of the newest run before that was."""
+    found: dict[str, Any] = {}
+    earlier = [
+        run
+        for run in history.runs(latest.engine.name)
+        if run.machine.fingerprint == latest.machine.fingerprint
+        and (run.engine.version == latest.engine.version or run.engine.git_hash)
+        and run.started_at <= latest.started_at
+    ]
+    for run in sorted(earlier, key=lambda run: run.started_at, reverse=True):
+        told = {definition.test for definition, _ in found.values()}
+        ladders = ((key, one) for key, one in history.samples(run.id).items() if one[0].kind == "ladder")
+        found |= {key: one for key, one in ladders if one[0].test not in told}
+        if run.asked is None or (run.asked.whole and "sweep" in run.asked.families):
+            break
+    return found
 
 
 def _titles(engines: Sequence[Any]) -> list[str]:

@@ -22,6 +22,7 @@ from spook_tracker.tracker.document.about import about
 from spook_tracker.tracker.document.errors import UnknownName
 
 SHORTEST = 4  # characters of a hash or an id
+MOST_NAMED = 12  # engines in a sentence
 WORDS = ("latest", "previous", "last-green")
 
 
@@ -136,6 +137,19 @@ def _unknown(runs: Sequence[RunInfo], name: str) -> UnknownName:
         return UnknownName("there is only one run, and so no previous one; record another with: tracker run")
     if name == "last-green":
         return UnknownName("no run has passed all its gates yet; name a version instead")
+    engines = list(dict.fromkeys(run.engine.name for run in runs))
+    asked, at, _ = name.rpartition("@")
+    if at and name.endswith(("@latest", "@previous")) and asked not in engines:
+        only = ", ".join(engines[:MOST_NAMED])
+        return UnknownName(
+            f"no run of an engine {asked[:80]!r} is recorded, only of {only}", tuple(engines[:1])
+        )
+    if name in engines:
+        return UnknownName(
+            f"{name!r} is an engine: compare it with another one that is recorded, or name a version of it, as in "
+            f"{name}@latest",
+            (f"{name}@latest",),
+        )
     names = [run.engine.version for run in reversed(runs)]
     names += [run.engine.git_hash[:12] for run in reversed(runs) if run.engine.git_hash]
     unique = list(dict.fromkeys(names))
