@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
+from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.measure.other_tools import of_other_tools
 
@@ -131,6 +134,7 @@ def test_what_is_nobody_elses_is_left_to_others(said: Any) -> None:
         PYTEST | {"benchmarks": [{"fullname": "x", "stats": {"data": [-1.0]}}]},
         PYTEST | {"benchmarks": [{"fullname": "x", "stats": {"data": ["fast"]}}]},
         GOOGLE | {"benchmarks": [{"name": "x", "real_time": 1.0, "time_unit": "years"}]},
+        ASV | {"result_columns": 3},
         ASV | {"date": "yesterday"},
         ASV | {"date": 1e300},
         ACTION | {"entries": {"x": [{}]}},
@@ -143,3 +147,43 @@ def test_what_makes_no_sense_is_one_sentence(said: Any) -> None:
 
     assert str(refused.value).startswith("file")
     assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("before", "said"),
+    [(b"", PYTEST), (b"", GOOGLE), (b"", ASV), (b"window.BENCHMARK_DATA = ", ACTION)],
+    ids=["pytest-benchmark", "google", "asv", "action"],
+)
+def test_the_command_takes_each_of_them(before: bytes, said: Any, tmp_path: Path) -> None:
+    """A file of asv has results, like our own short form, and is not mistaken for one."""
+    file = tmp_path / "said.json"
+    file.write_bytes(before + json.dumps(said).encode())
+
+    done = CliRunner().invoke(main, ["import", str(file), "--db", f"sqlite:///{tmp_path}/history.db"])
+
+    assert done.exit_code == 0, done.output
+    assert f"{len(read(said, before))} runs recorded" in done.output
+
+
+def test_aggregates_alone_give_their_median_and_an_older_file_names_no_machine() -> None:
+    context = {"date": "2026-11-01T11:00:00+00:00", "num_cpus": 2}
+    each = {"run_name": "BM", "run_type": "aggregate", "time_unit": "us"}
+    told = [
+        {"name": f"BM_{kind}", "aggregate_name": kind, "real_time": time} | each
+        for kind, time in (("mean", 13.0), ("median", 12.0), ("stddev", 0.5))
+    ]
+    (run,) = read({"context": context, "benchmarks": told})
+
+    assert values(run) == {"BM": (pytest.approx(1.2e-5), "s", "smaller")}
+    assert run.machine.fingerprint == "unknown"
+
+
+def test_what_failed_is_left_out_and_no_commit_is_made_up() -> None:
+    (failed,) = read(ASV | {"results": ASV["results"] | {"bench.gone": None}})
+    entry = ACTION["entries"]["Engine"][0]
+    torn = entry | {"benches": [*entry["benches"], {"name": "nan", "value": None, "unit": "ms"}]}
+    (kept,) = read(ACTION | {"entries": {"Engine": [torn]}}, b"window.BENCHMARK_DATA = ")
+    (unknown,) = read(PYTEST | {"commit_info": {"id": "unversioned", "time": None}})
+
+    assert len(failed.samples) == 4 and len(kept.samples) == 1
+    assert (unknown.engine.git_hash, unknown.engine.version) == ("", "unknown")

@@ -93,10 +93,10 @@ def _short(files: tuple[Path, ...]) -> dict[Path, tuple[Any, ...]]:
         if not file.is_file() or file.stat().st_size > MAX_BYTES:
             continue
         content = file.read_bytes()
-        if is_short(content):
-            found[file] = (whole(content, str(file)),)
-        elif (runs := of_other_tools(content, str(file))) is not None:
+        if (runs := of_other_tools(content, str(file))) is not None:
             found[file] = runs
+        elif is_short(content):  # only then: asv's files have results, too
+            found[file] = (whole(content, str(file)),)
     return found
 
 

@@ -60,13 +60,14 @@ def _reader(said: Mapping[str, Any]) -> Any:
     if isinstance(said.get("benchmarks"), list):
         if "machine_info" in said and "commit_info" in said:
             return _pytest
-        if isinstance(context := said.get("context"), dict) and "host_name" in context:
+        if isinstance(context := said.get("context"), dict) and "num_cpus" in context:
             return _google
     return None
 
 
 def _pytest(said: Mapping[str, Any]) -> Iterator[ShortRun]:
     commit = said["commit_info"]
+    known = commit.get("id") if commit.get("id") != "unversioned" else ""
     results = []
     for one in said["benchmarks"]:
         stats = one["stats"]
@@ -74,8 +75,8 @@ def _pytest(said: Mapping[str, Any]) -> Iterator[ShortRun]:
         results.append(_timed(one["fullname"], [float(s) for s in seconds]))
     yield ShortRun(
         engine=commit.get("project") or "unknown",
-        version=(commit.get("id") or "unknown")[:10],
-        commit=commit.get("id") or "",
+        version=(known or "unknown")[:10],
+        commit=known or "",
         commit_time=commit.get("time") or "",
         started=said.get("datetime") or "",
         machine=said["machine_info"].get("node") or "unknown",
@@ -84,18 +85,22 @@ def _pytest(said: Mapping[str, Any]) -> Iterator[ShortRun]:
 
 
 def _google(said: Mapping[str, Any]) -> Iterator[ShortRun]:
-    """Repetitions of one name are its repeats; the aggregates made of them are left out."""
+    """Repetitions of one name are its repeats; of aggregates the median counts, where they are all there is."""
     context = said["context"]
     seconds: dict[str, list[float]] = {}
+    medians: dict[str, list[float]] = {}
     for one in said["benchmarks"]:
-        if one.get("run_type", "iteration") == "iteration" and not one.get("error_occurred"):
+        run = one.get("run_type", "iteration") == "iteration" and not one.get("error_occurred")
+        if run or one.get("aggregate_name") == "median":
             taken = float(one["real_time"]) * UNITS[one.get("time_unit", "ns")]
-            seconds.setdefault(one.get("run_name") or one["name"], []).append(taken)
+            name = one.get("run_name") or one["name"]
+            (seconds if run else medians).setdefault(name, []).append(taken)
+    seconds = medians | seconds
     yield ShortRun(
         engine=str(context.get("executable", "unknown")).rpartition("/")[2] or "unknown",
         version=str(context.get("git_version") or context["date"]),
         started=context["date"],
-        machine=context["host_name"],
+        machine=context.get("host_name") or "unknown",
         results=tuple(_timed(name, repeats) for name, repeats in seconds.items()),
     )
 
@@ -105,7 +110,7 @@ def _asv(said: Mapping[str, Any]) -> Iterator[ShortRun]:
     columns = said["result_columns"]
     results = []
     for name, row in said["results"].items():
-        told = dict(zip(columns, row, strict=False))
+        told = dict(zip(columns, row or (), strict=False))
         values = told.get("result") or []
         for place, value in enumerate(values):
             if value is not None and math.isfinite(float(value)):
@@ -134,7 +139,7 @@ def _github_action(said: Mapping[str, Any]) -> Iterator[ShortRun]:
                 commit=commit["id"],
                 commit_time=commit.get("timestamp") or "",
                 started=datetime.fromtimestamp(float(entry["date"]) / 1e3, UTC).isoformat(),
-                results=tuple(_bench(one, larger) for one in entry["benches"]),
+                results=tuple(_bench(one, larger) for one in entry["benches"] if one["value"] is not None),
             )
 
 
