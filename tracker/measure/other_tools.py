@@ -44,6 +44,7 @@ def of_other_tools(content: bytes, origin: str) -> tuple[RunDocument, ...] | Non
         AttributeError,
         IndexError,
         OverflowError,
+        OSError,  # a moment that no calendar has
         msgspec.ValidationError,
     ) as error:
         words = f"{type(error).__name__}: {error!s:.120}"
