@@ -106,18 +106,23 @@ Polygon clipped(const Polygon& in, Vec3 on, Vec3 out, double slop, std::uint32_t
     return kept;
 }
 
-/// The manifold of `reference`'s face against the face of `incident` that looks most against it; `flip` is −1 if the
-/// face's normal points from first to second.
-void add_faces(Manifold& manifold, const Solid& reference, int index, const Solid& incident, double flip,
-               double margin, double slop) noexcept {
-    const Polytope::Face& face = reference.face(index);
-    const Vec3 n = reference.normal(index);
+/// The face of a solid that looks most against a direction.
+int most_against(Vec3 n, const Solid& solid) noexcept {
     int opposite = 0;
     double against = 1e300;
-    for (int k = 0; k < static_cast<int>(incident.shape.faces.size()); ++k) {
-        const double cosine = dot(n, incident.normal(k));
+    for (int k = 0; k < static_cast<int>(solid.shape.faces.size()); ++k) {
+        const double cosine = dot(n, solid.normal(k));
         if (cosine < against - 1e-9) against = cosine, opposite = k;
     }
+    return opposite;
+}
+
+/// The manifold of `reference`'s face against the face `opposite` of `incident`; `flip` is −1 if the first's normal
+/// points from first to second.
+void add_faces(Manifold& manifold, const Solid& reference, int index, const Solid& incident, int opposite,
+               double flip, double margin, double slop) noexcept {
+    const Polytope::Face& face = reference.face(index);
+    const Vec3 n = reference.normal(index);
     // Eight corners and as many sides take five bits, twice as many six.
     Polygon polygon;
     const Polytope::Face& other = incident.face(opposite);
@@ -163,6 +168,26 @@ void add_edges(Manifold& manifold, const Solid& first, const Solid& second, cons
     if (gap <= margin) manifold.add(0.5 * (p + q), edges.normal, gap, feature);
 }
 
+double deepest_gap(const Manifold& manifold) noexcept {
+    double least = 1e300;
+    for (int k = 0; k < manifold.count; ++k) least = std::min(least, manifold.points[k].gap);
+    return least;
+}
+
+/// Of all faces that look against the reference face, the one that reaches deepest below it: the face that looks most
+/// against it may be cut off where a sharp solid is already through.
+Manifold deepest_faces(const Solid& reference, int index, const Solid& incident, double flip, double margin,
+                       double slop) noexcept {
+    Manifold best;
+    for (int k = 0; k < static_cast<int>(incident.shape.faces.size()); ++k) {
+        if (!(dot(reference.normal(index), incident.normal(k)) < 0.0)) continue;
+        Manifold tried;
+        add_faces(tried, reference, index, incident, k, flip, margin, slop);
+        if (deepest_gap(tried) < deepest_gap(best)) best = tried;
+    }
+    return best;
+}
+
 /// Where no polygon is left: the corner of `other` that is deepest below the face.
 void add_deepest(Manifold& manifold, const Solid& reference, int index, const Solid& other,
                  double flip) noexcept {
@@ -190,13 +215,18 @@ Manifold solid_solid(const Primitive& one, const Pose& at_first, const Primitive
         return manifold;
     }
     const bool theirs = axes.second_face.gap > axes.first_face.gap + prefer;
-    if (theirs) add_faces(manifold, second, axes.second_face.second, first, 1.0, margin, slop);
-    else add_faces(manifold, first, axes.first_face.first, second, -1.0, margin, slop);
-    if (manifold.count > 0 || face > 0.0) return manifold;
-    // Overlapping, yet no corner of a face inside the other: only near ties of the axes end here.
+    const Solid &reference = theirs ? second : first, &incident = theirs ? first : second;
+    const int index = theirs ? axes.second_face.second : axes.first_face.first;
+    const double flip = theirs ? 1.0 : -1.0;
+    const int opposite = most_against(reference.normal(index), incident);
+    add_faces(manifold, reference, index, incident, opposite, flip, margin, slop);
+    if (face > 0.0 || (manifold.count > 0 && (face > -slop || deepest_gap(manifold) < 0.0))) return manifold;
+    // Overlapping, yet nothing of that face inside the other.
+    manifold = deepest_faces(reference, index, incident, flip, margin, slop);
+    if (deepest_gap(manifold) < 0.0) return manifold;
+    manifold = {};  // only near ties of the axes end here
     if (axes.edges.first >= 0) add_edges(manifold, first, second, axes.edges, margin);
-    else if (theirs) add_deepest(manifold, second, axes.second_face.second, first, 1.0);
-    else add_deepest(manifold, first, axes.first_face.first, second, -1.0);
+    else add_deepest(manifold, reference, index, incident, flip);
     return manifold;
 }
 
