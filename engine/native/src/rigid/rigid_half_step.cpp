@@ -28,14 +28,19 @@ void RigidSystem::find_bias(double* bias) const {
     }
 }
 
-/// Velocities half a step back: v −= (h/2) v', ℓ −= (h/2) ℓ' with the accelerations the rows allow.
-void RigidSystem::start_half_step() {
+/// Places for what each step compares, also where surfaces may touch and none does.
+void RigidSystem::make_room_beyond() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     trial_ = live_.bodies;
     violation_.assign(rows, 0.0);
     live_.last_violation.assign(rows, 0.0);
     bias_.assign(rows, 0.0);
     live_.before.resize(live_.bodies.size());
+}
+
+/// Velocities half a step back: v −= (h/2) v', ℓ −= (h/2) ℓ' with the accelerations the rows allow.
+void RigidSystem::start_half_step() {
+    const std::size_t rows = static_cast<std::size_t>(rows_);
     if (half_step_) {
         if (!force_.empty()) apply_forces();
         const auto back = [this](int i, Vec3 velocity, Vec3 momentum) {
@@ -77,11 +82,9 @@ void RigidSystem::start_half_step() {
 void RigidSystem::start_half_step_touching() {
     const Live start = live_;
     const MixedSystem mixed = mixed_;
-    live_.before.resize(live_.bodies.size());
     velocity_stage();
     const LargeArray<BodyState> whole = live_.bodies;
     live_ = start;
-    live_.before.resize(live_.bodies.size());
     mixed_ = mixed;
     contacts_ = fresh_contacts_;
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});

@@ -184,7 +184,10 @@ void RigidSystem::reset(StageClock* clock) {
     if (composed_) start_composition();
     if (stiff_) find_tensions();
     const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
-    if ((half_step_ || method_.corrections > 0) && !may_touch) start_half_step();
+    if (half_step_ || method_.corrections > 0) {
+        make_room_beyond();
+        if (!may_touch) start_half_step();
+    }
     if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
     mixed_.mass.assign(tied_.size(), Mat6{});
     mixed_.momentum.resize(tied_.size());

@@ -202,6 +202,7 @@ private:
     void look_ahead();
 
     // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
+    void make_room_beyond();
     void start_half_step();
     void start_half_step_touching();
     void read_half_step();
