@@ -192,6 +192,8 @@ def line(name: str, values: list[tuple[int, float]], unit: str, columns: int) ->
     (_, least), (smaller, before), (larger, last) = values[0], *values[-2:]
     if last - before < NOISE * last:
         return f"| {name} | {' | '.join(told)} | none seen | {last:.2g} {unit} |"
+    if before <= least:  # no growth to carry on: the smallest two are noise
+        return f"| {name} | {' | '.join(told)} | | |"
     exponent = math.log((last - least) / (before - least)) / math.log(larger / smaller)
     planned = least + (last - least) * (PLANNED / larger) ** exponent
     return f"| {name} | {' | '.join(told)} | {exponent:.2f} | {planned:.2g} {unit} |"
