@@ -99,19 +99,13 @@ def slider_crank() -> Scene:
     return made(bodies, rows)
 
 
-def doors() -> Scene:
-    """Two bodies that know nothing of each other, each on a hinge of the world; one is the first of its hinge."""
-    bodies = [rod("a", (0, 0), (1, 0), spin=2.0), rod("bb", (3, 0), (3.6, 0.8), spin=-1.0)]
-    return made(bodies, [hinge("0", WORLD, "a", (0, 0)), hinge("1", "bb", WORLD, (3.6, 0.8))])
-
-
 def bars() -> Scene:
     scene = dataclasses.replace(four_bars.scene(2, 0.02), gravity=(0.3, -9.81, 0.0))
     rows = tuple(dataclasses.replace(row, compliance=0.0) for row in scene.constraints)
     return dataclasses.replace(scene, constraints=rows)
 
 
-SCENES = {"chain": chain(), "slider crank": slider_crank(), "doors": doors(), "two four-bars": bars()}
+SCENES = {"chain": chain(), "slider crank": slider_crank(), "two four-bars": bars()}
 
 
 def placed(scene: Scene, turn: np.ndarray) -> Scene:

@@ -16,9 +16,6 @@ void PlaneTree::take(Plane3 plane, std::vector<Node> nodes, std::vector<Closing>
     courses_.assign(nodes_.size(), Course{});
     pushes_.assign(nodes_.size(), {});
     twists_.assign(nodes_.size(), 0.0);
-    apart_ = closings_.empty() && std::none_of(nodes_.begin(), nodes_.end(), [](const Node& node) {
-                 return node.parent >= 0 || node.slides;
-             });
     std::size_t columns = 0;
     for (Closing& loop : closings_) {
         loop.reduced = static_cast<int>(columns);
@@ -288,25 +285,11 @@ void PlaneTree::write(double tau, LargeArray<BodyState>& bodies, double* increme
     }
 }
 
-/// (J + m r²) sin θ/τ is what a body has about its pivot. False if one would turn far.
-bool PlaneTree::turn_apart(double tau) noexcept {
-    constexpr double FAR = 0.9;
-    for (std::size_t k = 0; k < nodes_.size(); ++k) {
-        const Node& node = nodes_[k];
-        Course& m = courses_[k];
-        const double about = m.spin - node.mass * cross(m.reach, m.velocity);
-        const double whole = tau * about / (node.inertia + node.mass * dot(node.arm, node.arm));
-        if (!(std::fabs(whole) < FAR)) return false;
-        const double cosine = std::sqrt(0.5 + 0.5 * std::sqrt(1.0 - whole * whole));
-        const double sine = 0.5 * whole / cosine;
-        m.moved = {std::sqrt(1.0 - sine * sine), sine};
-    }
-    return true;
-}
-
-/// Newton's method from the increments. False if it finds nothing near.
-bool PlaneTree::settle(double tau, const double* increments, std::int64_t& rounds) noexcept {
+template <int NORMAL>
+bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
+                      std::int64_t& rounds) noexcept {
     using Rounds = JointRounds;
+    read<NORMAL>(bodies);
     if (!look_at(increments)) return false;
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
     double before = std::numeric_limits<double>::infinity();
@@ -356,14 +339,6 @@ bool PlaneTree::settle(double tau, const double* increments, std::int64_t& round
     }
     for (const Course& course : courses_)
         if (!(course.moved.cosine > 0.3)) return false;
-    return true;
-}
-
-template <int NORMAL>
-bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
-                      std::int64_t& rounds) noexcept {
-    read<NORMAL>(bodies);
-    if (!(apart_ && turn_apart(tau)) && !settle(tau, increments, rounds)) return false;
     move(tau);
     ++rounds;
     place();

@@ -56,10 +56,8 @@ public:
     };
 
     bool empty() const noexcept { return nodes_.empty(); }
-    void clear() noexcept { nodes_.clear(), apart_ = false; }
+    void clear() noexcept { nodes_.clear(); }
     int normal() const noexcept { return plane_.normal; }
-    /// Whether each body turns about a point of the world on its own.
-    bool apart() const noexcept { return apart_; }
     /// Nodes and closings are those of a JointTree, with its numbers; `scale` in kg m².
     void take(Plane3 plane, std::vector<Node> nodes, std::vector<Closing> closings, int reach, double scale);
 
@@ -95,8 +93,6 @@ private:
     void write(double tau, LargeArray<BodyState>& bodies, double* increments) const noexcept;
     template <int NORMAL>
     bool stage(double tau, LargeArray<BodyState>& bodies, double* increments, std::int64_t& rounds) noexcept;
-    bool turn_apart(double tau) noexcept;
-    bool settle(double tau, const double* increments, std::int64_t& rounds) noexcept;
     bool look_at(const double* increments) noexcept;
     void move(double tau) noexcept;
     void gain(double tau) noexcept;
@@ -107,7 +103,6 @@ private:
     bool solve(bool fresh) noexcept;
 
     Plane3 plane_;
-    bool apart_ = false;
     std::vector<Node> nodes_;
     std::vector<Course> courses_;
     std::vector<Closing> closings_;
