@@ -40,7 +40,8 @@ void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet
     joints_ = &joints;
     coordinates_ = 0;
     plane_.clear();
-    if (hang(tied) && close(start) && order()) return flatten();
+    pivots_.clear();
+    if (hang(tied) && close(start) && order()) return flatten(), free_pivots();
     coordinates_ = 0;
 }
 
@@ -384,6 +385,15 @@ void JointTree::flatten() {
         closings.push_back(closing);
     }
     plane_.take(flat, std::move(nodes), std::move(closings), system_.reach(), scale_);
+}
+
+/// Takes bodies that only turn about a point of the world.
+void JointTree::free_pivots() {
+    for (const Node& node : nodes_)
+        if (node.parent >= 0 || node.turns != 3 || node.slides != 0 || node.end != node_of_[node.body] + 1)
+            return;
+    if (!loops_.empty()) return;
+    for (const Node& node : nodes_) pivots_.add(node.body, constants_[node.body], node.arm);
 }
 
 bool JointTree::holds(const LargeArray<BodyState>& bodies) {

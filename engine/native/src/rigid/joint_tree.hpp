@@ -18,6 +18,7 @@
 
 #include "linear/band_lu.hpp"
 #include "rigid/joint_set.hpp"
+#include "rigid/pivot_bodies.hpp"
 #include "rigid/plane_tree.hpp"
 
 namespace spook {
@@ -34,6 +35,8 @@ public:
     int rows() const noexcept { return rows_; }
     /// The axis of the world that all hinges turn about and all slides lie across (0: x), if numbers of a plane do; −1.
     int across() const noexcept { return plane_.empty() ? -1 : plane_.normal(); }
+    /// Whether every body hangs on a ball joint of the world and nothing else, and so turns like a free one.
+    bool pivots() const noexcept { return !pivots_.empty(); }
     /// Whether the joints of the forest hold where the bodies are, as joint coordinates take for granted.
     bool holds(const LargeArray<BodyState>& bodies);
 
@@ -98,6 +101,7 @@ private:
     bool independent(const LargeArray<BodyState>& start);
     bool order();
     void flatten();
+    void free_pivots();
     void take(const LargeArray<BodyState>& bodies) noexcept;
     bool look_at(const double* increments) noexcept;
     void move(double tau) noexcept;
@@ -127,6 +131,7 @@ private:
     std::vector<Vec3> pushes_, twists_;
     BandLu system_;
     PlaneTree plane_;
+    PivotBodies pivots_;
     int coordinates_ = 0, rows_ = 0, trees_ = 0;
     double scale_ = 1.0;  // kg m²: of the inertias that coordinates feel
 };

@@ -303,6 +303,7 @@ void JointTree::fill_loops(bool derivatives) noexcept {
 bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
                       std::int64_t& rounds) noexcept {
     if (!plane_.empty()) return plane_.stage(tau, bodies, increments, rounds);
+    if (!pivots_.empty()) return pivots_.stage(tau, bodies, increments, rounds);
     take(bodies);
     if (!look_at(increments)) return false;
     for (const Closing& loop : loops_) {

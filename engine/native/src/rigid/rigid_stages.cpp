@@ -212,6 +212,7 @@ void RigidSystem::tell(StageChoices& choices) const {
     solve = "joints make trees: " + std::to_string(tree_.coordinates()) + " joint coordinates, " +
             std::to_string(tree_.rows()) + " rows to close loops, by Newton's method in a band";
     if (tree_.across() >= 0) solve += std::string(", in the plane across ") + "xyz"[tree_.across()];
+    if (tree_.pivots()) solve = "bodies on balls of the world: each turns about its own as a free body does";
     choices[static_cast<std::size_t>(Stage::correct_curvature)].reason =
         "joint coordinates keep the joints by construction";
     choices[static_cast<std::size_t>(Stage::assemble_rows)].reason =
