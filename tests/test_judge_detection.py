@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
+from bench import detectors
 from spook_tracker.tracker.judge import noise, shifts
 from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.shifts import permutation_probability, remembered, standard_error, student
@@ -84,15 +85,46 @@ FOUND = {  # the least share of forty series
 }
 
 
-def test_what_is_asked_of_a_small_step_is_below_what_any_test_can_give() -> None:
-    """Four nights three deviations above a level that sixty nights tell, at one false alarm in 100 000 nights."""
-    alarm = stats.norm.isf(1e-5)
-    known = stats.norm.sf(alarm - 3.0 * math.sqrt(4.0))  # Neyman and Pearson: level and noise are known
-    learnt = stats.norm.sf(alarm - 3.0 / math.sqrt(1 / 4 + 1 / 60))  # the level has to be learnt, too
-    student = stats.nct.sf(stats.t.isf(1e-5, 59), 59, 3.0 / math.sqrt(1 / 4 + 1 / 60))  # and the noise
+def test_no_detector_that_looks_every_night_finds_more_than_the_bound() -> None:
+    """One that knows level and noise and looks at the last night, at the last two, three and four, every night."""
+    draws = np.random.default_rng(7)
 
-    assert (round(known, 3), round(learnt, 3), round(student, 3)) == (0.959, 0.939, 0.863)
-    assert FOUND["+3 % at 1 % noise"] < student
+    def told(values: Any) -> Any:
+        sums, red = np.cumsum(values, axis=-1), values > 3.6
+        for nights in (2, 3, 4):
+            red[..., nights:] |= sums[..., nights:] - sums[..., :-nights] > 3.6 * math.sqrt(nights)
+        return red
+
+    red = told(draws.standard_normal(1_000_000))
+    rate = np.sum(red[1:] & ~red[:-1]) / len(red)
+    after = told(draws.standard_normal((100_000, 8)) + 3.0 * (np.arange(8) >= 4))
+    found = np.mean(np.any(after[:, 4:] & ~after[:, 3:4], axis=1))
+    bound = detectors.best_of_nights(rate)[0]
+
+    assert 1e-4 < rate < 1e-3
+    assert bound - 0.02 < found < bound
+
+
+def test_what_no_detector_exceeds_is_what_the_best_test_of_all_the_nights_finds() -> None:
+    """By draws: the mean of four nights, its critical value from draws too, at a size that draws can tell."""
+    draws = np.random.default_rng(8)
+    before, nights = draws.standard_normal((40_000, 60)), draws.standard_normal((40_000, 4))
+
+    def student(nights: Any) -> Any:
+        freedom = before.shape[1] + nights.shape[1] - 2
+        squares = np.sum((before.T - before.mean(1)) ** 2, 0) + np.sum((nights.T - nights.mean(1)) ** 2, 0)
+        return (nights.mean(1) - before.mean(1)) / np.sqrt(squares / freedom * (1 / 60 + 1 / 4))
+
+    known, learnt, both = detectors.best_of_nights(0.01, apart=1.0)
+    assert np.mean(nights.mean(1) + 1.0 > np.quantile(nights.mean(1), 0.96)) == pytest.approx(known, abs=0.02)
+    off = nights.mean(1) - before.mean(1)
+    assert np.mean(off + 1.0 > np.quantile(off, 0.96)) == pytest.approx(learnt, abs=0.02)
+    assert np.mean(student(nights + 1.0) > np.quantile(student(nights), 0.96)) == pytest.approx(
+        both, abs=0.02
+    )
+    assert detectors.best_on_clusters(1e-4, factor=1.0, step=1.03, nights=4) == pytest.approx(
+        detectors.best_of_nights(1e-4)[0], abs=3e-3
+    )
 
 
 @pytest.mark.parametrize("name", battery.STEPS)

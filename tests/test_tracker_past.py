@@ -152,6 +152,26 @@ def test_old_commits_join_the_history_once(
     assert second.output.count("recorded already") == 2
 
 
+def test_old_commits_are_asked_only_with_the_options_that_were_given(
+    repository: Repository, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An engine of long ago refuses what its own command did not know yet."""
+    made, passed = repository.commit(0.1), []
+
+    def ask(place: Path, tests: object, *options: str) -> object:
+        passed.append(options)
+        return repository.measure(str(place)), "its own questions"
+
+    monkeypatch.chdir(repository.folder)
+    monkeypatch.setattr(commits, "built", lambda where, commit, folder: Path(commit))
+    monkeypatch.setattr(commits, "ask_commit", ask)
+    for number, given in enumerate(([], ["--time-limit", "60", "--memory", "100"])):
+        CliRunner().invoke(main, ["backfill", made, *given, "--db", f"sqlite:///{tmp_path}/{number}.db"])
+
+    assert not {"--time-limit", "--memory"} & set(passed[0])
+    assert {"--time-limit", "60.0", "--memory", "100"} <= set(passed[1])
+
+
 def test_what_the_history_blames_is_where_a_search_begins(
     repository: Repository, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

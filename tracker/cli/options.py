@@ -25,6 +25,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 SQLITE = b"SQLite format 3\0"  # a file that holds a history begins so
 MOST = 600  # characters of a complaint
 MEMORY = 4096  # MB for one piece of work, unless something else is said
+TIME_LIMIT = 1200.0  # s for one, likewise
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
 
 
@@ -161,7 +162,7 @@ def workers_option(command: Command) -> Command:
         click.option(
             "--time-limit",
             metavar="SECONDS",
-            default=1200.0,
+            default=TIME_LIMIT,
             show_default=True,
             type=click.FloatRange(0.1, 1e6),
             help="For one piece of work; what takes longer is ended and recorded as timed out.",

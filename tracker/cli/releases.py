@@ -9,7 +9,14 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.options import MEMORY, database_option, example, limit_option, workers_option
+from spook_tracker.tracker.cli.options import (
+    MEMORY,
+    TIME_LIMIT,
+    database_option,
+    example,
+    limit_option,
+    workers_option,
+)
 
 KEPT = ".tracker-releases"
 MEGABYTE = 1e6
@@ -87,9 +94,11 @@ def backfill(
             raise click.UsageError(
                 "name commits to measure, or --engine NAME for the releases of another engine"
             )
-        asked = [*["--sweep"] * sweep, "--workers", str(workers), "--time-limit", str(time_limit)]
+        asked = [*["--sweep"] * sweep, "--workers", str(workers)]
         asked += [] if limit is None else ["--limit", str(limit)]
-        asked += [] if memory == MEMORY else ["--memory", str(memory)]  # older commits do not know the option
+        # Older commits do not know all options: what nobody asked for is left to them.
+        asked += [] if time_limit == TIME_LIMIT else ["--time-limit", str(time_limit)]
+        asked += [] if memory == MEMORY else ["--memory", str(memory)]
         backfill_commits(versions, tests, asked, folder or Path(COMMITS), database)
         return
     folder = folder or Path(KEPT)

@@ -71,9 +71,14 @@ def shift(values: Sequence[float], clusters_only: bool = False) -> Shift | None:
         old, new = np.array(base), np.array(last)
         every = None if clusters_only else _tried(old, new)
         for tried in (every, _apart_from_clusters(old, new)):
-            if tried is not None and (found is None or tried.probability < found.probability):
+            if tried is not None and (found is None or _tells_more(tried, found)):
                 found = tried
     return found
+
+
+def _tells_more(one: Shift, other: Shift) -> bool:
+    """A shift away from both clusters, which no visit explains, before any other; else the rarer."""
+    return (one.apart, -one.probability) > (other.apart, -other.probability)
 
 
 def _apart_from_clusters(base: Values, last: Values) -> Shift | None:
