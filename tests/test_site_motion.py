@@ -298,6 +298,12 @@ def test_dragging_zooms_into_a_chart_and_writes_the_address(driver, site):
     box = "document.getElementById('f-deviation-against-time')"
     driver.execute_script(f"{box}.scrollIntoView({{block: 'center'}})")
     wait_for(driver, f"'drawn' in {box}.dataset")
+    # Charts above are drawn as they come near, and move this one.
+    wait_for(
+        driver,
+        f"(() => {{const top = {box}.querySelector('.nsewdrag').getBoundingClientRect().top, stood = window.stood === top;"
+        " window.stood = top; return stood})()",
+    )
     where = driver.execute_script(
         f"const r = {box}.querySelector('.nsewdrag').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]"
     )
