@@ -17,11 +17,40 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from spook_tracker.engine import (
+    AngularVelocity,
+    Method,
+    Orientation,
+    Position,
+    Scene,
+    Trace,
+    Velocity,
+    simulate,
+)
 from tests.oracle_rigid import RigidOracle
 
 Array = npt.NDArray[Any]
 _SUZUKI = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 STAGES = {2: (1.0,), 4: (_SUZUKI, _SUZUKI, 1.0 - 4.0 * _SUZUKI, _SUZUKI, _SUZUKI)}
+STATE = {
+    "x": Trace(quantity=Position()),
+    "q": Trace(quantity=Orientation()),
+    "v": Trace(quantity=Velocity()),
+    "w": Trace(quantity=AngularVelocity()),
+}
+
+
+def assert_dense_steps(scene: Scene, h: float, steps: int, within: float = 1e-9) -> None:
+    """The engine takes the oracle's steps of order 4: m, m/s and rad/s to `within`, quaternions to a tenth of it."""
+    oracle = ComposedOracle(scene, h)
+    run = simulate(scene, time_step=h, steps=steps, method=Method(composition="order4"), observe=STATE)
+
+    for k in range(1, steps + 1):
+        oracle.step()
+        same = np.sign(np.sum(run["q"][k] * oracle.q, axis=1))[:, None]
+        for quantity, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
+            assert np.abs(run[quantity][k] - exact).max() < within, quantity
+        assert np.abs(same * run["q"][k] - oracle.q).max() < 0.1 * within
 
 
 class ComposedOracle(RigidOracle):

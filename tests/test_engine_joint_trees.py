@@ -12,7 +12,6 @@ from spook_tracker import engine
 from spook_tracker.engine import (
     WORLD,
     AngularMomentum,
-    AngularVelocity,
     Cylindrical,
     Distance,
     Final,
@@ -20,7 +19,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Momentum,
-    Orientation,
     Particle,
     Planar,
     PointOnLine,
@@ -28,22 +26,15 @@ from spook_tracker.engine import (
     Prismatic,
     Scene,
     Trace,
-    Velocity,
     Violation,
     simulate,
 )
 from spook_tracker.scalar_tests.multibody import four_bars
 from tests import rigid_scenes
-from tests.oracle_rigid_composition import ComposedOracle
+from tests.oracle_rigid_composition import STATE, assert_dense_steps
 from tests.test_engine_symmetries import turned
 
 ORDER4 = Method(composition="order4")
-OBSERVE = {
-    "x": Trace(quantity=Position()),
-    "q": Trace(quantity=Orientation()),
-    "v": Trace(quantity=Velocity()),
-    "w": Trace(quantity=AngularVelocity()),
-}
 
 
 def rigid(scene: Scene) -> Scene:
@@ -94,17 +85,7 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_joint_coordinates_take_the_dense_steps(name: str) -> None:
-    scene, h, steps = SCENES[name], 0.02, 2
-    oracle = ComposedOracle(scene, h)
-
-    run = simulate(scene, time_step=h, steps=steps, method=ORDER4, observe=OBSERVE)
-
-    for k in range(1, steps + 1):
-        oracle.step()
-        same = np.sign(np.sum(run["q"][k] * oracle.q, axis=1))[:, None]
-        for quantity, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
-            assert np.abs(run[quantity][k] - exact).max() < 1e-9, quantity
-        assert np.abs(same * run["q"][k] - oracle.q).max() < 1e-10
+    assert_dense_steps(SCENES[name], 0.02, 2)
 
 
 @pytest.mark.parametrize(
@@ -149,11 +130,11 @@ def test_freer_joints_move_as_their_rows_have_it(kind: type[Any]) -> None:
     beside = dataclasses.replace(scene, bodies=(*scene.bodies, dot), constraints=(*scene.constraints, pin))
 
     trees, rows = (
-        simulate(s, time_step=0.02, steps=25, method=ORDER4, observe=OBSERVE) for s in (scene, beside)
+        simulate(s, time_step=0.02, steps=25, method=ORDER4, observe=STATE) for s in (scene, beside)
     )
 
     assert trees.state_hash != rows.state_hash
-    for quantity in OBSERVE:
+    for quantity in STATE:
         assert np.abs(trees[quantity] - rows[quantity][:, :2]).max() < 1e-9, quantity
 
 

@@ -5,29 +5,21 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
 
 from spook_tracker import engine
 from spook_tracker.engine import (
     WORLD,
-    AngularVelocity,
+    AngularMomentum,
+    Ball,
     Hinge,
     Method,
-    Orientation,
-    Position,
     Scene,
     Trace,
-    Velocity,
     simulate,
 )
 from tests import rigid_scenes
-from tests.oracle_rigid_composition import ComposedOracle
-
-OBSERVE = {
-    "x": Trace(quantity=Position()),
-    "v": Trace(quantity=Velocity()),
-    "w": Trace(quantity=AngularVelocity()),
-    "q": Trace(quantity=Orientation()),
-}
+from tests.oracle_rigid_composition import STATE, assert_dense_steps
 
 
 def pivots() -> Scene:
@@ -49,18 +41,8 @@ def reason(scene: Scene) -> str:
 
 
 def test_pivots_take_the_dense_steps() -> None:
-    scene = pivots()
-    oracle = ComposedOracle(scene, 0.02)
-
-    run = simulate(scene, time_step=0.02, steps=2, method=Method(composition="order4"), observe=OBSERVE)
-
-    assert "bodies on balls of the world" in reason(scene)
-    for k in (1, 2):
-        oracle.step()
-        same = np.sign(np.sum(run["q"][k] * oracle.q, axis=1))[:, None]
-        for quantity, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
-            assert np.abs(run[quantity][k] - exact).max() < 1e-9, quantity
-        assert np.abs(same * run["q"][k] - oracle.q).max() < 1e-10
+    assert "bodies on balls of the world" in reason(pivots())
+    assert_dense_steps(pivots(), 0.02, 2)
 
 
 def test_pivots_move_as_joint_coordinates_in_general_have_it() -> None:
@@ -71,10 +53,34 @@ def test_pivots_move_as_joint_coordinates_in_general_have_it() -> None:
     beside = dataclasses.replace(alone, bodies=(*alone.bodies, away), constraints=(*alone.constraints, pin))
 
     runs = [
-        simulate(s, time_step=0.02, steps=5, method=Method(composition="order8"), observe=OBSERVE)
+        simulate(s, time_step=0.02, steps=5, method=Method(composition="order8"), observe=STATE)
         for s in (alone, beside)
     ]
 
     assert "10 joint coordinates" in reason(beside)
-    for quantity in OBSERVE:
+    for quantity in STATE:
         assert np.abs(runs[0][quantity] - runs[1][quantity][:, :3]).max() < 1e-12, quantity
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.9])
+def test_a_body_on_a_ball_at_its_centre_turns_as_a_free_one(turn: float) -> None:
+    """Nothing pushes it: slowly, and so fast that most of a radian goes by in a step. Momentum stays as it was."""
+    h = 0.01
+    free = dataclasses.replace(
+        rigid_scenes.rigid_body(np.random.default_rng(8), 0),
+        velocity=(0.0, 0.0, 0.0),
+        angular_velocity=tuple(turn / h * np.array([0.6, 0.48, 0.64])),
+    )
+    ball = Ball(name="ball", between=(WORLD, free.name), at=free.position, compliance=0.0)
+    observe = {**STATE, "L": Trace(quantity=AngularMomentum())}
+
+    held, loose = (
+        simulate(Scene(bodies=(free,), constraints=rows, contacts=False), time_step=h, steps=50,
+                 method=Method(composition="order6"), observe=observe)
+        for rows in ((ball,), ())
+    )  # fmt: skip
+
+    for quantity in observe:
+        scale = np.abs(loose[quantity]).max() or 1.0
+        assert np.abs(held[quantity] - loose[quantity]).max() < 1e-11 * scale, quantity
+    assert np.ptp(held["L"], axis=0).max() < 1e-13 * np.abs(held["L"]).max()

@@ -41,7 +41,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.scalar_tests import spinning_top, swinging_door
-from tests.oracle_rigid_composition import ComposedOracle
+from tests.oracle_rigid_composition import assert_dense_steps
 from tests.rigid_scenes import EVERY_JOINT, one_joint
 
 HALF = Method(half_step_velocities=True)
@@ -157,22 +157,7 @@ def held(kind: str, bodies: int) -> Scene:
 @pytest.mark.parametrize("bodies", [1, 2])
 @pytest.mark.parametrize("kind", EVERY_JOINT)
 def test_a_composition_is_the_dense_one_for_every_joint(kind: str, bodies: int) -> None:
-    scene, h, steps = held(kind, bodies), 0.04, 5
-    oracle = ComposedOracle(scene, h)
-    observe = {
-        "x": Trace(quantity=Position()),
-        "q": Trace(quantity=Orientation()),
-        "v": Trace(quantity=Velocity()),
-        "w": Trace(quantity=AngularVelocity()),
-    }
-    run = simulate(scene, time_step=h, steps=steps, method=Method(composition="order4"), observe=observe)
-
-    for k in range(1, steps + 1):
-        oracle.step()
-        same = np.sign(np.sum(run["q"][k] * oracle.q, axis=1))[:, None]
-        for name, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
-            assert np.abs(run[name][k] - exact).max() < 1e-10, name
-        assert np.abs(same * run["q"][k] - oracle.q).max() < 1e-11
+    assert_dense_steps(held(kind, bodies), 0.04, 5, within=1e-10)
 
 
 @pytest.mark.parametrize("kind", EVERY_JOINT)

@@ -267,3 +267,17 @@ def test_no_shift_below_one_per_cent_is_told() -> None:
 
     assert shifts.shift(values) is None
     assert shifts.shift([*values[:60], *[1.011] * 6]) is not None
+
+
+def test_a_step_on_two_clusters_is_told_as_one_away_from_both() -> None:
+    """Above both of two clusters drawn at random: never taken for a visit to the slower one, which needs no look."""
+    found = []
+    for seed in range(20):
+        draws = np.random.default_rng(seed)
+        nights = np.where(draws.random(66) < 0.5, 1.08, 1.0) * (1.0 + 0.01 * draws.standard_normal(66))
+        nights[60:] *= 1.1
+        found.append(shifts.shift(list(nights)))
+
+    told = [one for one in found if one is not None]
+    assert len(told) >= 15
+    assert all(one.apart for one in told)

@@ -1,16 +1,14 @@
 // One stage in joint coordinates: Newton's method on what the joints let the bodies gain.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "rigid/joint_rounds.hpp"
 #include "rigid/joint_tree.hpp"
 #include "rigid/rotation.hpp"
 
 namespace spook {
 
 namespace {
-
-using Rounds = JointRounds;
 
 Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 Vec3 vector_of(Quat q) noexcept { return {q.x, q.y, q.z}; }
@@ -312,22 +310,20 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
         reduce(loop, rows, false, start_rows_.data() + loop.reduced);
     }
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
-    double before = std::numeric_limits<double>::infinity();
-    bool fresh = true;  // the derivative is taken where the joints are
-    for (int round = 0;; ++round) {
+    for (JointRounds round;;) {
         move(tau);
         gain(bodies, tau);
-        if (fresh) {
+        if (round.fresh()) {
             turn_ends();
             system_.clear();
             fill_masses();
         }
         if (!loops_.empty()) {
             place();
-            fill_loops(fresh);
+            fill_loops(round.fresh());
         }
         ++rounds;
-        if (fresh && !system_.factor()) return false;
+        if (round.fresh() && !system_.factor()) return false;
         system_.solve(right_.data());
         double size = 0.0, moved = 0.0;
         for (const Node& node : nodes_)
@@ -337,19 +333,12 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
                 step_[node.first + i] = step;
                 if (!(off <= size)) size = off;
             }
-        if (!(size < Rounds::FARTHEST) || round == Rounds::MOST) return false;
+        if (round.lost(size)) return false;
         turn_by(step_.data());
         for (int row = 0; row < rows_; ++row) multiplier_[row] += right_[place_of_[coordinates_ + row]];
         for (const Course& course : courses_)
             moved = std::max(moved, dot(vector_of(course.moved), vector_of(course.moved)));
-        // What a step leaves: the share of it that the last one left; with a fresh derivative the square of it.
-        const double rate = round > 0 ? size / before : loops_.empty() ? size : 1.0;
-        const double left = rate * (fresh && round > 0 ? rate * size : size);
-        if (size < Rounds::SETTLED || (size < Rounds::NEAR && left < 1e-17 * moved) ||
-            (size < Rounds::NEAR && rate > 0.5))
-            break;
-        fresh = (round > 0 ? rate : size) > Rounds::FRESH;
-        before = size;
+        if (round.settled(size, moved, !loops_.empty())) break;
     }
     for (const Course& course : courses_)
         if (!(course.moved.w > 0.3)) return false;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "rigid/joint_rounds.hpp"
 
 namespace spook {
 
@@ -188,7 +189,6 @@ void PlaneTree::fill_masses() noexcept {
         double twist = twists_[k];
         for (int b = k;;) {
             put(b, push, twist);
-
             if (nodes_[b].parent < 0) break;
             twist += cross(courses_[b].from_parent, push);
             b = nodes_[b].parent;
@@ -256,12 +256,6 @@ void PlaneTree::fill_loops(bool derivatives) noexcept {
     }
 }
 
-bool PlaneTree::solve(bool fresh) noexcept {
-    if (fresh && !system_.factor()) return false;
-    system_.solve(right_.data());
-    return true;
-}
-
 template <int NORMAL>
 void PlaneTree::write(double tau, LargeArray<BodyState>& bodies, double* increments) const noexcept {
     constexpr Plane3 flat{NORMAL};
@@ -288,32 +282,30 @@ void PlaneTree::write(double tau, LargeArray<BodyState>& bodies, double* increme
 template <int NORMAL>
 bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
                       std::int64_t& rounds) noexcept {
-    using Rounds = JointRounds;
     read<NORMAL>(bodies);
     if (!look_at(increments)) return false;
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
-    double before = std::numeric_limits<double>::infinity();
-    bool fresh = true;  // the derivative is taken where the joints are
-    for (int round = 0;; ++round) {
+    for (JointRounds round;;) {
         move(tau);
         gain(tau);
-        if (fresh) {
+        if (round.fresh()) {
             turn_ends();
             system_.clear();
             fill_masses();
         }
         if (!closings_.empty()) {
             place();
-            fill_loops(fresh);
+            fill_loops(round.fresh());
         }
         ++rounds;
-        if (!solve(fresh)) return false;
+        if (round.fresh() && !system_.factor()) return false;
+        system_.solve(right_.data());
         double size = 0.0, moved = 0.0;
         for (const Node& node : nodes_) {
             const double off = std::fabs(right_[node.place]) / (node.slides ? node.extent : 1.0);
             if (!(off <= size)) size = off;
         }
-        if (!(size < Rounds::FARTHEST) || round == Rounds::MOST) return false;
+        if (round.lost(size)) return false;
         for (std::size_t k = 0; k < nodes_.size(); ++k) {
             const double step = right_[nodes_[k].place];
             Course& m = courses_[k];
@@ -328,14 +320,7 @@ bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
         }
         for (const Closing& loop : closings_)
             for (int i = 0; i < 2; ++i) multiplier_[loop.at + i] += right_[loop.places[i]];
-        // What a step leaves: the share of it that the last one left; with a fresh derivative the square of it.
-        const double rate = round > 0 ? size / before : closings_.empty() ? size : 1.0;
-        const double left = rate * (fresh && round > 0 ? rate * size : size);
-        if (size < Rounds::SETTLED || (size < Rounds::NEAR && left < 1e-17 * moved) ||
-            (size < Rounds::NEAR && rate > 0.5))
-            break;
-        fresh = (round > 0 ? rate : size) > Rounds::FRESH;
-        before = size;
+        if (round.settled(size, moved, !closings_.empty())) break;
     }
     for (const Course& course : courses_)
         if (!(course.moved.cosine > 0.3)) return false;

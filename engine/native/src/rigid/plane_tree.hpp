@@ -15,17 +15,6 @@
 
 namespace spook {
 
-/// When Newton's method on joint coordinates goes on, and when it gives up: the same in space and in a plane.
-struct JointRounds {
-    static constexpr int MOST = 20;
-    static constexpr double FARTHEST =
-        0.5;  // rad or sizes of a joint: a first step beyond it leads to other solutions
-    static constexpr double SETTLED = 1e-13;  // of a step: rounding
-    static constexpr double NEAR = 3e-9;      // from where on one more step is beyond rounding
-    static constexpr double FRESH =
-        0.05;  // left by a step: beyond it a new derivative is cheaper than more steps
-};
-
 class PlaneTree {
 public:
     /// A body on one hinge or slide; a parent stands before all that hang on it.
@@ -100,7 +89,6 @@ private:
     void fill_masses() noexcept;
     void place() noexcept;
     void fill_loops(bool derivatives) noexcept;
-    bool solve(bool fresh) noexcept;
 
     Plane3 plane_;
     std::vector<Node> nodes_;
