@@ -42,7 +42,7 @@ def reason(scene: Scene) -> str:
 
 def test_pivots_take_the_dense_steps() -> None:
     assert "bodies on balls of the world" in reason(pivots())
-    assert_dense_steps(pivots(), 0.02, 2)
+    assert_dense_steps(pivots(), 0.1, 2)
 
 
 def test_pivots_move_as_joint_coordinates_in_general_have_it() -> None:
@@ -53,7 +53,7 @@ def test_pivots_move_as_joint_coordinates_in_general_have_it() -> None:
     beside = dataclasses.replace(alone, bodies=(*alone.bodies, away), constraints=(*alone.constraints, pin))
 
     runs = [
-        simulate(s, time_step=0.02, steps=5, method=Method(composition="order8"), observe=STATE)
+        simulate(s, time_step=0.1, steps=5, method=Method(composition="order4"), observe=STATE)
         for s in (alone, beside)
     ]
 

@@ -25,7 +25,7 @@ from spook_tracker.scalar_tests.multibody import four_bars
 from tests.oracle_rigid_composition import STATE, assert_dense_steps
 from tests.test_engine_symmetries import rotation, turned
 
-ORDER8 = Method(composition="order8")
+ORDER4, ORDER8 = Method(composition="order4"), Method(composition="order8")
 # Quaternions: the world's axes in another order, and a turn of .4 rad about a direction that is none of them.
 ACROSS = {"x": np.full(4, 0.5), "y": np.array([0.5, -0.5, -0.5, -0.5]), "z": np.array([1.0, 0.0, 0.0, 0.0])}
 LEANING = np.array([np.cos(0.2), *(np.sin(0.2) * np.array([1.0, 2.0, 2.0]) / 3.0)])
@@ -111,11 +111,11 @@ def reasons(scene: Scene) -> dict[str, str]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_same_mechanism_in_another_plane_takes_the_same_steps(name: str) -> None:
-    """Two ways to one map: numbers of the plane, and vectors of space. A tenth of a second at 1e-12."""
+    """Two ways to one map: numbers of the plane, and vectors of space; by steps so long that it shows which map it is."""
     scene = SCENES[name]
     leaning, lean = placed(scene, LEANING), rotation(LEANING)
 
-    runs = [simulate(s, time_step=0.02, steps=5, method=ORDER8, observe=STATE) for s in (scene, leaning)]
+    runs = [simulate(s, time_step=0.1, steps=5, method=ORDER4, observe=STATE) for s in (scene, leaning)]
 
     assert "in the plane across z" in reasons(scene)["solve_block"]
     assert "in the plane" not in reasons(leaning)["solve_block"]
@@ -130,7 +130,7 @@ def test_numbers_of_the_plane_take_the_dense_steps(name: str, axis: str) -> None
     scene = placed(SCENES[name], ACROSS[axis])
 
     assert f"in the plane across {axis}" in reasons(scene)["solve_block"]
-    assert_dense_steps(scene, 0.02, 2)
+    assert_dense_steps(scene, 0.1, 2)
 
 
 def test_joints_hold_over_many_steps() -> None:
