@@ -1,7 +1,7 @@
 """What all commands share: options, and errors as one line that names what to do next.
 
 Exit codes everywhere: 0 same, better or green; 1 a regression or a red test; 2 usage error, no such version,
-no data, unreadable database; 3 not comparable. Only click is imported here, so that `--help` answers at once.
+no data, unreadable database; 3 not comparable. Only click and numbers are imported here, so that `--help` answers at once.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ from typing import Any, NoReturn, TypeVar
 import click
 
 import spook_tracker.tracker.cli.settings as tracker_toml
+from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 SQLITE = b"SQLite format 3\0"  # a file that holds a history begins so
 MOST = 600  # characters of a complaint
-MEMORY = 4096  # MB for one piece of work, unless something else is said
-TIME_LIMIT = 1200.0  # s for one, likewise
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
 
 

@@ -9,14 +9,8 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.options import (
-    MEMORY,
-    TIME_LIMIT,
-    database_option,
-    example,
-    limit_option,
-    workers_option,
-)
+from spook_tracker.tracker.cli.options import database_option, example, limit_option, workers_option
+from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 
 KEPT = ".tracker-releases"
 MEGABYTE = 1e6

@@ -24,6 +24,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
+from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
+
 START_LIMIT = 120.0  # s in which a new process has read its program, on a machine however busy
 WORTH = 1.0  # s of work after which further processes are worth what they take to start
 DIED = "the engine's process died while answering"
@@ -36,8 +38,8 @@ Piece = TypeVar("Piece")
 class Limits:
     """What one piece of work may take."""
 
-    seconds: float = 1200.0  # of wall time
-    memory: int = 4 << 30  # bytes more than the process has at its start; 0: no limit
+    seconds: float = TIME_LIMIT  # of wall time
+    memory: int = MEMORY << 20  # bytes more than the process has at its start; 0: no limit
 
 
 @dataclass(frozen=True)
