@@ -29,6 +29,7 @@ from spook_tracker.engine import (
     Trace,
     simulate,
 )
+from spook_tracker.scalar_tests.door import scene as door
 from spook_tracker.scalar_tests.multibody import bricard
 from spook_tracker.scalar_tests.multibody.library import turned
 
@@ -335,3 +336,16 @@ def test_a_spring_on_a_joint_does_not_hide_that_its_loop_locks(stiffness: float,
     )
 
     assert "locked by redundant joints" in simulate(scene, time_step=H, duration=1.0).failure
+
+
+@pytest.mark.parametrize("h", [1 / 30, 1 / 60, 1 / 240])
+def test_a_door_that_stands_is_hardly_looked_at(h: float) -> None:
+    """Five hinges on one axis repeat each other and hold nothing back: a look costs more than a step, so they are few.
+
+    What stands moves by rounding, which halves and doubles from step to step; that is no motion that was stopped.
+    """
+    steps = 960
+    run = simulate(door.scene(5, damping=2.0 * h), time_step=h, steps=steps)
+
+    assert run.completed
+    assert 1 <= run.counters["redundancy_looks"] <= 4 + steps / 64

@@ -38,6 +38,7 @@ ITERATIONS = frozenset(
         "friction_rounds",
         "corrections",
         "halved_steps",
+        "redundancy_looks",
     }
 )
 JUDGED = EXACT | ITERATIONS

@@ -20,6 +20,7 @@ constexpr std::int64_t SOON = 8,
                        LATE = 64;  // steps to the next look; and where half of the motion goes in one
 constexpr double LITTLE = 1e-2;    // of what is too much: then the next look has twice the time
 constexpr double TAKEN = 0.25;     // of the largest energy of motion, by rows that should take none
+constexpr double AT_REST = 1e-6;   // of what the loads of a step would set in motion: such motion is none
 constexpr double HELD = 0.1;       // of what the loads would set in motion
 constexpr double TOLD = 1e-3;      // of the largest share: a joint that is named
 
@@ -191,11 +192,15 @@ double RigidSystem::motion_of(const Loop& loop) const {
 
 void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
     const double motion = motion_of(loop);
-    const bool stopped = motion < 0.5 * seen.last;
+    // What stands moves by rounding, and that may stop as it likes: it would be looked at in nearly every step.
+    const double told = LITTLE * TAKEN * std::max(seen.motion, AT_REST * seen.given);
+    const bool stopped = motion < 0.5 * seen.last && seen.last > told;
     const bool due = live_.step >= seen.next;
     seen.last = motion;
     seen.motion = std::max(seen.motion, motion);
-    if (!(due || stopped) || !find_repeated(loop)) return;
+    if (!(due || stopped)) return;
+    ++live_.looks;
+    if (!find_repeated(loop)) return;
 
     double work = 0.0, held = 0.0, load = driven(loop);
     const int row_blocks = static_cast<int>(joints_.blocks().size());
@@ -219,14 +224,17 @@ void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
         load += dot(given_twist, turned_by(body, s, given_twist));
         y += 3;
     }
+    seen.given = load;
     const double most = TAKEN * seen.motion, before = seen.work;
     seen.work += (stopped ? 1.0 : static_cast<double>(seen.wait)) * work;
     seen.held += std::sqrt(held);
     seen.load += std::sqrt(load);
-    const bool little = std::abs(seen.work - before) < LITTLE * most && held < LITTLE * HELD * HELD * load;
-    seen.wait = little ? std::min(2 * seen.wait, LATE) : SOON;
+    const bool little =
+        std::abs(seen.work - before) < LITTLE * TAKEN * std::max(seen.motion, AT_REST * load) &&
+        held < LITTLE * HELD * HELD * load;
+    seen.wait = little ? std::clamp(2 * seen.wait, SOON, LATE) : SOON;
     seen.next = live_.step + seen.wait;
-    const bool took = std::abs(seen.work) > most && seen.motion > 1e-6 * load;
+    const bool took = std::abs(seen.work) > most && seen.motion > AT_REST * load;
     if (took || (seen.load > 0.0 && seen.held > HELD * seen.load)) note_locked(loop);
 }
 

@@ -359,6 +359,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["newton_iterations"] = live_.newton_iterations;
         report.counters["halved_steps"] = live_.halved_steps;
     }
+    if (!loops_.empty()) report.counters["redundancy_looks"] = live_.looks;
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     std::int64_t moving = 0;
     for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;

@@ -138,9 +138,11 @@ private:
         struct Watched {       // of the redundant rows of a loop, see rigid_locking.cpp
             double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
             double held = 0.0, load = 0.0;    // √(2 J): what they held back, and what the loads gave
+            double given = 0.0;               // 2 J: what the loads gave at the last look
             std::int64_t next = 0, wait = 1;  // steps: of the next look, and to it
         };
         std::vector<Watched> watched;
+        std::int64_t looks = 0;  // at loops, for rows that lock
         std::vector<int> named;  // joints that health() tells of
         std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
         // Stages × differences × unknowns: of the rows' forces [N], or of the paces of joint coordinates, from step
