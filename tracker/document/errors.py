@@ -13,9 +13,12 @@ from typing import ClassVar
 
 
 class TrackerError(Exception):
-    """Base of all; `str(error)` is the sentence for the user."""
+    """Base of all; `str(error)` is the sentence for the user: one line, whatever it repeats of what was given."""
 
     exit_code: ClassVar[int] = 2
+
+    def __init__(self, sentence: str = "") -> None:
+        super().__init__(" ".join(sentence.splitlines()))
 
 
 class DatabaseError(TrackerError):

@@ -82,8 +82,8 @@ public:
     bool is_distance(int joint) const noexcept { return kind(joint) == JointKind::distance; }
     /// The bodies of a block beyond its first two: relations and wires may have more.
     std::span<const int> others(int block) const noexcept;
-    /// Their Jacobians, a row of six each, as the last assemble() found them.
-    const double* other_rows() const noexcept { return gradient_.data() + 12; }
+    /// Their Jacobians, a row of six each, as the last assemble() found them; null where no row has any.
+    const double* other_rows() const noexcept { return gradient_.empty() ? nullptr : gradient_.data() + 12; }
 
     /// Writes the Jacobians of a block (rows × 6 each; the memory holds zeros or an earlier call's values) and
     /// its right side without the share of bodies that move by themselves.
