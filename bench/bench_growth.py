@@ -183,20 +183,26 @@ def table(kind: str, found: list[Measured]) -> Iterator[str]:
     yield line("the database", [(at.samples, at.size / 1e9) for at in found], "GB", len(found))
 
 
+def two_digits(value: float) -> str:
+    """Two significant digits, without an exponent."""
+    rounded = float(f"{value:.2g}")
+    return f"{rounded:.0f}" if rounded >= 10.0 else f"{rounded:g}"
+
+
 def line(name: str, values: list[tuple[int, float]], unit: str, columns: int) -> str:
     """One measure over the sizes."""
-    told = [f"{value:.2g} {unit}" for _, value in values]
+    told = [f"{two_digits(value)} {unit}" for _, value in values]
     told += ["not measured"] * (columns - len(told))
     if len(values) < 3:
         return f"| {name} | {' | '.join(told)} | | |"
     (_, least), (smaller, before), (larger, last) = values[0], *values[-2:]
     if last - before < NOISE * last:
-        return f"| {name} | {' | '.join(told)} | none seen | {last:.2g} {unit} |"
+        return f"| {name} | {' | '.join(told)} | none seen | {two_digits(last)} {unit} |"
     if before <= least:  # no growth to carry on: the smallest two are noise
         return f"| {name} | {' | '.join(told)} | | |"
     exponent = math.log((last - least) / (before - least)) / math.log(larger / smaller)
     planned = least + (last - least) * (PLANNED / larger) ** exponent
-    return f"| {name} | {' | '.join(told)} | {exponent:.2f} | {planned:.2g} {unit} |"
+    return f"| {name} | {' | '.join(told)} | {exponent:.2f} | {two_digits(planned)} {unit} |"
 
 
 @contextlib.contextmanager
