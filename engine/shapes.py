@@ -330,8 +330,16 @@ class Compound(Shape):
 
     def inertia(self, mass: float) -> Vector | polytope.Tensor:
         """By Steiner's theorem; a tensor, unless it is diagonal. Raises SceneError off the centre of mass."""
-        whole = self.volume
-        centre = [math.fsum(p.shape.volume * p.position[k] for p in self.parts) / whole for k in range(3)]
+        try:
+            whole = self.volume
+            centre = [math.fsum(p.shape.volume * p.position[k] for p in self.parts) / whole for k in range(3)]
+        except (OverflowError, ValueError, ZeroDivisionError):  # of infinities, opposite ones, or nothing
+            centre = [math.nan]
+        if not all(map(math.isfinite, centre)):
+            raise SceneError(
+                "compound: its parts are so large, so small or so far away that numbers do not hold their moments; "
+                "choose another unit of length"
+            )
         size = max(math.hypot(*part.position) + part.shape.volume ** (1.0 / 3.0) for part in self.parts)
         if math.hypot(*centre) > 1e-9 * size:
             raise SceneError(
