@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from spook_tracker.engine import (
     PLAIN,
+    WORLD,
     AngularVelocity,
     Box,
     Final,
     Fluid,
+    MaximumAbsolute,
     Method,
     Orientation,
     Position,
+    Prismatic,
     Result,
     RigidBody,
     Scene,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_point, cell, table
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -31,6 +37,8 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityMap,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -45,6 +53,14 @@ ANGLES = (2.0, 5.0, 10.0)  # degrees, at which the surface meets only the sides
 UPRIGHT = (0.2, 0.8)  # ratios at which it stands
 TILTED = (0.2225, 0.5, 0.7775)  # and at which it falls
 NUDGE = 1e-4  # rad
+LIFTED, BOBS = (
+    1e-7,
+    60,
+)  # m and steps, of the stability studies: so little that it can grow a hundredfold unbent
+SEARCHED = 2e-3  # their resolution
+DRAG = 1.0  # 1, of the log across a stream
+STEPS = (1 / 60, 0.05, 0.1, 0.15, 0.2, 0.24, 0.26, 0.3)  # s
+STREAMS = (0.0, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 200.0, 300.0)  # m/s
 
 
 def scene(ratio: float = RATIO, raised: float = 0.0, roll: float = 0.0) -> Scene:
@@ -138,6 +154,66 @@ def _wrong(simulate: Simulate, ratio: float, stands: bool) -> bool:
     return rolled > 1.1 * NUDGE if stands else rolled < 100.0 * NUDGE
 
 
+def bobs(simulate: Simulate, ratio: float, time_step: float) -> bool:
+    """Whether a log that is lifted a little never goes a hundred times as far."""
+    observe = {"z": MaximumAbsolute(quantity=Position("log"), from_start=True)}
+    result = simulate(scene(ratio, raised=LIFTED), time_step=time_step, steps=BOBS, observe=observe)
+    return result.completed and float(result["z"][2]) < 100.0 * LIFTED
+
+
+LONGEST = 2.0 / heave_rate()  # s: h ω = 2
+LIGHTEST = 0.25 * GRAVITY * TIME_STEP**2 / SIDE  # density ratio: the same at 1/60 s
+
+
+def longest(simulate: Simulate) -> BreakPoint:
+    """The longest step in which the log bobs."""
+    return break_point(
+        lambda time_step: bobs(simulate, RATIO, time_step), 0.4 * LONGEST, 2.0 * LONGEST, resolution=SEARCHED
+    )
+
+
+def lightest(simulate: Simulate) -> BreakPoint:
+    """The lightest log that bobs at 1/60 s."""
+    return break_point(
+        lambda ratio: bobs(simulate, ratio, TIME_STEP), 6.0 * LIGHTEST, 0.2 * LIGHTEST, resolution=SEARCHED
+    )
+
+
+def moored(stream: float) -> Scene:
+    """The log lifted a little on a rail straight up, across a stream [m/s] with drag."""
+    rail = Prismatic(name="rail", between=(WORLD, "log"), axis=(0.0, 0.0, 1.0), compliance=0.0)
+    sea = Fluid(name="sea", density=WATER, level=0.0, velocity=(0.0, stream, 0.0), drag_coefficient=DRAG)
+    return replace(scene(raised=LIFTED), constraints=(rail,), forces=(sea,))
+
+
+def heave_growth(time_step: float, stream: float) -> float:
+    """Growth of a small heave in a step: largest |eigenvalue| of v₊ = (1 − h c) v − h ω² z, z₊ = z + h v₊."""
+    damped = 1.0 - time_step * 0.5 * DRAG * stream / SIDE
+    pulled = -time_step * heave_rate() ** 2
+    step = np.array(((1.0 + time_step * pulled, time_step * damped), (pulled, damped)))
+    return float(np.abs(np.linalg.eigvals(step)).max())
+
+
+def stream_map(simulate: Simulate) -> StabilityMap:
+    """(time step, stream): what a run does, beside the eigenvalue of its step."""
+
+    def kind(time_step: float, stream: float) -> str:
+        observe = {"z": Trace(quantity=Position("log"), from_start=True)}
+        result = simulate(moored(stream), time_step=time_step, steps=BOBS, observe=observe)
+        return cell(result, result.partial["z"][:, 2] / LIFTED + 1.0, bound=100.0, rest=1e-3)
+
+    return StabilityMap(
+        x=STEPS,
+        y=STREAMS,
+        cells=table(STREAMS, STEPS, kind),
+        x_label="time step [s]",
+        y_label="stream [m/s]",
+        prediction=table(STREAMS, STEPS, heave_growth),
+        note="Drag is a plain force, too: a stream that damps the heave at short steps drives it at long ones, from "
+        f"(h ω)² + h C U/B = 4 on; without a stream that is {told(LONGEST, 3)} s.",
+    )
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest distance from z_0 cos ω t in 2 s [m]."""
     observe = {"z": Trace(quantity=Position("log"))}
@@ -203,6 +279,8 @@ TEST = ScalarTest(
         "Heave: ω² = ρ g A/m = g/(s H). One step of the method: z_n = z₀ cos((n + ½) θ)/cos(θ/2) with sin(θ/2) = h ω/2.",
         "Roll: righting arm GZ = sin φ (GM + ½ BM tan² φ), GM = s H/2 + B²/(12 s H) − H/2, BM = B²/(12 s H).",
         "GM < 0 between s = ½ − √(1/12) = .2113 and ½ + √(1/12) = .7887: there a square log does not stand.",
+        "Buoyancy and drag are plain forces: no step carries h ω > 2, which at 1/60 s is foam of g h²/(4 H) the density of water; "
+        "across a stream U with drag C the heave is damped by c = C U/(2 B) and bounded while (h ω)² + 2 h c < 4.",
     ),
     reference="Hydrostatics in closed form, wall-sided formula; closed form of the discrete step.",
     conclusion="Green: the submerged volume, its centre and the forces from them are right. Red: one of them is not, "
@@ -282,6 +360,38 @@ TEST = ScalarTest(
     figures=(
         Figure(name="heave", title="Heave", draw=draw_heave),
         Figure(name="roll", title="Roll against density", draw=draw_roll),
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step",
+            title="Longest time step in which the log bobs",
+            configuration="plain",
+            definition="lifted by 1e-7 m it never goes a hundred times as far in 60 steps",
+            study=longest,
+            unit="s",
+            expected=((1.0 - 1.1 * SEARCHED) * LONGEST, LONGEST),
+            expected_source="h ω = 2: at rest z_n turns into (2 n + 1) z₀ there, before it into no more than z₀/√(1 − (h ω/2)²); "
+            "the search ends 0.2 % short of it at most",
+        ),
+        StabilityStudy(
+            name="lightest",
+            title="Lightest log, over the water, that bobs at 1/60 s",
+            configuration="plain",
+            definition="lifted by 1e-7 m it never goes a hundred times as far in 60 steps",
+            study=lightest,
+            unit="1",
+            better="smaller",
+            expected=(LIGHTEST, (1.0 + 1.1 * SEARCHED) * LIGHTEST),
+            expected_source="h ω = 2 of the heave, ω² = g/(s H): s = g h²/(4 H); the search ends 0.2 % short of it at most",
+        ),
+        StabilityStudy(
+            name="stream",
+            title="Heave of a log moored across a stream",
+            configuration="plain",
+            definition="lifted by 1e-7 m, 60 steps: settled within a thousandth of that; growing beyond a hundred times, or "
+            "twice as large in the last third as in the middle",
+            study=stream_map,
+        ),
     ),
     ladders=(
         Ladder(
