@@ -18,6 +18,7 @@ from spook_tracker.engine import (
     Method,
     Momentum,
     Particle,
+    Position,
     Prismatic,
     Relation,
     Result,
@@ -29,7 +30,9 @@ from spook_tracker.engine import (
     Wire,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -38,6 +41,7 @@ from spook_tracker.scalar_tests.case import (
     Measurement,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -53,13 +57,21 @@ IDEAL = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT)  # m/s²
 TURNING = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT + DRUM / RADIUS**2)
 
 
-def atwood() -> Scene:
+BLOCK, STRAND, SLING = 1.0, 4.0, 1.0  # kg, m, m: a block in two strands, and the load under it
+ASIDE, SWAYS, SEARCHED = 1e-7, 200, 2e-3  # m and steps, of the study of its sway, and its resolution
+RATIOS, HELD = (
+    1e12,
+    1e-9,
+)  # as far as the ratio of two weights is searched, and to what their pull must be right
+
+
+def atwood(heavy: float = HEAVY, light: float = LIGHT) -> Scene:
     """Two weights on a wire over two eyes without friction."""
     ends = {"heavy": (-RADIUS, 0.0, -1.0), "light": (RADIUS, 0.0, -1.0)}
     return Scene(
         bodies=(
-            Particle(name="heavy", mass=HEAVY, position=ends["heavy"]),
-            Particle(name="light", mass=LIGHT, position=ends["light"]),
+            Particle(name="heavy", mass=heavy, position=ends["heavy"]),
+            Particle(name="light", mass=light, position=ends["light"]),
         ),
         constraints=(
             Wire(
@@ -112,6 +124,25 @@ def tackle(load: float, strands: int = 4) -> Scene:
             Particle(name="weight", mass=1.0, position=(4.0, 0.0, 0.0)),
         ),
         constraints=(Wire(name="wire", through=tuple(through), compliance=0.0),),
+        gravity=(0.0, 0.0, -GRAVITY),
+    )
+
+
+def crane(load: float) -> Scene:
+    """A block in two strands of a wire, balanced by a weight at its end, with a load [kg] on a sling; the block is nudged."""
+    block = (ASIDE, 0.0, 0.0)
+    top, side = (0.0, 0.0, STRAND), (STRAND, 0.0, STRAND)
+    strands = ((WORLD, top), ("block", block), (WORLD, top), (WORLD, side), ("weight", (STRAND, 0.0, 0.0)))
+    return Scene(
+        bodies=(
+            Particle(name="block", mass=BLOCK, position=block),
+            Particle(name="load", mass=load, position=(0.0, 0.0, -SLING)),
+            Particle(name="weight", mass=0.5 * (BLOCK + load), position=(STRAND, 0.0, 0.0)),
+        ),
+        constraints=(
+            Wire(name="wire", through=strands, compliance=0.0),
+            Wire(name="sling", through=(("block", block), ("load", (0.0, 0.0, -SLING))), compliance=0.0),
+        ),
         gravity=(0.0, 0.0, -GRAVITY),
     )
 
@@ -190,6 +221,43 @@ def snap(simulate: Simulate) -> dict[str, float]:
     return worst
 
 
+def heaviest_load() -> float:
+    """The load [kg] with which the block sways by half a turn a step, Ω = 2/h: its strands pull it back with (m + M) g/s aside,
+    its sling with M g/l, and Ω² is an eigenvalue of both bodies' sway."""
+    square, strand, sling = (2.0 / TIME_STEP) ** 2, GRAVITY / STRAND, GRAVITY / SLING
+    return BLOCK * (square - strand) * (square - sling) / (square * (strand + sling) - strand * sling)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest load under a light block that hangs still."""
+
+    def hangs(load: float) -> bool:
+        observe = {"x": MaximumAbsolute(quantity=Position("block"), from_start=True)}
+        result = simulate(crane(load), time_step=TIME_STEP, steps=SWAYS, observe=observe)
+        return result.completed and float(result["x"][0]) < 100.0 * ASIDE
+
+    return break_point(hangs, 0.1 * heaviest_load(), 3.0 * heaviest_load(), resolution=SEARCHED)
+
+
+def most_uneven(simulate: Simulate) -> BreakPoint:
+    """The largest ratio of two weights whose wire pulls as it must, half a second long."""
+    observe: dict[str, Observable] = {
+        "v": Final(quantity=Velocity("heavy")),
+        "pull": Final(quantity=ConstraintForce("wire")),
+    }
+
+    def pulls(ratio: float) -> bool:
+        result = simulate(atwood(ratio, 1.0), time_step=TIME_STEP, steps=30, observe=observe)
+        if not result.completed:
+            return False
+        pull = 2.0 * ratio * GRAVITY / (ratio + 1.0)
+        speed = (ratio - 1.0) * GRAVITY / (ratio + 1.0) * 30.0 * TIME_STEP
+        off = abs(float(result["pull"]) / pull - 1.0), abs(-float(result["v"][2]) / speed - 1.0)
+        return max(off) < HELD
+
+    return break_point(pulls, 10.0, RATIOS, walk=12)
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Place of the drum's heavy weight after a second against ½ a t² [m]."""
     from_start = {"z": Trace(quantity=Velocity("heavy"))}
@@ -242,14 +310,16 @@ TEST = ScalarTest(
         ("Atwood", "3 kg and 2 kg; drum of 0.08 kg m² and 0.2 m"),
         ("tackle", "n = 2 … 8 strands, 1 kg against n and 2 n kg"),
         ("tow", "5 kg and 2 kg, 3 m/s, 0.4 m of slack"),
+        ("crane", "a block of 1 kg in two strands of 4 m, a load on a sling of 1 m"),
         ("gravity", "9.81 m/s²; none for the tow"),
     ),
     theory=(
         "Atwood: a = (m₁ − m₂) g/(m₁ + m₂ + I/r²); pull 2 m₁ m₂ g/(m₁ + m₂) with I = 0.",
         "Tackle of n strands: M = n m balances; else a = (M − n m) g/(M + n² m) of the block.",
         "Snap: the parting speed u becomes −e u, momentum stays, ½ µ u² (1 − e²) is lost, µ = m M/(m + M).",
-        "The rope is one row with λ ≤ 0: an open gap may close and no more, then the blow acts. Nothing here can run away: "
-        "wires are rigid along their length and hang straight, so they have no swing.",
+        "The rope is one row with λ ≤ 0: an open gap may close and no more, then the blow acts.",
+        "Wires are rigid along their length, at any ratio of weights. Across it a light block under a heavy load is a swing: "
+        "ω² is nearly (M g/m) (1/s + 1/l) with strands of s and a sling of l, and no step carries h ω > 2.",
     ),
     reference="Mechanics in closed form.",
     conclusion="Green: wires pull alike on both sides of every eye and ropes let go. Red: a wire pushes, or a blow "
@@ -328,6 +398,30 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=atwood(), time_step=TIME_STEP, duration=1.0),
     figures=(Figure(name="snap", title="A rope snaps taut", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="heaviest-load",
+            title="Heaviest load under a block of 1 kg that hangs still at 1/60 s",
+            configuration="plain",
+            definition="nudged by 1e-7 m the block, in two strands of 4 m with the load on a sling of 1 m, never goes a "
+            "hundred times as far in 200 steps",
+            study=heaviest,
+            unit="kg",
+            expected=((1.0 - 1.1 * SEARCHED) * heaviest_load(), heaviest_load()),
+            expected_source="h ω = 2 of the faster sway of block and load; the search ends 0.2 % short of it at most",
+        ),
+        StabilityStudy(
+            name="mass-ratio",
+            title="Largest ratio of two weights whose wire pulls as it must",
+            configuration="plain",
+            definition="after 30 steps pull and speed are right to 1e-9",
+            study=most_uneven,
+            unit="1",
+            expected=(RATIOS, RATIOS),
+            expected_source="a wire is one row: 1/m₁ + 1/m₂ is a sum in which nothing cancels, so only rounding is lost at any "
+            "ratio; the search ends at 1e12",
+        ),
+    ),
     ladders=(
         Ladder(
             name="fall",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 
 from spook_tracker.engine import simulate
-from spook_tracker.scalar_tests import floating_box
+from spook_tracker.scalar_tests import floating_box, wires
 from spook_tracker.scalar_tests.bracket import is_stable
 from spook_tracker.scalar_tests.case import StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -73,3 +74,55 @@ def test_logs_do_in_a_stream_what_their_eigenvalues_say() -> None:
     assert isinstance(found, StabilityMap) and found.prediction is not None
     for cells, growths in zip(found.cells, found.prediction, strict=True):
         assert [is_stable(kind) for kind in cells] == [growth <= 1.0 + 1e-9 for growth in growths]
+
+
+def crane_energy(places: np.ndarray, load: float) -> float:
+    """Potential [J] of block, load and weight, at the sideways places [m] of the first two; wires as long as ever.
+
+    The block may hang anywhere: it stays at its height, and the weight gives way.
+    """
+    w, (block, hung) = wires, places
+    strands = 2.0 * (math.hypot(block, w.STRAND) - w.STRAND)  # what the weight is drawn up by
+    lower = math.sqrt(w.SLING**2 - (hung - block) ** 2)
+    return w.GRAVITY * (0.5 * (w.BLOCK + load) * strands - load * lower)
+
+
+def swayed(load: float) -> float:
+    """How far from its start a nudged block gets in the steps of the study, over the nudge."""
+    size, h = 1e-3, wires.TIME_STEP
+    stiff = np.zeros((2, 2))
+    for i, j, a, b in ((i, j, a, b) for i in (0, 1) for j in (0, 1) for a in (1, -1) for b in (1, -1)):
+        corner = size * (a * np.eye(2)[i] + b * np.eye(2)[j])
+        stiff[i, j] += a * b * crane_energy(corner, load) / (4.0 * size * size)
+    pull = stiff / np.array(((wires.BLOCK,), (load,)))
+    x, v, found = np.array((1.0, 0.0)), np.zeros(2), 0.0
+    for _ in range(wires.SWAYS):
+        v = v - h * pull @ x
+        x = x + h * v
+        found = max(found, abs(x[0] - 1.0))
+    return found
+
+
+def test_a_light_block_carries_what_its_sway_allows() -> None:
+    low, high = band("wires", "heaviest-load")
+    assert swayed(low * math.exp(wires.SEARCHED)) < 100.0 < swayed(high)
+
+
+def test_weights_on_a_wire_lose_nothing_but_rounding_at_any_ratio() -> None:
+    """One row in floating point against the same in fractions, where λ = −(G v − h G g)/(1/M + 1/m)."""
+    assert band("wires", "mass-ratio") == (wires.RATIOS, wires.RATIOS)
+    for ratio in (10.0 ** np.arange(1.0, 13.0)).tolist():
+        found = []
+        for number in (float, Fraction):
+            heavy, h, g = number(ratio), number(wires.TIME_STEP), number(wires.GRAVITY)
+            down, up, pull = number(0), number(0), number(0)  # m/s downwards of both, N s
+            for _ in range(30):
+                down, up = down + h * g, up + h * g
+                pull = (down + up) / (1 / heavy + number(1))
+                down, up = down - pull / heavy, up - pull
+            found.append((pull / h, down))
+        (pull, down), (exact_pull, exact_down) = found
+        closed = 2 * Fraction(ratio) * Fraction(wires.GRAVITY) / (Fraction(ratio) + 1)
+        assert exact_pull == closed
+        assert abs(Fraction(pull) / exact_pull - 1) < 1e-3 * wires.HELD
+        assert abs(Fraction(down) / exact_down - 1) < 1e-3 * wires.HELD
