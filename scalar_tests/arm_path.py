@@ -12,6 +12,7 @@ import numpy as np
 from spook_tracker.engine import (
     PLAIN,
     ConstraintForce,
+    Final,
     Hinge,
     JointCoordinate,
     Load,
@@ -24,7 +25,9 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -32,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.robot_arm import POSES, inverse_dynamics, kinematics
@@ -49,6 +53,9 @@ READ = (0.2, 0.4)  # s, when its torques are read
 WEAK = {1: 40.0, 2: 10.0}  # N m, bounds of the drives of the second and the third joint
 FALL = 15  # steps
 STILL = np.zeros(6)
+NUDGE = 1e-6  # rad, of every joint
+SWINGS = 16  # steps
+FASTEST = 2.0 * (math.sqrt(2.0) - 1.0) / TIME_STEP  # rad/s, of a critical correction once a step
 
 
 def path(time: float) -> tuple[Any, Any, Any]:
@@ -60,9 +67,9 @@ def path(time: float) -> tuple[Any, Any, Any]:
     )
 
 
-def drives(motors: list[Motor | None], pose: Any = POSES[0]) -> Scene:
-    """The arm of the other question at rest in a pose, with these drives."""
-    still = driven(pose)
+def drives(motors: list[Motor | None], pose: Any = POSES[0], speeds: Any = STILL) -> Scene:
+    """The arm of the other question in a pose, its joints turning at these speeds, with these drives."""
+    still = driven(pose, speeds)
     joints = (joint for joint in still.constraints if isinstance(joint, Hinge))
     return replace(
         still,
@@ -198,6 +205,41 @@ def held_limit() -> float:
     return 1.25 * (TIME_STEP * float(np.abs(fallen()[1]).sum())) ** 2
 
 
+def corrected(pose: Any, speeds: Any, rate: float) -> Scene:
+    """The arm on its way back to the second pose: torques that inverse dynamics gives for e'' = −ω² e − 2 ω e'."""
+    torques, _, _ = inverse_dynamics(pose, speeds, -(rate**2) * (pose - POSES[1]) - 2.0 * rate * speeds)
+    pushes = [*(t * axis for t, (_, axis, _, _) in zip(torques, kinematics(pose), strict=True)), np.zeros(3)]
+    loads = tuple(
+        Load(name=f"torque {k + 1}", body=f"link {k + 1}", torque=tuple(pushes[k] - pushes[k + 1]))
+        for k in JOINTS
+    )
+    return replace(drives([None] * 6, pose, speeds), forces=loads)
+
+
+def comes_back(simulate: Simulate, rate: float) -> bool:
+    """Whether no joint is further from the second pose after some steps, each with the torques of the angles at its start and
+    of how far they came in the step before; begun on the swing from side to side that breaks first."""
+    observe: dict[str, Observable] = {
+        f"{k}": Final(quantity=JointCoordinate(f"joint {k + 1}")) for k in JOINTS
+    }
+    off, turned = np.full(6, NUDGE), np.full(6, 2.0 * NUDGE)
+    for _ in range(SWINGS):
+        asked = corrected(POSES[1] + off, turned / TIME_STEP, rate)
+        result = simulate(asked, time_step=TIME_STEP, steps=1, observe=observe)
+        if not result.completed:
+            return False
+        turned = np.array([float(result[f"{k}"]) for k in JOINTS])
+        off = off + turned
+    return float(np.abs(off).max()) <= NUDGE
+
+
+def stiffest(simulate: Simulate) -> BreakPoint:
+    """The fastest correction that leads the arm back."""
+    return break_point(
+        functools.partial(comes_back, simulate), 0.3 * FASTEST, 3.0 * FASTEST, resolution=1e-3, walk=4
+    )
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest distance of a joint from the path [rad]."""
     return float(np.abs(strays(simulate, time_step, method)).max())
@@ -245,7 +287,8 @@ TEST = ScalarTest(
         "A step takes torques at its start: it leads by h/2, and an arm without feedback leaves its path with what that grows "
         "to. Rows know how joints move a step late, two at most.",
         "A drive at its bound carries the bound; the joint falls with M⁻¹ of what is left.",
-        "Nothing can run away here but the arm itself, which has no feedback.",
+        "Without feedback only the arm itself can run away. With torques for e'' = −ω² e − 2 ω e', once a step, it does beyond "
+        "h ω = 2 (√2 − 1).",
     ),
     reference="Recursive Newton–Euler; the fall by Runge and Kutta with its columns for a mass matrix.",
     conclusion="Green: the arm answers torques as its model says. Red: loads, drives' bounds or inertias act wrongly.",
@@ -314,6 +357,19 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=led(), time_step=TIME_STEP, duration=DURATION),
     figures=(Figure(name="path", title="Distance from the path", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="stiffest",
+            title="Fastest critical correction that computed torque may ask for at 1/60 s",
+            configuration="plain",
+            definition="a microradian off the second pose, to the other side with every step, no joint is further off after 16",
+            study=stiffest,
+            unit="rad/s",
+            expected=(0.998 * FASTEST, 1.001 * FASTEST),
+            expected_source="e'' = −ω² e − 2 ω e' once a step is z² − (2 − 2 h ω − (h ω)²) z + 1 − 2 h ω: a root is −1 at "
+            "h ω = 2 (√2 − 1); the search ends within a thousandth",
+        ),
+    ),
     ladders=(
         Ladder(
             name="path",

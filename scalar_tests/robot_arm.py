@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,9 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.joints import Constraint
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -33,6 +37,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -55,6 +60,7 @@ POSES = (  # rad
 SPEEDS = (0.8, -0.6, 1.1, -1.5, 0.9, 2.0)  # rad/s, of the driven arm
 TIME_STEP = 1.0 / 60.0  # s
 FINE = 1e-4  # s, of the driven arm
+SLOWEST = 1e-6  # rad/s, of a link that is no longer held
 SETTLED = 50  # steps after which the torques of the driven arm are read
 Vector = Any
 
@@ -137,9 +143,12 @@ def quaternion(rotation: Any) -> tuple[float, float, float, float]:
     return (w, x, y, z)
 
 
-def scene(pose: Vector, speeds: Vector = (0.0,) * 6, torque: float | None = None) -> Scene:
+def scene(
+    pose: Vector, speeds: Vector = (0.0,) * 6, torque: float | Sequence[float | None] | None = None
+) -> Scene:
     """The arm in a pose, its links moving with the joints' speeds, each joint driven at its speed with at most `torque`
-    [N m]."""
+    [N m], of all or one by one."""
+    bounds = torque if isinstance(torque, Sequence) else (torque,) * len(LINKS)
     arm = kinematics(pose)
     _, velocities, spins = inverse_dynamics(pose, speeds, np.zeros(6))
     bodies: list[RigidBody] = []
@@ -165,7 +174,7 @@ def scene(pose: Vector, speeds: Vector = (0.0,) * 6, torque: float | None = None
                 at=tuple(place),
                 axis=tuple(axis),
                 compliance=0.0,
-                motor=Motor(speed=float(speeds[k]), max_force=torque),
+                motor=Motor(speed=float(speeds[k]), max_force=bounds[k]),
             )
         )
     return Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=GRAVITY)
@@ -202,6 +211,21 @@ def hold(simulate: Simulate) -> dict[str, float]:
     axis = kinematics(POSES[1])[1][1]
     bound = abs(float(axis @ result["f"][3:])) / weak - 1.0
     return {"holding_error": worst, "creep": moved, "bound_error": bound}
+
+
+def stays(simulate: Simulate, share: float) -> bool:
+    """Whether the second pose is still held after half a second by drives that may carry so much of what that takes; the
+    upright axis needs none and is held."""
+    needed = np.abs(inverse_dynamics(POSES[1], np.zeros(6), np.zeros(6))[0])
+    asked = scene(POSES[1], torque=[None, *(float(share * one) for one in needed[1:])])
+    observe = {"w": Final(quantity=AngularVelocity())}
+    result = simulate(asked, time_step=TIME_STEP, steps=30, observe=observe)
+    return result.completed and float(np.abs(result["w"]).max()) < SLOWEST
+
+
+def weakest(simulate: Simulate) -> BreakPoint:
+    """The weakest drives that hold the arm."""
+    return break_point(functools.partial(stays, simulate), 3.0, 0.3, resolution=1e-4, walk=5)
 
 
 def driven_error(
@@ -289,7 +313,8 @@ TEST = ScalarTest(
         "Outward: ω, ω', accelerations of the links; inward: forces and moments; τ_i = axis_i · moment_i.",
         "At rest the discrete torques are those, exactly. In motion the step takes the gyroscopic and centrifugal "
         "terms at its own place in time, a step late: first order in h.",
-        "A drive at its bound carries the bound. Nothing can run away: drives hold every joint at its speed.",
+        "A drive at its bound carries the bound. Nothing runs away while drives hold every joint at its speed: they do down to "
+        "bounds of what inverse dynamics asks for.",
     ),
     reference="Recursive Newton–Euler written in this test (J. Luh, M. Walker, R. Paul, ASME JDSMC 102 (1980) 69).",
     conclusion="Green: drives, hinges and inertias act together as mechanics says. Red: a reaction, an inertia or a sign "
@@ -355,6 +380,20 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(POSES[1], SPEEDS), time_step=TIME_STEP, duration=4.0),
     figures=(Figure(name="torques", title="Torques of the joints", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="weakest",
+            title="Weakest drives that hold the arm, over what inverse dynamics asks of each",
+            configuration="plain",
+            definition="after half a second in the second pose no link turns faster than 1e-6 rad/s",
+            study=weakest,
+            unit="1",
+            better="smaller",
+            expected=(1.0 - 1e-6, 1.0 + 1.01e-4),
+            expected_source="statics: the torques of inverse dynamics hold it, and a millionth less does not; the search ends "
+            "within 1e-4",
+        ),
+    ),
     ladders=(
         Ladder(
             name="torque",

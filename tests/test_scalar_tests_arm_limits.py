@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.scalar_tests import arm_path, robot_arm
+from spook_tracker.scalar_tests.bracket import break_point
 from tests.limits import measurement
 
 STILL = np.zeros(6)
@@ -107,3 +108,61 @@ def test_torques_of_a_guided_arm_are_two_steps_late_at_most() -> None:
         q, v, a = arm_path.path(time)
         whole = mass_matrix(q) @ a + motion_part(q, v) + robot_arm.inverse_dynamics(q, STILL, STILL)[0]
         np.testing.assert_allclose(robot_arm.inverse_dynamics(q, v, a)[0], whole, atol=1e-9)
+
+
+def weight(pose: Any) -> Any:
+    """The torques that hold the arm, from the slope of its potential energy; not from forces."""
+
+    def energy(at: Any) -> float:
+        arm = zip(robot_arm.LINKS, robot_arm.kinematics(at), strict=True)
+        return sum(mass * 9.81 * float(link[2][2]) for (_, _, _, mass, _), link in arm)
+
+    d = 1e-4
+    return np.array([(energy(pose + d * one) - energy(pose - d * one)) / (2.0 * d) for one in np.eye(6)])
+
+
+def test_the_arm_is_held_down_to_the_slope_of_its_energy() -> None:
+    pose = np.array(robot_arm.POSES[1])
+    (study,) = robot_arm.TEST.stability
+    needed = weight(pose)
+    np.testing.assert_allclose(robot_arm.inverse_dynamics(pose, STILL, STILL)[0], needed, atol=1e-6)
+
+    def stays(share: float) -> bool:
+        """Drives of so much each: what the weight has left over turns the links for half a second; the axis needs none."""
+        left = max(0.0, 1.0 - share) * needed[1:]
+        speeds = np.append(0.0, 0.5 * np.linalg.solve(mass_matrix(pose)[1:, 1:], left))
+        spins = robot_arm.inverse_dynamics(pose, speeds, STILL)[2]
+        return float(np.abs(spins).max()) < robot_arm.SLOWEST
+
+    low, high = study.expected or (0.0, 0.0)
+    found = break_point(stays, 3.0, 0.3, resolution=1e-4, walk=5)
+
+    assert not stays(low) and stays(1.0)
+    assert low < found.value < high < low * (1.0 + 1.1e-4)
+
+
+def test_a_correction_once_a_step_breaks_where_its_polynomial_and_steps_of_the_joints_do() -> None:
+    (study,) = arm_path.TEST.stability
+    h, pose = arm_path.TIME_STEP, np.array(robot_arm.POSES[1])
+
+    def largest(rate: float) -> float:
+        """Of the roots of z² − (2 − 2 x − x²) z + 1 − 2 x, from e₊ = e + h v₊, v₊ = v − h (ω² e + 2 ω v), x = h ω."""
+        x = h * rate
+        return float(np.abs(np.linalg.eigvals([[1.0 - x * x, 1.0 - 2.0 * x], [-x * x, 1.0 - 2.0 * x]])).max())
+
+    def comes_back(rate: float) -> bool:
+        """The torques of inverse dynamics on an arm of energies: the mass matrix of the kinetic, the slope of the other."""
+        off, turned = np.full(6, arm_path.NUDGE), np.full(6, 2.0 * arm_path.NUDGE)
+        for _ in range(arm_path.SWINGS):
+            v = turned / h
+            asked = robot_arm.inverse_dynamics(pose + off, v, -rate * rate * off - 2.0 * rate * v)[0]
+            v = v + h * np.linalg.solve(mass_matrix(pose + off), asked - weight(pose + off))
+            turned = h * v
+            off = off + turned
+        return bool(np.abs(off).max() <= arm_path.NUDGE)
+
+    low, high = study.expected or (0.0, 0.0)
+
+    assert largest(low) < 1.0 < largest(high) and comes_back(low) and not comes_back(high)
+    assert largest(arm_path.FASTEST) == pytest.approx(1.0, abs=1e-12)
+    assert high < 1.0031 * low
