@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from spook_tracker.engine import (
     PLAIN,
     Box,
+    Final,
     Material,
     Method,
     Orientation,
@@ -20,7 +22,9 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -28,6 +32,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -39,21 +44,29 @@ RADIUS = math.hypot(HALF_WIDTH, HALF_HEIGHT)  # m, from a corner to the centre
 SLENDER = math.atan2(HALF_WIDTH, HALF_HEIGHT)  # rad, the lean at which it stands on its corner
 RATE = math.sqrt(0.75 * GRAVITY / RADIUS)  # p, 1/s
 START = 0.6 * SLENDER  # rad
+COARSE = 1.0 / 60.0  # s, of a fall without a blow
+SHORT, LAID, ARRIVING, ROCKED = 1e-5, 2e-4, 2.0, 5e-9  # s, rad, rad/s, rad: of a blow by itself
 KEPT = 1.0 - 1.5 * math.sin(SLENDER) ** 2  # of the angular velocity at a blow
 
 
 @functools.cache
-def scene() -> Scene:
-    """The block at rest, leaning on its right lower edge."""
+def scene(lean: float = START, half_width: float = HALF_WIDTH, spin: float = 0.0) -> Scene:
+    """The block leaning on its right lower edge, at rest or turning about it [rad/s]."""
     rough = Material(friction=2.0)
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=rough)
-    c, s = math.cos(START), math.sin(START)
+    c, s = math.cos(lean), math.sin(lean)
+    out, up = (
+        HALF_HEIGHT * s - half_width * c,
+        half_width * s + HALF_HEIGHT * c,
+    )  # of the centre, from the edge
     block = RigidBody(
         name="block",
         mass=MASS,
-        shape=Box((2 * HALF_WIDTH, DEPTH, 2 * HALF_HEIGHT)),
-        position=(HALF_WIDTH - HALF_WIDTH * c + HALF_HEIGHT * s, 0.0, HALF_WIDTH * s + HALF_HEIGHT * c),
-        orientation=(math.cos(0.5 * START), 0.0, math.sin(0.5 * START), 0.0),
+        shape=Box((2 * half_width, DEPTH, 2 * HALF_HEIGHT)),
+        position=(half_width + out, 0.0, up),
+        orientation=(math.cos(0.5 * lean), 0.0, math.sin(0.5 * lean), 0.0),
+        velocity=(spin * up, 0.0, -spin * out),
+        angular_velocity=(0.0, spin, 0.0),
         material=rough,
     )
     return Scene(bodies=(ground, block), gravity=(0.0, 0.0, -GRAVITY))
@@ -94,6 +107,50 @@ DURATION = quarter(START) + 2.0 * quarter(next_lean()) + 0.1  # s, two blows
 def whole(time_step: float) -> float:
     """Two blows, in whole steps [s]."""
     return round(DURATION / time_step) * time_step
+
+
+def returns(simulate: Simulate, lean: float) -> bool:
+    """Whether a block let go at that lean has come back by some of it after a second."""
+    observe = {"q": Final(quantity=Orientation("block"))}
+    result = simulate(scene(lean), time_step=COARSE, duration=1.0, observe=observe)
+    return result.completed and 2.0 * math.atan2(result["q"][2], result["q"][0]) < lean
+
+
+def farthest(simulate: Simulate) -> BreakPoint:
+    """The largest lean from which it comes back."""
+    return break_point(
+        functools.partial(returns, simulate), 0.25 * SLENDER, 2.0 * SLENDER, resolution=1e-4, walk=5
+    )
+
+
+def rocks(simulate: Simulate, half_width: float) -> bool:
+    """Whether a block that a slow turn sets down on its other edge leans over that one then."""
+    observe = {"q": Trace(quantity=Orientation("block"))}
+    asked = scene(LAID, half_width, -ARRIVING)
+    result = simulate(asked, time_step=SHORT, steps=100, observe=observe)
+    return result.completed and float(result["q"][:, 2].min()) < -ROCKED
+
+
+def broadest(simulate: Simulate) -> BreakPoint:
+    """The largest width over its height at which it rocks on."""
+    found = break_point(
+        functools.partial(rocks, simulate),
+        0.5 * HALF_HEIGHT,
+        4.0 * HALF_HEIGHT,
+        resolution=1e-4,
+        walk=4,
+    )
+    return replace(found, value=found.value / HALF_HEIGHT)
+
+
+def unseen() -> float:
+    """How far below √2 of its height a block is so broad that it does not lean by `ROCKED`, or not within the step of its
+    blow: ω₊ = (1 − (3/2) sin²α) ω₋ must pay for the lean, ω₊² = 2 p² sin α θ, for gravity's kick, h p² sin α, and for the
+    corner's arm at a lean of h ω₋, 3 sin α cos α h ω₋². By b/h it falls by 3 √2/9 ω₋."""
+    s, c = math.sqrt(2.0 / 3.0), math.sqrt(1.0 / 3.0)
+    pull = 0.75 * GRAVITY / (HALF_HEIGHT / c) * s  # p² sin α
+    lost = math.sqrt(2.0 * pull * ROCKED) + SHORT * pull + 3.0 * s * c * SHORT * ARRIVING**2
+    return lost / ARRIVING / (math.sqrt(2.0) / 3.0)
 
 
 def leans(simulate: Simulate, time_step: float, method: Method = PLAIN) -> Any:
@@ -195,6 +252,7 @@ TEST = ScalarTest(
     theory=(
         "About the new corner angular momentum is kept: ω₊/ω₋ = 1 − (3/2) sin²α, tan α = b/h (Housner 1963).",
         "The energy kept is the square of that; the swing from lean to lean follows from energy by quadrature.",
+        "It falls over from a lean of α; a block of b/h = √2 or more does not rock on, for ω₊/ω₋ = 0.",
     ),
     reference="Angular momentum about the corner, and energy (closed form; times by quadrature).",
     conclusion="Green: the blow acts where it must. Red: impacts at two points at once are solved wrongly.",
@@ -234,6 +292,29 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=1.0 / 240.0, duration=4.0),
     figures=(Figure(name="lean", title="A block that rocks", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="farthest",
+            title="Largest lean from which the block comes back",
+            configuration="plain",
+            definition="let go it leans less after a second than at the start",
+            study=farthest,
+            unit="rad",
+            expected=(0.9998 * SLENDER, 1.0001 * SLENDER),
+            expected_source="at tan α = b/h its centre is above the edge; the search ends within 1e-4",
+        ),
+        StabilityStudy(
+            name="broadest",
+            title="Largest width over height of a block that rocks on after its blow",
+            configuration="plain",
+            definition="set down at 2 rad/s it then leans over the other edge by 5e-9 rad; 1e-5 s",
+            study=broadest,
+            unit="1",
+            expected=(math.sqrt(2.0) * (1.0 - 1.01e-4) - unseen(), math.sqrt(2.0) + unseen()),
+            expected_source="Housner's rule turns no block on whose (3/2) sin²α is 1, b/h = √2; what of a lean is too small to be "
+            "seen, and the search, which ends within 1e-4",
+        ),
+    ),
     ladders=(
         Ladder(
             name="kept",

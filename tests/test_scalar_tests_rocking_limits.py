@@ -119,11 +119,11 @@ def turned(spin: float, arm: Any) -> Any:
     return spin * np.array((arm[1], -arm[0]))
 
 
-def struck(velocity: Any, spin: float, arm: Any, wanted: Any) -> tuple[Any, float]:
+def struck(velocity: Any, spin: float, arm: Any, wanted: Any, about: float = ABOUT) -> tuple[Any, float]:
     """After the impulse at a corner that gives it the wanted velocity."""
 
     def moment(push: Any) -> float:
-        return float(arm[1] * push[0] - arm[0] * push[1]) / ABOUT
+        return float(arm[1] * push[0] - arm[0] * push[1]) / about
 
     yielding = np.array([push / MASS + turned(moment(push), arm) for push in np.eye(2)]).T
     push = np.linalg.solve(yielding, wanted - velocity - turned(spin, arm))
@@ -207,3 +207,55 @@ def test_a_step_that_holds_a_blow_keeps_as_much_as_the_limits_allow() -> None:
         spin = min(spin, 0.0) if lean >= 0.0 else spin  # both edges stand
         lean, step = lean + h * spin, step + 1
     assert abs(step - right.blow / h) < limits["blow_late"]
+
+
+def test_a_block_falls_over_from_where_its_centre_is_highest() -> None:
+    r = rocking_block
+    study = next(one for one in r.TEST.stability if one.name == "farthest")
+    low, high = study.expected or (0.0, 0.0)
+    leans = np.linspace(0.0, 0.5, 500_001)
+    highest = leans[np.argmax(WIDE * np.sin(leans) + TALL * np.cos(leans))]
+    assert highest == pytest.approx(r.SLENDER, abs=2e-6)
+
+    def returns(lean: float) -> bool:
+        """Moments about the edge: m g (b cos θ − h sin θ) over 4/3 m R², by the step of the study."""
+        place, spin = lean, 0.0
+        for _ in range(60):
+            arm = WIDE * math.cos(place) - TALL * math.sin(place)
+            spin -= r.COARSE * 9.81 * arm / (4.0 / 3.0 * (WIDE**2 + TALL**2))
+            place += r.COARSE * spin
+        return place < lean
+
+    assert low < highest < high < 1.0004 * low
+    assert returns(low) and not returns(high)
+
+
+def test_no_block_broader_than_root_two_of_its_height_rocks_on() -> None:
+    """One blow by Newton's laws at the corner that comes down, as a step does it: its gap closes, and then it stands."""
+    r = rocking_block
+    study = next(one for one in r.TEST.stability if one.name == "broadest")
+    low, high = study.expected or (0.0, 0.0)
+
+    def after(ratio: float, h: float, part: float) -> float:
+        """Speed about the new corner of a block that is so broad, if it would pass upright after that part of a step."""
+        wide, lean, spin = ratio * TALL, part * h * r.ARRIVING, -r.ARRIVING
+        about, pull = MASS * (wide**2 + TALL**2) / 3.0, h * np.array((0.0, -9.81))
+        velocity = np.zeros(2)
+        for k in range(2):
+            c, s = math.cos(lean), math.sin(lean)
+            if k == 0:
+                velocity = turned(spin, np.array((-wide * c + TALL * s, wide * s + TALL * c)))
+            arm = np.array((-wide * c - TALL * s, wide * s - TALL * c))  # from the centre to the new corner
+            wanted = np.array((0.0, -2.0 * wide * s / h if k == 0 else 0.0))
+            velocity, spin = struck(velocity + pull, spin, arm, wanted, about)
+            lean += h * spin
+        return -spin
+
+    assert after(math.sqrt(2.0), 1e-9, 0.5) == pytest.approx(0.0, abs=1e-7)
+    assert after(1.0, 1e-9, 0.5) == pytest.approx(0.25 * r.ARRIVING, rel=1e-6)  # 1 − (3/2) sin² 45°
+    for part in (0.02, 0.25, 0.5, 0.75, 0.98):
+        # What turns on leans until gravity has taken its speed: m g b over 4/3 m R².
+        pull = 9.81 * low * TALL / (4.0 / 3.0 * TALL**2 * (1.0 + low**2))
+        assert after(low, r.SHORT, part) > math.sqrt(2.0 * pull * r.ROCKED)
+        assert after(high, r.SHORT, part) < math.sqrt(2.0 * pull * r.ROCKED)
+    assert high < 1.001 * low
