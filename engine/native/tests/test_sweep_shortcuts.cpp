@@ -1,0 +1,393 @@
+// What sweeps leave out must not be seen: islands that have settled, and in spent ones whatever is not far off. Random
+// contacts, islands that grow together, bodies that are met late, against the law and against sweeps over everything.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <random>
+
+#include "contacts/contact_sweeps.hpp"
+#include "expect.hpp"
+
+using namespace spook;
+
+namespace {
+
+constexpr int forever = 1'000'000;  // sweeps: no island is spent
+const std::function<bool()> nothing_more = [] { return false; };
+
+Mat6 unit_mass() {
+    Mat6 unit{};
+    for (int i = 0; i < 6; ++i) unit[7 * i] = 1.0;
+    return unit;
+}
+
+MixedSystem resting(int bodies) {
+    MixedSystem system;
+    system.mass.assign(bodies, unit_mass());
+    system.momentum.assign(bodies, Vec6{});
+    return system;
+}
+
+SweepContact between(int first, int second, Vec3 normal, double friction) {
+    SweepContact contact;
+    contact.first = first;
+    contact.second = second;
+    contact.normal = normal;
+    const Vec3 aside = std::abs(normal.x) < 0.7 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+    const Vec3 across = cross(normal, aside);
+    contact.across = (1.0 / norm(across)) * across;
+    contact.tangent = cross(contact.across, normal);
+    contact.friction = friction;
+    return contact;
+}
+
+/// What one unit of an impulse along `way` does to the contact's own slip along it, of unit masses.
+double own(const SweepContact& contact, Vec3 way) {
+    double sum = 0.0;
+    if (contact.first >= 0) sum += 1.0 + dot(cross(contact.first_arm, way), cross(contact.first_arm, way));
+    if (contact.second >= 0) sum += 1.0 + dot(cross(contact.second_arm, way), cross(contact.second_arm, way));
+    return sum;
+}
+
+/// A sweeper, with all that it was given.
+struct Heap {
+    MixedSystem system;
+    ContactSweeps sweeps;
+    std::vector<SweepContact> contacts;
+
+    explicit Heap(const MixedSystem& given) : system(given) { sweeps.start(system, FrictionModel::cone); }
+    void add(const SweepContact& contact) {
+        EXPECT(sweeps.add(contact) == static_cast<int>(contacts.size()));
+        contacts.push_back(contact);
+    }
+    Vec3 slip(const SweepContact& c) const {
+        Vec3 u;
+        if (c.first >= 0) {
+            const Vec6& v = sweeps.velocity(c.first);
+            u += Vec3{v[0], v[1], v[2]} + cross(Vec3{v[3], v[4], v[5]}, c.first_arm);
+        }
+        if (c.second >= 0) {
+            const Vec6& v = sweeps.velocity(c.second);
+            u += -1.0 * (Vec3{v[0], v[1], v[2]} + cross(Vec3{v[3], v[4], v[5]}, c.second_arm));
+        }
+        return u;
+    }
+    /// How far one contact is from Signorini's and Coulomb's law, m/s; the impulses as they are.
+    double off(std::size_t k) const {
+        const SweepContact& c = contacts[k];
+        const double* const z = sweeps.impulse(static_cast<int>(k));
+        const Vec3 u = slip(c);
+        const double w = dot(c.normal, u) - c.right[0];
+        const double normal = w > 0.0 ? std::min(w, z[0] * own(c, c.normal)) : -w;
+        if (!(c.friction > 0.0)) return normal;
+        const double bound = c.friction * z[0], used = std::hypot(z[1], z[2]);
+        const double s1 = dot(c.tangent, u), s2 = dot(c.across, u), slip = std::hypot(s1, s2);
+        EXPECT(used <= bound * (1.0 + 1e-12));
+        // What is short of the cone, or not against the slip, may not slip.
+        const double short_of = std::min(slip, (bound - used) * own(c, c.tangent)),
+                     against = used > 0.0 ? -(z[1] * s1 + z[2] * s2) / used : slip,
+                     askew = std::min(slip - std::max(0.0, against), 2.0 * bound * own(c, c.tangent));
+        return std::max({normal, short_of, askew});
+    }
+    double worst() const {
+        double sum = 0.0;
+        for (std::size_t k = 0; k < contacts.size(); ++k) sum = std::max(sum, off(k));
+        return sum;
+    }
+    /// The largest difference between the velocities and what the impulses make of the momenta.
+    double unbalanced() const {
+        std::vector<Vec6> made = system.momentum;
+        for (std::size_t k = 0; k < contacts.size(); ++k) {
+            const SweepContact& c = contacts[k];
+            const double* const z = sweeps.impulse(static_cast<int>(k));
+            const Vec3 p = z[0] * c.normal + z[1] * c.tangent + z[2] * c.across;
+            for (const bool first : {true, false}) {
+                const int body = first ? c.first : c.second;
+                if (body < 0) continue;
+                const Vec3 turn = cross(first ? c.first_arm : c.second_arm, p);
+                const double all[6] = {p.x, p.y, p.z, turn.x, turn.y, turn.z};
+                for (int i = 0; i < 6; ++i) made[body][i] += (first ? 1.0 : -1.0) * all[i];
+            }
+        }
+        double most = 0.0;
+        for (std::size_t b = 0; b < made.size(); ++b)
+            for (int i = 0; i < 6; ++i)
+                most = std::max(most, std::abs(made[b][i] - sweeps.velocity(static_cast<int>(b))[i]));
+        return most;
+    }
+};
+
+using Random = std::mt19937;
+double uniform(Random& random, double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random);
+}
+
+/// Between two of the bodies, one of them the ground at times. All push up, so that there is an answer: rise fast.
+SweepContact any_contact(Random& random, int bodies, double friction) {
+    const int first = static_cast<int>(random() % bodies);
+    int second = static_cast<int>(random() % bodies);
+    if (second == first || random() % 3 == 0) second = -1;
+    Vec3 normal{uniform(random, -0.5, 0.5), uniform(random, -0.5, 0.5), 1.0};
+    normal = (1.0 / norm(normal)) * normal;
+    SweepContact contact =
+        first > second ? between(first, second, normal, friction) : between(second, first, normal, friction);
+    contact.first_arm = {uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), -0.5};
+    contact.second_arm = {uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), 0.5};
+    return contact;
+}
+
+/// Islands settle, and then contacts found late join them to each other: all has to be swept again, and nothing lost.
+/// A row's last change is at most the tolerance, and what came after it in that sweep are at most as many such.
+void islands_that_grow_together_obey_the_law() {
+    int late = 0, joined = 0;
+    for (unsigned seed = 0; seed < 60; ++seed)
+        for (const double friction : {0.0, 0.5}) {
+            Random random(seed);
+            const int bodies = 24;
+            MixedSystem system = resting(bodies);
+            for (Vec6& p : system.momentum)
+                for (double& x : p) x = uniform(random, -1.0, 1.0);
+            Heap heap(system);
+            for (int k = 0; k < 12; ++k) heap.add(any_contact(random, bodies, friction));
+            int left = 16;
+            const double tolerance = 1e-11;
+            const auto find = [&] {
+                if (left == 0) return false;
+                for (int k = static_cast<int>(random() % 3); k >= 0 && left > 0; --k, --left) {
+                    const SweepContact& found = any_contact(random, bodies, friction);
+                    joined += found.second >= 0;
+                    heap.add(found);
+                    ++late;
+                }
+                return true;
+            };
+            bool converged = false;  // whatever is found at the end is, three times, then the next run's
+            for (int turn = 0; turn < 16 && !converged; ++turn)
+                converged = heap.sweeps.run(forever, tolerance, 1e-2, find).converged;
+            EXPECT(converged && left == 0);
+            EXPECT(heap.worst() <= 100.0 * heap.contacts.size() * tolerance);
+            EXPECT(heap.unbalanced() <= 1e-12);
+        }
+    EXPECT(late > 500 && joined > 300);
+}
+
+/// Two that rest by themselves and one that is long in settling, then a contact between them: the one at rest has to rise.
+void a_body_at_rest_is_woken_by_what_joins_it() {
+    for (const bool backwards : {false, true}) {
+        const int bodies = 8;
+        MixedSystem system = resting(bodies);
+        for (Vec6& p : system.momentum) p[2] = -1.0;
+        const int still = backwards ? bodies - 1 : 0, foot = backwards ? 0 : 1;
+        Heap heap(system);
+        heap.add(between(still, -1, {0, 0, 1}, 0.0));
+        for (int k = 0; k < bodies - 1; ++k)
+            heap.add(between(foot + k, k == 0 ? -1 : foot + k - 1, {0, 0, 1}, 0.0));
+        bool met = false;
+        const FrictionReport report = heap.sweeps.run(forever, 1e-13, 1e-3, [&] {
+            if (met) return false;
+            SweepContact push = between(still, foot, {0, 0, 1}, 0.0);
+            push.right[0] = 0.25;
+            heap.add(push);
+            return met = true;
+        });
+        EXPECT(report.converged);
+        for (int b = 0; b < bodies; ++b)
+            EXPECT_NEAR(heap.sweeps.velocity(b)[2], b == still ? 0.25 : 0.0, 1e-10);
+    }
+}
+
+/// A column of bodies on each other, all at rest by impulses that are known; one of them is struck.
+Heap struck_column(int bodies, int struck, double blow, bool upwards = true) {
+    MixedSystem system = resting(bodies);
+    for (Vec6& p : system.momentum) p[2] = -1.0;
+    system.momentum[struck][2] -= blow;
+    Heap heap(system);
+    for (int k = 0; k < bodies; ++k) {
+        const int b = upwards ? k : bodies - 1 - k;
+        SweepContact contact = between(b, b - 1, {0, 0, 1}, 0.0);
+        contact.impulse[0] = bodies - b;
+        heap.add(contact);
+    }
+    return heap;
+}
+
+/// Goes on turn by turn as the contact stage does, until no contact is further off than `focus`; the sweeps it took.
+int go_on(Heap& heap, int iterations, double focus) {
+    int sweeps = 0;
+    for (int turn = 0; turn < 1000; ++turn) {
+        sweeps += heap.sweeps.run(iterations, 1e-13, focus, nothing_more).sweeps;
+        if (!(heap.sweeps.worst(focus).residual > focus)) return sweeps;
+    }
+    return forever;
+}
+
+/// How many sweeps over everything bring all contacts within `focus`.
+int full_sweeps(int bodies, int struck, double blow, double focus, bool upwards) {
+    for (int sweeps = 1;; ++sweeps) {
+        Heap heap = struck_column(bodies, struck, blow, upwards);
+        heap.sweeps.run(sweeps, 1e-13, focus, nothing_more);
+        if (heap.worst() <= focus) return sweeps;
+    }
+}
+
+/// One body far off in an island that has settled else: the blow spreads from it, up and down the column, whatever the
+/// order of its contacts, in about as many sweeps as if all were swept; whom it does not reach is not touched.
+void what_is_far_off_in_a_spent_island_is_brought_home() {
+    const int bodies = 60;
+    const double focus = 0.05;
+    for (const bool upwards : {true, false})
+        for (const int struck : {0, 30, 59}) {
+            const double blow = 3.0;
+            const int needed = full_sweeps(bodies, struck, blow, focus, upwards);
+            for (const int iterations : {1, 3, 10}) {
+                Heap heap = struck_column(bodies, struck, blow, upwards);
+                EXPECT(go_on(heap, iterations, focus) <= 2 * needed + iterations);
+                EXPECT(heap.worst() <= focus);
+                EXPECT(heap.unbalanced() <= 1e-12);
+            }
+            // Full sweeps would go on moving what is nearer to its law than that.
+            Heap small = struck_column(bodies, struck, 0.5 * focus, upwards);
+            small.sweeps.run(1, 1e-13, focus, nothing_more);
+            std::vector<double> before;
+            for (int b = 0; b < bodies; ++b) before.push_back(small.sweeps.velocity(b)[2]);
+            EXPECT(go_on(small, 10, focus) <= 1);
+            for (int b = 0; b < bodies; ++b) EXPECT(small.sweeps.velocity(b)[2] == before[b]);
+        }
+}
+
+/// What was left when an island was spent stays said, though the sweeps after it touched nothing of it.
+void a_spent_island_is_not_called_settled_for_being_left_alone() {
+    Heap heap = struck_column(40, 20, 1.0);
+    EXPECT(!heap.sweeps.run(3, 1e-9, 0.5, nothing_more).converged);
+    const FrictionReport report = heap.sweeps.run(3, 1e-9, 0.5, nothing_more);
+    EXPECT(!report.converged);
+    EXPECT(report.residual > 1e-9);
+    EXPECT(heap.worst() > 1e-9);
+}
+
+/// A contact that is new to a spent island is swept at once, before anyone has looked who is furthest off.
+void a_contact_that_is_new_to_a_spent_island_is_swept() {
+    for (const int met : {0, 20, 39}) {
+        Heap heap = struck_column(40, 20, 1.0);
+        heap.sweeps.run(3, 1e-9, 0.05, nothing_more);
+        SweepContact wall = between(met, -1, {0, 1, 0}, 0.0);
+        wall.right[0] = 2.0;
+        heap.add(wall);
+        heap.sweeps.run(3, 1e-9, 0.05, nothing_more);
+        EXPECT_NEAR(heap.sweeps.velocity(met)[1], 2.0, 1e-12);
+    }
+}
+
+/// Two islands, one spent and far from settled, one not yet; then they are one.
+void a_spent_island_takes_in_another() {
+    for (const int joining : {0, 10, 19})
+        for (unsigned seed = 0; seed < 10; ++seed) {
+            Random random(seed);
+            MixedSystem system = resting(40);
+            for (Vec6& p : system.momentum) p[2] = uniform(random, -3.0, 0.0);
+            Heap heap(system);
+            for (int b = 0; b < 20; ++b) heap.add(between(b, b - 1, {0, 0, 1}, 0.0));
+            const double focus = 0.05;
+            heap.sweeps.run(2, 1e-12, focus, nothing_more);
+            for (int b = 20; b < 40; ++b) heap.add(between(b, b == 20 ? -1 : b - 1, {0, 0, 1}, 0.0));
+            SweepContact push = between(joining, 20 + joining, {0, 0, 1}, 0.0);
+            push.right[0] = 1.0;
+            heap.add(push);
+            EXPECT(go_on(heap, 5, focus) < forever);
+            EXPECT(heap.worst() <= focus);
+            EXPECT(heap.unbalanced() <= 1e-12);
+        }
+}
+
+/// What is left of a spent island is left of the one it joins, whichever of both is named first; the rest of it is still
+/// left alone.
+void a_spent_island_stays_spent_in_another() {
+    for (const bool spent_first : {true, false}) {
+        MixedSystem system = resting(42);
+        for (int b = 0; b < 41; ++b) system.momentum[b][2] = -1.0;
+        const int beside = 41, foot = spent_first ? 0 : 1, still = spent_first ? 40 : 0;
+        Heap heap(system);
+        for (int k = 0; k < 40; ++k) heap.add(between(foot + k, k == 0 ? -1 : foot + k - 1, {0, 0, 1}, 0.0));
+        heap.add(between(beside, foot, {0, 1, 0}, 0.0));  // touches, and pushes nobody
+        EXPECT(!heap.sweeps.run(3, 1e-9, 0.5, nothing_more).converged);
+        heap.add(between(still, -1, {0, 0, 1}, 0.0));
+        EXPECT(!heap.sweeps.run(3, 1e-9, 0.5, nothing_more).converged);
+        EXPECT_NEAR(heap.sweeps.velocity(still)[2], 0.0, 0.0);
+        const double far = heap.sweeps.velocity(foot + 30)[2];
+        heap.add(between(still, beside, {0, 1, 0}, 0.0));
+        const FrictionReport report = heap.sweeps.run(3, 1e-9, 0.5, nothing_more);
+        EXPECT(!report.converged);
+        EXPECT(report.residual > 1e-9);
+        EXPECT(heap.sweeps.velocity(foot + 30)[2] == far);
+    }
+}
+
+/// The same sweeper, step after step: islands that were, what was spent, hot or joined in them is forgotten, and a number
+/// that is used again means the new one.
+void a_step_knows_nothing_of_the_one_before() {
+    Heap used = struck_column(40, 20, 3.0);
+    for (unsigned seed = 0; seed < 40; ++seed) {
+        Random random(seed);
+        const int bodies = 10 + static_cast<int>(random() % 40);
+        MixedSystem system = resting(bodies);
+        for (Vec6& p : system.momentum)
+            for (double& x : p) x = uniform(random, -1.0, 1.0);
+        std::vector<SweepContact> contacts;
+        for (int k = 0; k < bodies; ++k) contacts.push_back(any_contact(random, bodies, 0.3));
+        Heap fresh(system);
+        MixedSystem same = system;
+        used.sweeps.start(same, FrictionModel::cone);
+        std::vector<double> said;
+        for (ContactSweeps* const sweeps : {&fresh.sweeps, &used.sweeps}) {
+            const auto run = [&](int iterations) {
+                const FrictionReport report = sweeps->run(iterations, 1e-12, 0.05, nothing_more);
+                said.insert(said.end(), {report.residual, double(report.sweeps), double(report.converged)});
+            };
+            for (int k = 0; k + 5 < bodies; ++k) sweeps->add(contacts[k]);
+            run(2);
+            for (int k = bodies - 5; k < bodies; ++k) sweeps->add(contacts[k]);
+            run(4);
+        }
+        for (std::size_t k = 0; k < said.size() / 2; ++k) EXPECT(said[k] == said[k + said.size() / 2]);
+        for (int b = 0; b < bodies; ++b) EXPECT(fresh.sweeps.velocity(b) == used.sweeps.velocity(b));
+        for (int k = 0; k < bodies; ++k)
+            EXPECT(std::equal(fresh.sweeps.impulse(k), fresh.sweeps.impulse(k) + 3, used.sweeps.impulse(k)));
+    }
+}
+
+/// Who is furthest off, and who is far off at all, is said of every contact, in whichever island.
+void the_worst_contact_is_found_where_it_is() {
+    for (unsigned seed = 0; seed < 30; ++seed)
+        for (const double friction : {0.0, 0.5}) {
+            Random random(seed);
+            MixedSystem system = resting(20);
+            for (Vec6& p : system.momentum)
+                for (double& x : p) x = uniform(random, -1.0, 1.0);
+            Heap heap(system);
+            for (int k = 0; k < 30; ++k) heap.add(any_contact(random, 20, friction));
+            heap.sweeps.run(static_cast<int>(1 + seed % 4), 1e-13, 0.0, nothing_more);
+            const RowsResidual found = heap.sweeps.worst(1.0);
+            // Both measure the same law, friction from another side: nothing may be off by more than the figure says.
+            if (friction == 0.0) {
+                EXPECT_NEAR(found.residual, heap.worst(), 1e-12);
+                EXPECT_NEAR(heap.off(static_cast<std::size_t>(found.row)), heap.worst(), 1e-12);
+            } else {
+                EXPECT((found.residual > 1e-9) == (heap.worst() > 1e-9));
+            }
+        }
+}
+
+}  // namespace
+
+int main() {
+    islands_that_grow_together_obey_the_law();
+    a_body_at_rest_is_woken_by_what_joins_it();
+    what_is_far_off_in_a_spent_island_is_brought_home();
+    a_spent_island_is_not_called_settled_for_being_left_alone();
+    a_contact_that_is_new_to_a_spent_island_is_swept();
+    a_spent_island_takes_in_another();
+    a_spent_island_stays_spent_in_another();
+    a_step_knows_nothing_of_the_one_before();
+    the_worst_contact_is_found_where_it_is();
+    return report();
+}
