@@ -21,9 +21,12 @@ from spook_tracker.engine import (
     Result,
     RigidBody,
     Scene,
+    SimulationFailed,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -31,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -45,10 +49,10 @@ DURATION = 1.5  # s
 RELAXATION = 2.0  # damping of the joints over the time step
 
 
-def pin(theta: Any) -> tuple[Any, Any, Any]:
+def pin(theta: Any, crank: float = CRANK) -> tuple[Any, Any, Any]:
     """Place of the slider [m], angle of the rod [rad], both by the crank's angle, and the pin's height [m]."""
-    height = CRANK * np.sin(theta)
-    return CRANK * np.cos(theta) + np.sqrt(ROD**2 - height**2), np.arcsin(height / ROD), height
+    height = crank * np.sin(theta)
+    return crank * np.cos(theta) + np.sqrt(ROD**2 - height**2), np.arcsin(height / ROD), height
 
 
 def slope(function: Any, theta: Any, width: float = 1e-4) -> Any:
@@ -58,30 +62,30 @@ def slope(function: Any, theta: Any, width: float = 1e-4) -> Any:
     return (8.0 * one - two) / (12.0 * width)
 
 
-def kinetic(theta: Any) -> Any:
+def kinetic(theta: Any, mass: float = SLIDER) -> Any:
     """Energy of rod and slider [J] while the crank turns steadily."""
     slider = slope(lambda t: pin(t)[0], theta)
     middle = slope(lambda t: CRANK * np.cos(t) + 0.5 * ROD * np.cos(pin(t)[1]), theta)
     across, turn = 0.5 * CRANK * np.cos(theta), slope(lambda t: pin(t)[1], theta)
     rod = ROD_MASS * (middle**2 + across**2 + ROD**2 / 12.0 * turn**2)
-    return 0.5 * SPEED**2 * (SLIDER * slider**2 + rod)
+    return 0.5 * SPEED**2 * (mass * slider**2 + rod)
 
 
-def torque(theta: Any) -> Any:
+def torque(theta: Any, mass: float = SLIDER) -> Any:
     """What the motor carries [N m]: power is the change of energy, τ = dE/dθ."""
-    return slope(kinetic, theta, 1e-3)
+    return slope(functools.partial(kinetic, mass=mass), theta, 1e-3)
 
 
 @functools.cache
-def scene(time_step: float) -> Scene:
-    """Crank, rod and slider in the xy plane, moving as the motor wants."""
-    x, lean, _ = (float(value) for value in pin(START))
-    rates = [SPEED * float(slope(lambda t, i=i: pin(t)[i], START)) for i in (0, 1)]
-    c, s = CRANK * math.cos(START), CRANK * math.sin(START)
+def scene(time_step: float, speed: float = SPEED, crank: float = CRANK, mass: float = SLIDER) -> Scene:
+    """Crank, rod and a slider of a mass [kg] in the xy plane, moving as the motor wants."""
+    x, lean, _ = (float(value) for value in pin(START, crank))
+    rates = [speed * float(slope(lambda t, i=i: pin(t, crank)[i], START)) for i in (0, 1)]
+    c, s = crank * math.cos(START), crank * math.sin(START)
     joint: dict[str, Any] = {"compliance": 0.0, "damping": RELAXATION * time_step}
     bodies = (
         RigidBody(
-            name="crank", mass=1.0, inertia=(TURNING,) * 3, position=(0, 0, 0), angular_velocity=(0, 0, SPEED)
+            name="crank", mass=1.0, inertia=(TURNING,) * 3, position=(0, 0, 0), angular_velocity=(0, 0, speed)
         ),
         RigidBody(
             name="rod",
@@ -89,11 +93,11 @@ def scene(time_step: float) -> Scene:
             inertia=(1e-4, ROD_MASS * ROD**2 / 12.0, ROD_MASS * ROD**2 / 12.0),
             position=(0.5 * (c + x), 0.5 * s, 0.0),
             orientation=(math.cos(0.5 * lean), 0.0, 0.0, -math.sin(0.5 * lean)),
-            velocity=(0.5 * (rates[0] - SPEED * s), 0.5 * SPEED * c, 0.0),
+            velocity=(0.5 * (rates[0] - speed * s), 0.5 * speed * c, 0.0),
             angular_velocity=(0.0, 0.0, -rates[1]),
         ),
         RigidBody(
-            name="slider", mass=SLIDER, inertia=(0.01,) * 3, position=(x, 0, 0), velocity=(rates[0], 0, 0)
+            name="slider", mass=mass, inertia=(0.01,) * 3, position=(x, 0, 0), velocity=(rates[0], 0, 0)
         ),
     )
     joints = (
@@ -102,7 +106,7 @@ def scene(time_step: float) -> Scene:
             between=(WORLD, "crank"),
             at=(0, 0, 0),
             axis=(0, 0, 1),
-            motor=Motor(speed=SPEED),
+            motor=Motor(speed=speed),
             **joint,
         ),
         Hinge(name="pin", between=("crank", "rod"), at=(c, s, 0.0), axis=(0, 0, 1), **joint),
@@ -112,17 +116,18 @@ def scene(time_step: float) -> Scene:
     return Scene(bodies=bodies, constraints=joints, gravity=(0, 0, 0), contacts=False)
 
 
-def errors(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[float, float]:
+def errors(
+    simulate: Simulate, time_step: float, method: Method = PLAIN, mass: float = SLIDER
+) -> tuple[float, float]:
     """Largest errors of the slider's place [m] and of the motor's torque [N m] in a turn, after half a second."""
     observe = {"x": Trace(quantity=Position("slider")), "f": Trace(quantity=ConstraintForce("drive"))}
-    result = simulate(
-        scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
-    )
+    asked = scene(time_step, mass=mass)
+    result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     first = round(SETTLED / time_step)
     times = time_step * np.arange(len(result["x"]))
     place = result["x"][:, 0] - pin(START + SPEED * times)[0]
     # The force of a step acts between its two ends.
-    carried = result["f"][:, 5] - torque(START + SPEED * (times - 0.5 * time_step))
+    carried = result["f"][:, 5] - torque(START + SPEED * (times - 0.5 * time_step), mass)
     return float(np.abs(place[first:]).max()), float(np.abs(carried[first:]).max())
 
 
@@ -155,10 +160,55 @@ def place_limit(time_step: float) -> float:
     return lag(time_step) + ahead(time_step, DURATION)
 
 
-def torque_limit(time_step: float) -> float:
+def torque_limit(time_step: float, mass: float = SLIDER) -> float:
     """A step's force is that of some moment within it: half a step before or after its middle, of the largest torque."""
-    carried = torque(TURN)
-    return 0.5 * SPEED * time_step * float(np.abs(slope(torque, TURN, 1e-2)).max() / np.abs(carried).max())
+    asked = functools.partial(torque, mass=mass)
+    steepest = float(np.abs(slope(asked, TURN, 1e-2)).max())
+    return 0.5 * SPEED * time_step * steepest / float(np.abs(asked(TURN)).max())
+
+
+FASTEST = 170.6562  # rad/s, h ω = 0.711: by the planar step of the test
+TURNS_RUN, OFF, NARROWEST = 3, 0.01 * ROD, 2.51846e-3  # turns, m, and 1 − r/l of the fold, by the same step
+# kg: the crank's inertia is 1e-12 of what the slider's comes to at the crank, the floor of pivots
+HEAVIEST = TURNING / PLAIN.floor / float(np.abs(slope(lambda t: pin(t)[0], TURN)).max()) ** 2
+
+
+def fastest(simulate: Simulate) -> BreakPoint:
+    """The fastest crank that runs."""
+
+    def runs(speed: float) -> bool:
+        return simulate(scene(TIME_STEP, speed), time_step=TIME_STEP, steps=200).completed
+
+    return break_point(runs, 0.3 * FASTEST, 2.0 * FASTEST, resolution=2e-3)
+
+
+def narrowest(simulate: Simulate) -> BreakPoint:
+    """The least that a rod may be longer than its crank, over the rod."""
+    observe = {"x": Trace(quantity=Position("slider"))}
+    turn = math.asin(TIME_STEP * SPEED)  # of a step
+    steps = round(TURNS_RUN * math.tau / turn)
+
+    def folds(gap: float) -> bool:
+        crank = (1.0 - gap) * ROD
+        result = simulate(scene(TIME_STEP, crank=crank), time_step=TIME_STEP, steps=steps, observe=observe)
+        exact = pin(START + turn * np.arange(steps + 1), crank)[0]
+        return result.completed and float(np.abs(result["x"][:, 0] - exact).max()) < OFF
+
+    return break_point(folds, 0.1, 1e-4, resolution=0.01)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest slider that the motor moves and feels as it must."""
+
+    def carries(mass: float) -> bool:
+        try:
+            place, carried = errors(simulate, TIME_STEP, mass=mass)
+        except SimulationFailed:
+            return False
+        most = torque_limit(TIME_STEP, mass) * float(np.abs(torque(TURN, mass)).max())
+        return place < place_limit(TIME_STEP) and carried < most
+
+    return break_point(carries, SLIDER, 1e4 * HEAVIEST, resolution=0.05)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -209,7 +259,9 @@ TEST = ScalarTest(
     theory=(
         "x = r cos θ + √(l² − r² sin²θ).",
         "The motor's power is the change of kinetic energy: τ = dE/dθ.",
-        "Nothing can run away: the motor holds the one coordinate there is, and rigid rows the rest.",
+        "The motor holds the one coordinate there is, and rigid rows the rest, so that no mass has a say in the motion. What a step "
+        "can lose is the turn of the crank, h ω, and the fold where crank and rod are nearly as long and stand upright: there the "
+        "rod turns back within √(2 (1 − r/l)) of the crank's turn.",
     ),
     reference="Geometry, and the energy of the moving parts (closed form, differentiated by five points).",
     conclusion="Green: loops of joints and motors carry inertia rightly. Red: the loop drifts, or forces are wrong.",
@@ -240,6 +292,41 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(1.0 / 60.0), time_step=1.0 / 60.0, duration=4.0),
     figures=(Figure(name="torque", title="Torque of the motor over a turn", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="fastest",
+            title="Fastest crank that runs at 1/240 s",
+            configuration="plain",
+            definition="200 steps run to their end",
+            study=fastest,
+            unit="rad/s",
+            expected=(0.997 * FASTEST, 1.001 * FASTEST),
+            expected_source="five rows of the step in the plane for five speeds, run by themselves: h ω = 0.711; beyond it the rod "
+            "lags until h w of its own reaches 1",
+        ),
+        StabilityStudy(
+            name="narrowest-fold",
+            title="Least that the rod may be longer than the crank, over the rod, for the slider to come through right",
+            configuration="plain",
+            definition="in three turns at 1/240 s the slider is never further off than a hundredth of the rod",
+            study=narrowest,
+            unit="1",
+            better="smaller",
+            expected=(0.999 * NARROWEST, 1.011 * NARROWEST),
+            expected_source="the step in the plane, run by itself; the search ends 1 % short of it at most",
+        ),
+        StabilityStudy(
+            name="heaviest-slider",
+            title="Heaviest slider that the motor moves and feels as it must",
+            configuration="plain",
+            definition="the errors of its place and of the motor's torque keep their limits",
+            study=heaviest,
+            unit="kg",
+            expected=(0.5 * HEAVIEST, 4.0 * HEAVIEST),
+            expected_source="masses have no say but by rounding: the crank's inertia is lost under the floor of pivots, 1e-12, when "
+            "M (dx/dθ)² is 1e12 times as much; at the largest dx/dθ, which of the bodies is eliminated first left open",
+        ),
+    ),
     ladders=(
         Ladder(
             name="place",

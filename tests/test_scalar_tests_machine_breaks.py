@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import simulate
-from spook_tracker.scalar_tests import floating_box, wires
+from spook_tracker.engine import PLAIN, simulate
+from spook_tracker.scalar_tests import floating_box, slider_crank, wires
 from spook_tracker.scalar_tests.bracket import is_stable
 from spook_tracker.scalar_tests.case import StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -126,3 +126,94 @@ def test_weights_on_a_wire_lose_nothing_but_rounding_at_any_ratio() -> None:
         assert exact_pull == closed
         assert abs(Fraction(pull) / exact_pull - 1) < 1e-3 * wires.HELD
         assert abs(Fraction(down) / exact_down - 1) < 1e-3 * wires.HELD
+
+
+def cranked(crank: float, speed: float, steps: int) -> np.ndarray:
+    """Places of the slider [m], from the rows of a step in the plane: as many as there are speeds, so no mass has a say.
+
+    G v₊ = −a g + (1 − b) G v of pin and wrist, the crank's speed as the motor wants; a step turns by asin(h w). It ends
+    where h w of the rod reaches 1.
+    """
+    s, h = slider_crank, slider_crank.TIME_STEP
+    spread = 1.0 + 4.0 * s.RELAXATION
+
+    def along(angle: float) -> np.ndarray:
+        return np.array((math.cos(angle), math.sin(angle)))
+
+    def across(arm: np.ndarray) -> np.ndarray:
+        return np.array((-arm[1], arm[0]))
+
+    turn, height = s.START, crank * math.sin(s.START)
+    lean = -math.asin(height / s.ROD)
+    slider = crank * math.cos(s.START) + math.sqrt(s.ROD**2 - height**2)
+    middle = crank * along(turn) + 0.5 * s.ROD * along(lean)
+    leaning = -speed * crank * math.cos(turn) / (s.ROD * math.cos(lean))
+    moving = speed * crank * across(along(turn)) + leaning * 0.5 * s.ROD * across(along(lean))
+    sliding = -speed * crank * math.sin(turn) - leaning * s.ROD * math.sin(lean)
+    v, found = np.array((speed, *moving, leaning, sliding)), [slider]  # of crank, rod, rod's turn, slider
+    for _ in range(steps):
+        arm, end = 0.5 * s.ROD * along(lean), np.array((slider, 0.0))
+        rows, off = np.zeros((5, 5)), np.zeros(5)
+        rows[0, 0] = 1.0
+        # A reaction acts on both bodies at the second one's point: the rod's at the pin, the slider's at the wrist.
+        rows[1:3, 0], rows[1:3, 1:3], rows[1:3, 3] = -across(middle - arm), np.eye(2), -across(arm)
+        rows[3:5, 1:3], rows[3:5, 3], rows[3:5, 4] = -np.eye(2), -across(end - middle), (1.0, 0.0)
+        off[1:3], off[3:5] = middle - arm - crank * along(turn), end - middle - arm
+        right = (rows @ v - 4.0 / h * off) / spread
+        right[0] = speed
+        v = np.linalg.solve(rows, right)
+        if abs(h * v[3]) >= 1.0:
+            break
+        turn, lean = turn + math.asin(h * v[0]), lean + math.asin(h * v[3])
+        middle, slider = middle + h * v[1:3], slider + h * v[4]
+        found.append(slider)
+    return np.array(found)
+
+
+def test_a_crank_runs_as_fast_as_the_rows_of_its_plane_can_be_stepped() -> None:
+    s = slider_crank
+    low, high = band("slider_crank", "fastest")
+    assert [len(cranked(s.CRANK, speed, 200)) for speed in (low, 0.9999 * s.FASTEST)] == [201, 201]
+    assert len(cranked(s.CRANK, 1.0001 * s.FASTEST, 200)) < 30
+    assert low < s.FASTEST * math.exp(-2e-3) < s.FASTEST < high
+
+
+def folded(gap: float) -> float:
+    """How far off the slider gets in the turns of the study [m], the crank so much shorter than the rod."""
+    s = slider_crank
+    turn, crank = math.asin(s.TIME_STEP * s.SPEED), (1.0 - gap) * s.ROD
+    places = cranked(crank, s.SPEED, round(s.TURNS_RUN * math.tau / turn))
+    angles = s.START + turn * np.arange(len(places))
+    exact = crank * np.cos(angles) + np.sqrt(s.ROD**2 - (crank * np.sin(angles)) ** 2)
+    return float(np.abs(places - exact).max())
+
+
+def test_a_slider_comes_through_a_fold_as_narrow_as_its_steps_in_the_plane_allow() -> None:
+    s = slider_crank
+    low, high = band("slider_crank", "narrowest-fold")
+    assert folded(1.0001 * s.NARROWEST) < s.OFF < folded(0.9999 * s.NARROWEST)
+    assert low < s.NARROWEST < s.NARROWEST * math.exp(0.01) < high
+
+
+def test_a_slider_so_heavy_leaves_a_crank_below_the_floor_of_pivots() -> None:
+    """What the motor's row moves, rows of pin and wrist held, over what it would move with the crank alone."""
+    s = slider_crank
+
+    def share(mass: float, angle: float) -> float:
+        """By energies: of crank, rod and slider at a unit speed of the crank, by differences of the closed path."""
+        d = 1e-5
+
+        def places(theta: float) -> np.ndarray:
+            x, lean, height = (float(value) for value in s.pin(theta))
+            return np.array((x, 0.5 * (s.CRANK * math.cos(theta) + x), 0.5 * height, lean))
+
+        x, y, z, lean = (places(angle + d) - places(angle - d)) / (2.0 * d)
+        rod = s.ROD_MASS * (y * y + z * z + s.ROD**2 / 12.0 * lean * lean)
+        return s.TURNING / (s.TURNING + rod + mass * x * x)
+
+    low, high = band("slider_crank", "heaviest-slider")
+    lost = [min(share(mass, angle) for angle in np.linspace(0.0, math.tau, 361)) for mass in (low, high)]
+    assert lost[0] > PLAIN.floor > lost[1]
+    assert min(share(s.HEAVIEST, angle) for angle in np.linspace(0.0, math.tau, 3601)) == pytest.approx(
+        PLAIN.floor, rel=1e-3
+    )
