@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import PLAIN, simulate
-from spook_tracker.scalar_tests import floating_box, slider_crank, wires
+from spook_tracker.scalar_tests import falling_chain, floating_box, slider_crank, wires
 from spook_tracker.scalar_tests.bracket import is_stable
 from spook_tracker.scalar_tests.case import StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -217,3 +217,75 @@ def test_a_slider_so_heavy_leaves_a_crank_below_the_floor_of_pivots() -> None:
     assert min(share(s.HEAVIEST, angle) for angle in np.linspace(0.0, math.tau, 3601)) == pytest.approx(
         PLAIN.floor, rel=1e-3
     )
+
+
+def solid(radius: float, length: float, mass: float) -> tuple[float, float]:
+    """Moments [kg m²] of a capsule across and along its axis, summed over slices."""
+    count = 200_000
+    along = (np.arange(count) + 0.5) / count * length - 0.5 * length
+    cap = np.maximum(0.0, np.abs(along) - 0.5 * length + radius)
+    square = radius**2 - cap**2
+    density = mass / float(square.sum())
+    across = density * float((square**2 / 4.0 + square * along**2).sum())
+    return across, 0.5 * density * float((square**2).sum())
+
+
+def strayed(time_step: float) -> float:
+    """How far sideways a link of the drawn chain gets in the steps of the study, over the nudge.
+
+    In the joints' places y and the links' rolls about themselves, small: (M + h C) w₊ = M w − h K y. Every contact, two
+    a link, rubs with µ N against the way on and, turned by what slips across, with µ N/v of that slip across.
+    """
+    c, h, n = falling_chain, time_step, falling_chain.LINKS
+    arm, weight = 0.5 * c.LENGTH - c.RADIUS, c.MASS * c.GRAVITY
+    across, along = solid(c.RADIUS, c.LENGTH, c.MASS)
+    # Friction a radius below the joints presses the front down: 2 arm d = µ radius of the weight
+    front = 0.5 + c.FRICTION * c.RADIUS / (2.0 * arm)
+    mass, stiff, rubs = (np.zeros((2 * n + 1, 2 * n + 1)) for _ in range(3))
+    for k in range(n):
+        centre, yaw, roll = (np.zeros(2 * n + 1) for _ in range(3))
+        centre[k], centre[k + 1] = 0.5, 0.5
+        yaw[k], yaw[k + 1] = 1.0 / c.LENGTH, -1.0 / c.LENGTH
+        roll[n + 1 + k] = 1.0
+        mass += c.MASS * np.outer(centre, centre) + across * np.outer(yaw, yaw) + along * np.outer(roll, roll)
+        pull = c.FRICTION * weight * (n - 1 - k)  # of all that is behind
+        for share, place in ((front, arm), (1.0 - front, -arm)):
+            rubbing = c.FRICTION * weight * share
+            pull += rubbing * (0.5 * c.LENGTH - place) / c.LENGTH
+            slip = centre + place * yaw + c.RADIUS * roll
+            rubs += rubbing / c.DRAWN * np.outer(slip, slip)
+        stiff += pull * c.LENGTH * np.outer(yaw, yaw)
+    mass, stiff, rubs = mass[1:, 1:], stiff[1:, 1:], rubs[1:, 1:]  # the head stays on its line
+    y, w, found = np.zeros(2 * n), np.zeros(2 * n), 0.0
+    y[:n] = (-1.0) ** np.arange(n)
+    for _ in range(c.SLIDES):
+        w = np.linalg.solve(mass + h * rubs, mass @ w - h * stiff @ y)
+        y = y + h * w
+        joints = np.concatenate(((0.0,), y[:n]))
+        found = max(found, float(np.abs(0.5 * (joints[1:] + joints[:-1])).max()))
+    return found
+
+
+def test_a_chain_is_drawn_straight_in_steps_as_long_as_its_swing_sideways_allows() -> None:
+    c = falling_chain
+    low, high = band("falling_chain", "longest-step")
+    assert strayed(0.9999 * c.LONGEST) < 100.0 < strayed(1.0001 * c.LONGEST)
+    assert strayed(0.99 * c.LONGEST) < 10.0 < 1000.0 < strayed(1.01 * c.LONGEST)
+    assert low < c.LONGEST * math.exp(-c.SEARCHED) < c.LONGEST < high
+
+
+def test_links_that_land_flat_slide_as_fast_as_one_in_exact_steps() -> None:
+    """A link in fractions: the floor's impulses up add up to the weight's, and friction is µ of each while it slides."""
+    c = falling_chain
+    h, g, friction = Fraction(1, 60), Fraction(c.GRAVITY), Fraction(c.FRICTION)
+    gap, up, ahead = Fraction(c.LOW), Fraction(0), Fraction(c.ALONG)
+    for _ in range(round(c.LANDED / c.TIME_STEP)):
+        free = up - h * g
+        pressed = max(Fraction(0), -gap / h - free)  # a gap may close, no more
+        up = free + pressed
+        gap += h * up
+        ahead -= friction * pressed
+        assert ahead > 0
+    assert gap == up == 0
+    assert float(ahead) == pytest.approx(c.ALONG - c.FRICTION * c.GRAVITY * c.LANDED, rel=1e-14)
+    assert band("falling_chain", "most-links") == (c.COUNTS[-1], c.COUNTS[-1])
