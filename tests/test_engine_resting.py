@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
 from spook_tracker.engine import (
+    WORLD,
     Box,
     Capsule,
     Compound,
@@ -19,9 +21,12 @@ from spook_tracker.engine import (
     Load,
     Lock,
     Material,
+    Method,
+    Motor,
     Part,
     Penetration,
     Position,
+    Prismatic,
     RigidBody,
     Scene,
     Sphere,
@@ -29,6 +34,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from spook_tracker.engine.joints import Constraint
 from tests.contact_scenes import DOWN, GRAVITY, TIME_STEP, ball, cube, ground
 
 
@@ -245,3 +251,56 @@ def test_a_lift_carries_its_load() -> None:
 
 
 # Overlap ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize("gap", [1e-8, 1e-6, 1e-3])
+@pytest.mark.parametrize("held", ["free", "rail", "lock"])
+def test_what_joints_hold_lands_as_what_is_free(
+    held: str, gap: float, solver: Literal["direct", "iterative"]
+) -> None:
+    """From a hair above the floor: the gap closes in a step, no more, though only the weight brings it there."""
+    box, above = cube("box", (0, 0, 0.5 + gap)), cube("above", (0, 0, 1.5 + gap))
+    joints: dict[str, Constraint] = {
+        "rail": Prismatic(name="rail", between=(WORLD, "box"), axis=(0, 0, 1), compliance=0.0),
+        "lock": Lock(name="lock", between=("box", "above"), at=(0, 0, 1.0 + gap), compliance=0.0),
+    }
+    result = simulate(
+        Scene(
+            bodies=(ground(), box, above) if held == "lock" else (ground(), box),
+            constraints=(joints[held],) if held in joints else (),
+            gravity=DOWN,
+            no_contact=(("box", "above"),) if held == "lock" else (),
+        ),
+        time_step=TIME_STEP,
+        steps=40,
+        method=Method(solver=solver, iterations=400),
+        observe={"z": Trace(quantity=Position("box")), "force": Final(quantity=ContactForce("box"))},
+    )
+
+    assert float(result["z"][:, 2].min()) == pytest.approx(0.5, abs=1e-9)
+    np.testing.assert_allclose(
+        result["force"], (0, 0, 2.0 * GRAVITY if held == "lock" else GRAVITY), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_load_presses_a_slide_to_a_wall_in_the_step_it_begins(driven: bool) -> None:
+    """At rest a hair from it, pushed sideways by a force, or by a drive."""
+    push = Load(name="push", body="slide", force=(20.0, 0.0, 0.0))
+    motor = Motor(speed=1.0, max_force=20.0) if driven else None
+    rail = Prismatic(name="rail", between=(WORLD, "slide"), axis=(1, 0, 0), compliance=0.0, motor=motor)
+    wall = RigidBody(name="wall", motion="static", shape=Box((0.1, 1, 1)), position=(0.55 + 1e-6, 0, 0))
+    result = simulate(
+        Scene(
+            bodies=(wall, cube("slide", (0, 0, 0), mass=2.0)),
+            constraints=(rail,),
+            forces=() if driven else (push,),
+        ),
+        time_step=TIME_STEP,
+        steps=10,
+        observe={"x": Trace(quantity=Position("slide")), "force": Final(quantity=ContactForce("slide"))},
+    )
+
+    assert float(result["x"][:, 0].max()) == pytest.approx(1e-6, abs=1e-12)
+    assert result["force"][0] == pytest.approx(-20.0, abs=1e-8)

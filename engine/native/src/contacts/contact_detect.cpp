@@ -37,8 +37,11 @@ bool ContactStage::is_closed(const Contact& contact) const noexcept {
 double ContactStage::margin_of(std::size_t b, const std::vector<Vec6>& velocity,
                                const std::vector<Vec6>& other) const {
     const double radius = detection_.radius()[b];
-    const double speed = std::max(norm(linear(velocity[b])), norm(linear(other[b])));
-    const double spin = std::max(norm(angular(velocity[b])), norm(angular(other[b])));
+    double speed = norm(linear(velocity[b])), spin = norm(angular(velocity[b]));
+    if (&other != &velocity) {
+        speed = std::max(speed, norm(linear(other[b])));
+        spin = std::max(spin, norm(angular(other[b])));
+    }
     return options_.time_step * (speed + spin * radius) + closed * radius;
 }
 
@@ -249,6 +252,17 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         return met;
     });
     return found;
+}
+
+bool ContactStage::meets(const std::vector<Vec6>& next) {
+    changed_.assign(next.size(), 1);
+    if (outrun(next)) find_open();
+    const std::size_t closed_points = points_.size();
+    if (find_strikes(next, true) > 0) take_back_strikes(closed_points, next);
+    if (points_.empty()) return false;
+    counters_.contacts += points_.size();
+    order_points();
+    return true;
 }
 
 /// The points of a pair that meets at `time`, with the bodies where they will be then.

@@ -8,7 +8,8 @@
 //                    −(4/h) Ups g + Ups C v   for a closed gap (the SPOOK row; without Ups C v if it is hit: a
 //                                             plastic impact, with friction), and
 //                    −g/h                     for an open one: it may close, no more;
-//                  then pairs that touch only because of these impulses are looked for, and all is solved again
+//                  then pairs that touch only because of these impulses, or of what joints alone make of forces, are
+//                  looked for, and all is solved again
 //                  (the iterative solver looks between its sweeps, and gives them rows in the same solve);
 //   4. parting     where the step ends, a displacement that parts overlapping bodies and leaves no trace in v.
 //
@@ -102,9 +103,13 @@ public:
     bool possible() const noexcept { return detection_.possible(); }
 
     /// Finds this step's contacts. `velocity` is v and `free_velocity` v + h M⁻¹ f, one per body of the scene.
-    /// False if there is none: nothing else need be called in this step.
+    /// False if there is none: nothing else need be called in this step, but meets() where there are joints.
     bool detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                 const std::vector<Vec6>& free_velocity);
+
+    /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per
+    /// body of the scene. Then it is a step with contacts.
+    bool meets(const std::vector<Vec6>& next);
 
     /// Whether a contact with restitution is approached faster than rounding; asked anew after each impact.
     bool impact_needed() const noexcept { return impact_needed_; }

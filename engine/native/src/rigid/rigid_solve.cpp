@@ -134,13 +134,25 @@ void RigidSystem::solve_locked() {
     mixed_values_ = false;
     LockedLoads loads{h_, stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{}, constants_, {}, force_};
     if (stages_.runs(Stage::apply_loads) || !load_follows_.empty()) loads.acceleration = acceleration_;
-    const bool finite =
-        locked_.solve(live_.bodies, loads, method_.refinements, [this, at_once](int body, const Twist& v) {
-            BodyState& s = live_.bodies[body];
-            s.velocity = v.linear;
-            s.angular_momentum = s.inertia * v.angular;
-            if (at_once) integrate_body(body);
+    const auto take = [this, at_once](int body, const Twist& v) {
+        BodyState& s = live_.bodies[body];
+        s.velocity = v.linear;
+        s.angular_momentum = s.inertia * v.angular;
+        if (at_once) integrate_body(body);
+    };
+    bool finite = false;
+    if (contacts_) {
+        next_ = free_velocities_;
+        finite = locked_.solve(live_.bodies, loads, method_.refinements, [this](int body, const Twist& v) {
+            next_[body] = {v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z};
         });
+        if (finite && meet_late()) return solve_mixed(true);
+        for (int i : tied_)
+            if (finite)
+                take(i, {{next_[i][0], next_[i][1], next_[i][2]}, {next_[i][3], next_[i][4], next_[i][5]}});
+    } else {
+        finite = locked_.solve(live_.bodies, loads, method_.refinements, take);
+    }
     if (!finite) live_.not_solved = tied_.front();
     tied_are_moved_ = at_once && finite;
     undelivered_ = finite;
@@ -165,6 +177,16 @@ void RigidSystem::solve_block() {
     if (!factor_and_solve()) {
         live_.not_solved = tied_.front();
         return;
+    }
+    if (contacts_) {
+        next_ = free_velocities_;
+        const double* x = solution_.data() + rows_;
+        for (int i : tied_) {
+            const int size = constants_[i].particle ? 3 : 6;
+            std::copy_n(x, size, next_[i].data());
+            x += size;
+        }
+        if (meet_late()) return solve_mixed(true);
     }
     if (method_.corrections > 0) correct_curvature();
     if (stiff_) keep_angular_momentum();
@@ -410,6 +432,11 @@ void RigidSystem::solve_mixed(bool touching) {
     if (!finite) {
         live_.not_solved = tied_.front();
         return;
+    }
+    if (contacts_ && !touching) {
+        next_ = free_velocities_;
+        for (std::size_t k = 0; k < tied_.size(); ++k) next_[tied_[k]] = mixed_.velocity[k];
+        if (meet_late()) return solve_mixed(true);
     }
     if (!following_.empty() && (touching || solver_ == RigidSolver::iterative)) {
         following_.begin();

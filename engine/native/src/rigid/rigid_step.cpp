@@ -112,6 +112,15 @@ bool RigidSystem::find_contacts() {
     return touching_;
 }
 
+/// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, next_:
+/// swept with their own they do not. Then the step is to be solved with contacts.
+bool RigidSystem::meet_late() {
+    if (!contacts_->meets(next_)) return false;
+    touching_ = true;
+    note_begin();
+    return true;
+}
+
 void RigidSystem::integrate_body(int i) {
     if (!integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
 }

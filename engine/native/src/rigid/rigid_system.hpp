@@ -242,6 +242,7 @@ private:
     void kick_free_bodies();
     void kick_free_body(int body) noexcept;
     bool find_contacts();
+    bool meet_late();
     void fill_masses();
     void fill_momenta(bool forces);
     void fill_rows();
@@ -377,7 +378,7 @@ private:
     std::optional<ContactStage> contacts_, fresh_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     std::vector<Pose> poses_;
-    std::vector<Vec6> velocities_, free_velocities_;
+    std::vector<Vec6> velocities_, free_velocities_, next_;  // at the start; with forces; with joints as well
     struct Begun {
         Vec3 displacement;
         double energy = 0.0;  // twice the kinetic one
