@@ -14,7 +14,9 @@ from spook_tracker.engine import (
     WORLD,
     Box,
     Compound,
+    ContactForce,
     Hinge,
+    Load,
     Material,
     Method,
     Motor,
@@ -30,7 +32,9 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -38,6 +42,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.slider_crank import (
@@ -59,13 +64,17 @@ from spook_tracker.scalar_tests.sweep import line, told
 PIN, PLAY = 0.02, 0.005  # m, radius of the pin, and how far it may go to either side in its slot
 WALL = (0.02, 0.1, 0.1)  # m
 TIME_STEP = 1.0 / 240.0  # s
+TURN = 1.0  # s
+PRELOAD = (
+    SLIDER * SPEED**2 * CRANK * (1.0 + CRANK / ROD)
+)  # N, m times the acceleration with crank and rod in one line
 DURATION = 2.25  # s: four flights
 
 
 @functools.cache
-def scene(time_step: float) -> Scene:
+def scene(time_step: float, preload: float | None = None) -> Scene:
     """A crank that a motor turns, a rod whose far end is a pin guided along x, and round it the slider's slot. The pin
-    touches the slot's left wall: it brakes the slider."""
+    touches the slot's left wall: it brakes the slider. Or the right one, which a preload [N] on the slider shuts."""
     x, lean, _ = (float(value) for value in pin(START))
     rates = [SPEED * float(slope(lambda t, i=i: pin(t)[i], START)) for i in (0, 1)]
     c, s = CRANK * math.cos(START), CRANK * math.sin(START)
@@ -93,7 +102,7 @@ def scene(time_step: float) -> Scene:
             mass=SLIDER,
             shape=Compound(tuple(Part(shape=Box(WALL), position=(d, 0.0, 0.0)) for d in (-aside, aside))),
             inertia=(0.01,) * 3,
-            position=(x + PLAY, 0, 0),
+            position=(x + (PLAY if preload is None else -PLAY), 0, 0),
             velocity=(rates[0], 0, 0),
             material=plastic,
         ),
@@ -111,7 +120,8 @@ def scene(time_step: float) -> Scene:
         PointOnLine(name="wrist", between=(WORLD, "rod"), at=(x, 0.0, 0.0), axis=(1, 0, 0), **joint),
         Prismatic(name="guide", between=(WORLD, "slider"), axis=(1, 0, 0), **joint),
     )
-    return Scene(bodies=bodies, constraints=joints)
+    loads = () if preload is None else (Load(name="preload", body="slider", force=(-preload, 0.0, 0.0)),)
+    return Scene(bodies=bodies, constraints=joints, forces=loads)
 
 
 def place(time: Any) -> Any:
@@ -224,6 +234,26 @@ def place_limit(time_step: float) -> float:
     return pin_error(time_step) + longest * flight_error(time_step)
 
 
+def shut(simulate: Simulate, preload: float) -> bool:
+    """Whether pin and wall press each other in every step of a turn."""
+    observe = {"f": Trace(quantity=ContactForce("slider", "rod"))}
+    asked = scene(TIME_STEP, preload)
+    result = simulate(asked, time_step=TIME_STEP, duration=TURN, observe=observe)
+    return result.completed and float(np.abs(result["f"][1:, 0]).min()) > 0.0
+
+
+def preload_error() -> float:
+    """Of the least preload [N]: joints lag, and what they lag swings twice a turn at most."""
+    return SLIDER * (2.0 * SPEED) ** 2 * lag(TIME_STEP)
+
+
+def least(simulate: Simulate) -> BreakPoint:
+    """The least preload that keeps the bearing from rattling."""
+    return break_point(
+        functools.partial(shut, simulate), 4.0 * PRELOAD, 0.25 * PRELOAD, resolution=1e-3, walk=4
+    )
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest error of the slider's place [m]."""
     times, x, _ = runs(simulate, time_step, method)
@@ -276,7 +306,8 @@ TEST = ScalarTest(
         "and moves with the pin again.",
         "The gap may close within a step, no more: the slider lands on its wall, and the blow is plastic. What the release "
         "is off is of second order, for the speed is largest there.",
-        "Nothing can run away: rows are rigid, and a plastic blow takes energy.",
+        "Nothing can run away: rows are rigid, and a plastic blow takes energy. Pressed to its wall by m ω² r (1 + r/l) or more "
+        "the slider never flies.",
     ),
     reference="Geometry, with release and strike located by halving.",
     conclusion="Green: contacts open and close within loops of joints as they must. Red: a contact pulls, or a blow is lost.",
@@ -315,6 +346,20 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(TIME_STEP), time_step=TIME_STEP, duration=4.0),
     figures=(Figure(name="play", title="The slider's play", draw=draw),),
+    stability=(
+        StabilityStudy(
+            name="preload",
+            title="Least preload of the slider that keeps its bearing from rattling",
+            configuration="plain",
+            definition="pressed to one wall it presses the pin in every step of a turn",
+            study=least,
+            unit="N",
+            better="smaller",
+            expected=(PRELOAD - preload_error(), 1.00101 * PRELOAD + preload_error()),
+            expected_source="m ω² r (1 + r/l), what the slider needs where crank and rod lie in one line; m (2 ω)² times what the "
+            "joints lag; the search ends within a thousandth",
+        ),
+    ),
     ladders=(
         Ladder(
             name="place",

@@ -319,6 +319,33 @@ def test_a_slider_with_play_flies_and_strikes_where_an_integration_with_events_s
     assert 0.0 < short < b.flight_error(h)
 
 
+def test_a_preload_shuts_a_bearing_that_takes_as_much_to_turn_back() -> None:
+    """The pin of a crank in steps, its joints behind by 5/4 h² of what the ends they tie turn apart."""
+    b, s, h = loose_bearing, slider_crank, loose_bearing.TIME_STEP
+    (study,) = b.TEST.stability
+    low, high = study.expected or (0.0, 0.0)
+
+    def needed(behind: float, times: np.ndarray) -> float:
+        """The largest push of a wall that holds the slider back [N]; rod's middle and lean give way to the gaps."""
+        angle = s.SPEED * times
+        lean = np.arcsin(s.CRANK * np.sin(angle) / s.ROD)
+        turned = s.CRANK * np.cos(angle) * s.SPEED / (s.ROD * np.cos(lean))
+        out = np.array((np.cos(lean), -np.sin(lean)))
+        bends = behind * h * h * 0.5 * s.ROD * turned**2 * out  # of the near end; the far one's is opposite
+        crank = -behind * h * h * s.SPEED**2 * s.CRANK * np.array((np.cos(angle), np.sin(angle)))
+        gap = bends - crank
+        # The near end is off by the gap; across the guide the far one by what it bends, the other way.
+        more = (bends[1] + gap[1]) / (s.ROD * np.cos(lean))
+        shift = gap[0] - s.ROD * np.sin(lean) * more
+        x = s.CRANK * np.cos(angle) + s.ROD * np.cos(lean) + shift
+        return s.SLIDER * float(np.max(2.0 * x[1:-1] - x[2:] - x[:-2])) / (times[1] - times[0]) ** 2
+
+    assert needed(0.0, np.arange(-20, 21) * 1e-4) == pytest.approx(b.PRELOAD, rel=1e-6)
+    found = [needed(1.25, np.arange(-3, 245) * h + part * h) for part in np.linspace(0.0, 1.0, 9)]
+    assert low < min(found) and 1.001 * max(found) < high
+    assert max(found) / b.PRELOAD > 1.0 + 0.2 * (high / b.PRELOAD - 1.0)  # nor is the band much wider
+
+
 def test_a_load_so_many_arms_heavy_is_seen_through_the_floor_of_pivots() -> None:
     """An arm gives way by 4/m at its ends and by 1/m in its middle, pushed across; a load by 1/M."""
     s = scissor_lift
