@@ -35,7 +35,7 @@ class Method:
                        Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct)
     iterations, residual_tolerance   when an iterative solve stops; where rows are still off by more than
-                       unsettled_residual, sweeps go on there and nearby, up to sixteen times as many (joints: four)
+                       unsettled_residual, sweeps go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: all that touch take part in one blow (a ball on four gives −.6 and four times .4);
                        a pair is struck once in a step, and stops without rebound where it approaches again;

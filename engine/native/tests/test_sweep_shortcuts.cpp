@@ -299,6 +299,29 @@ void a_spent_island_takes_in_another() {
         }
 }
 
+/// Work is counted in sweeps over everything: of a spent island what is swept, and for the rest a glance; looking who is
+/// furthest off is half a sweep, so that turns which sweep little come to an end, too.
+void work_is_what_was_swept() {
+    const int bodies = 40;
+    Heap heap = struck_column(bodies, 20, 1.0);
+    EXPECT(heap.sweeps.work() == 0.0);
+    heap.sweeps.run(3, 1e-9, 0.5, nothing_more);
+    EXPECT_NEAR(heap.sweeps.work(), 3.0, 1e-12);
+    heap.sweeps.run(3, 1e-9, 0.5, nothing_more);  // finds nobody, once
+    EXPECT_NEAR(heap.sweeps.work(), 3.0 + 1.0 / 16.0, 1e-12);
+    SweepContact wall = between(20, -1, {0, 1, 0}, 0.0);
+    heap.add(wall);
+    heap.sweeps.run(1, 1e-9, 0.5, nothing_more);  // body 20 stands on one, carries one, and meets the wall
+    EXPECT_NEAR(heap.sweeps.work() * (bodies + 1), (3.0 + 1.0 / 16.0) * bodies + 3.0 + (bodies - 2) / 16.0,
+                1e-9);
+    const double before = heap.sweeps.work();
+    heap.sweeps.worst(0.5);
+    EXPECT_NEAR(heap.sweeps.work(), before + 0.5, 1e-12);
+    MixedSystem again = heap.system;
+    heap.sweeps.start(again, FrictionModel::cone);
+    EXPECT(heap.sweeps.work() == 0.0);
+}
+
 /// What is left of a spent island is left of the one it joins, whichever of both is named first; the rest of it is still
 /// left alone.
 void a_spent_island_stays_spent_in_another() {
@@ -386,6 +409,7 @@ int main() {
     a_spent_island_is_not_called_settled_for_being_left_alone();
     a_contact_that_is_new_to_a_spent_island_is_swept();
     a_spent_island_takes_in_another();
+    work_is_what_was_swept();
     a_spent_island_stays_spent_in_another();
     a_step_knows_nothing_of_the_one_before();
     the_worst_contact_is_found_where_it_is();

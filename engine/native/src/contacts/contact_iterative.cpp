@@ -9,7 +9,7 @@ namespace spook {
 
 namespace {
 
-constexpr int most_turns = 16;  // times `iterations` sweeps, where a step would be unsettled otherwise
+constexpr int most_turns = 16;  // times `iterations` sweeps' work, where a step would be unsettled otherwise
 constexpr int joint_turns = 4;  // the same where a joint is furthest off: all of them are swept each time
 constexpr double focus = 0.5;   // of the residual allowed: contacts that change less are left alone then
 
@@ -109,7 +109,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     residual_ = 0.0;
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
-    for (int turn = 0; turn < most_turns; ++turn) {
+    for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
         report = sweeps_.run(options_.iterations, options_.residual_tolerance,
                              focus * options_.unsettled_residual, [this] { return find_more(); });
         counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);

@@ -12,8 +12,10 @@ namespace spook {
 
 namespace {
 
-constexpr int late_rounds = 3;                       // of sweeps for contacts found after the last one
-constexpr int cold = -2;                             // before every sweep
+constexpr int late_rounds = 3;         // of sweeps for contacts found after the last one
+constexpr int cold = -2;               // before every sweep
+constexpr double glance = 1.0 / 16.0;  // of what sweeping a contact costs: to see that it is cold
+constexpr double measuring = 0.5;      // the same: to see how far off it is
 constexpr int bodies_ahead = 2, contacts_ahead = 4;  // asked for while others are swept
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
@@ -73,6 +75,7 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     roots_.clear();
     chained_ = false;
     stamp_ = 0;
+    done_ = 0.0;
     hot_.assign(bodies_ + 1, cold);
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
@@ -256,12 +259,14 @@ void ContactSweeps::fetch(int item) const noexcept {
 
 double ContactSweeps::sweep_island(int island) noexcept {
     double change = 0.0;
-    for (int item = head_[island]; item >= 0; item = next_[item]) {
+    int swept = 0;
+    for (int item = head_[island]; item >= 0; item = next_[item], ++swept) {
         fetch(item);
         const double own = item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
                                                : update(contacts_[item - joint_count_]);
         change = larger(change, own);
     }
+    done_ += swept;
     return change;
 }
 
@@ -273,15 +278,18 @@ void ContactSweeps::heat(Both bodies) noexcept {
 /// As sweep_island(), but of the contacts only those of hot bodies.
 double ContactSweeps::sweep_hot(int island, double focus) noexcept {
     double change = 0.0;
-    for (int item = head_[island]; item >= 0; item = next_[item]) {
+    int seen = 0, swept = 0;
+    for (int item = head_[island]; item >= 0; item = next_[item], ++seen) {
         const Both bodies = bodies_of_[item];
         const bool joint = item < joint_count_;
         if (!joint && hot_[bodies.first] < stamp_ - 1 && hot_[bodies.second] < stamp_ - 1) continue;
+        ++swept;
         const double own = joint ? joints_.update_joint(static_cast<std::size_t>(item))
                                  : update(contacts_[item - joint_count_]);
         change = larger(change, own);
         if (!(own <= focus)) heat(bodies);
     }
+    done_ += swept + glance * (seen - swept);
     return change;
 }
 
@@ -336,6 +344,7 @@ void ContactSweeps::write(MixedSystem& system) const {
 
 RowsResidual ContactSweeps::worst(double focus) {
     RowsResidual worst{0.0, -1};
+    done_ += measuring * static_cast<double>(next_.size());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& c = contacts_[k];
         const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -

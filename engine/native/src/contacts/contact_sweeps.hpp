@@ -47,6 +47,9 @@ public:
     /// found by worst(), or was just changed by more than `focus` [m/s]: in a large heap something somewhere always asks.
     FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool()>& more);
 
+    /// What has been done since start(), in sweeps over everything there is now; looking for the worst is work, too.
+    double work() const noexcept { return next_.empty() ? 0.0 : done_ / static_cast<double>(next_.size()); }
+
     const Vec6& velocity(int body) const noexcept { return joints_.velocity()[body]; }
     const double* impulse(int contact) const noexcept { return contacts_[contact].impulse; }
     /// Multipliers of joints, and all velocities.
@@ -105,6 +108,7 @@ private:
     std::vector<double> left_;  // the last sweep's change, by root; the largest since it is spent
     std::vector<int> hot_;      // the last sweep that changed a body's rows much
     int stamp_ = 0;             // counts sweeps
+    double done_ = 0.0;         // items swept, and looked at for less
     bool chained_ = false;
 };
 
