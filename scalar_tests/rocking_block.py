@@ -12,6 +12,7 @@ import numpy as np
 from spook_tracker.engine import (
     PLAIN,
     Box,
+    ContactForce,
     Final,
     Material,
     Method,
@@ -48,11 +49,16 @@ COARSE = 1.0 / 60.0  # s, of a fall without a blow
 SHORT, LAID, ARRIVING, ROCKED = 1e-5, 2e-4, 2.0, 5e-9  # s, rad, rad/s, rad: of a blow by itself
 KEPT = 1.0 - 1.5 * math.sin(SLENDER) ** 2  # of the angular velocity at a blow
 
+# Of the blow's impulses: across, m ω₋ h (1 − κ), and upwards, m ω₋ b (1 + κ), κ what is kept.
+GRIP = 0.75 * math.sin(SLENDER) * math.cos(SLENDER) / (1.0 - 0.75 * math.sin(SLENDER) ** 2)
+
 
 @functools.cache
-def scene(lean: float = START, half_width: float = HALF_WIDTH, spin: float = 0.0) -> Scene:
+def scene(
+    lean: float = START, half_width: float = HALF_WIDTH, spin: float = 0.0, friction: float = 2.0
+) -> Scene:
     """The block leaning on its right lower edge, at rest or turning about it [rad/s]."""
-    rough = Material(friction=2.0)
+    rough = Material(friction=friction)
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=rough)
     c, s = math.cos(lean), math.sin(lean)
     out, up = (
@@ -141,6 +147,27 @@ def broadest(simulate: Simulate) -> BreakPoint:
         walk=4,
     )
     return replace(found, value=found.value / HALF_HEIGHT)
+
+
+def grips(simulate: Simulate, friction: float) -> bool:
+    """Whether the step of the same blow does not use friction up."""
+    observe = {"f": Trace(quantity=ContactForce("block", "ground"))}
+    asked = scene(LAID, spin=-ARRIVING, friction=friction)
+    result = simulate(asked, time_step=SHORT, steps=50, observe=observe)
+    if not result.completed:
+        return False
+    across, _, up = max(result["f"], key=lambda force: float(force[2]))
+    return abs(float(across)) < (1.0 - 1e-6) * friction * float(up)
+
+
+def smoothest(simulate: Simulate) -> BreakPoint:
+    """The least friction with which the edge that comes down does not slip."""
+    return break_point(functools.partial(grips, simulate), 4.0 * GRIP, 0.3 * GRIP, resolution=1e-4, walk=5)
+
+
+def beside() -> float:
+    """Of a blow's impulses in its step, as a part: the lean it may find, h ω₋ of α, and what gravity pushes meanwhile."""
+    return SHORT * ARRIVING / SLENDER + SHORT * GRAVITY / (ARRIVING * HALF_WIDTH * (1.0 + KEPT))
 
 
 def unseen() -> float:
@@ -253,6 +280,7 @@ TEST = ScalarTest(
         "About the new corner angular momentum is kept: ω₊/ω₋ = 1 − (3/2) sin²α, tan α = b/h (Housner 1963).",
         "The energy kept is the square of that; the swing from lean to lean follows from energy by quadrature.",
         "It falls over from a lean of α; a block of b/h = √2 or more does not rock on, for ω₊/ω₋ = 0.",
+        "Its new edge slips with friction below (3/4) sin α cos α/(1 − (3/4) sin²α).",
     ),
     reference="Angular momentum about the corner, and energy (closed form; times by quadrature).",
     conclusion="Green: the blow acts where it must. Red: impacts at two points at once are solved wrongly.",
@@ -313,6 +341,18 @@ TEST = ScalarTest(
             expected=(math.sqrt(2.0) * (1.0 - 1.01e-4) - unseen(), math.sqrt(2.0) + unseen()),
             expected_source="Housner's rule turns no block on whose (3/2) sin²α is 1, b/h = √2; what of a lean is too small to be "
             "seen, and the search, which ends within 1e-4",
+        ),
+        StabilityStudy(
+            name="smoothest",
+            title="Least friction with which the edge that comes down does not slip",
+            configuration="plain",
+            definition="set down at 2 rad/s, the step that pushes most does not use friction up; 1e-5 s",
+            study=smoothest,
+            unit="1",
+            better="smaller",
+            expected=(GRIP * (1.0 - beside()), GRIP * (1.00011 + beside())),
+            expected_source="the blow's impulses across and upwards, (1 − κ) h over (1 + κ) b with κ = 1 − (3/2) sin²α; what gravity "
+            "and the lean in the step of the blow change, 3e-4, and the search, which ends within 1e-4",
         ),
     ),
     ladders=(

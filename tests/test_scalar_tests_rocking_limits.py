@@ -259,3 +259,24 @@ def test_no_block_broader_than_root_two_of_its_height_rocks_on() -> None:
         assert after(low, r.SHORT, part) > math.sqrt(2.0 * pull * r.ROCKED)
         assert after(high, r.SHORT, part) < math.sqrt(2.0 * pull * r.ROCKED)
     assert high < 1.001 * low
+
+
+def test_the_edge_that_comes_down_needs_the_friction_of_its_impulses() -> None:
+    """The impulses at the new corner that stop it: by themselves, and with the step's gravity and lean."""
+    r = rocking_block
+    study = next(one for one in r.TEST.stability if one.name == "smoothest")
+    low, high = study.expected or (0.0, 0.0)
+
+    def needed(h: float, part: float, weight: float) -> float:
+        lean, spin, pull = part * h * r.ARRIVING, -r.ARRIVING, h * np.array((0.0, -weight))
+        c, s = math.cos(lean), math.sin(lean)
+        velocity = turned(spin, np.array((-WIDE * c + TALL * s, WIDE * s + TALL * c))) + pull
+        arm = np.array((-WIDE * c - TALL * s, WIDE * s - TALL * c))  # from the centre to the new corner
+        after, _ = struck(velocity, spin, arm, np.zeros(2))
+        across, up = after - velocity
+        return float(abs(across) / up)
+
+    assert needed(1e-12, 0.0, 0.0) == pytest.approx(r.GRIP, rel=1e-9)
+    found = [needed(r.SHORT, part, 9.81) for part in np.linspace(0.0, 1.0, 11)]
+    assert low < min(found) and max(found) * 1.0001 < high
+    assert high < low * 1.0009
