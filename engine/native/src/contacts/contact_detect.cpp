@@ -255,7 +255,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
 }
 
 bool ContactStage::meets(const std::vector<Vec6>& next) {
-    changed_.assign(next.size(), 1);
+    changed_ = jointed_;  // others have been swept with what they fly with
     if (outrun(next)) find_open();
     const std::size_t closed_points = points_.size();
     if (find_strikes(next, true) > 0) take_back_strikes(closed_points, next);
