@@ -149,15 +149,32 @@ def lag(time_step: float) -> float:
     return (1.0 + 2.0 * RELAXATION) / 4.0 * time_step**2 * across / math.cos(lean)
 
 
-def ahead(time_step: float, duration: float) -> float:
-    """A step turns the crank by 2 arcsin(h ω/2): it runs ahead by (h ω)²/24 of its angle; so much of the slider's way [m]."""
-    along = float(np.abs(slope(lambda t: pin(t)[0], TURN)).max())
-    return (SPEED * time_step) ** 2 / 24.0 * SPEED * duration * along
+def strayed(time_step: float, duration: float, guided: bool = False) -> Any:
+    """How far ahead of where a steady crank has it the slider is [m], a value a step from SETTLED on.
+
+    Rows of a joint that turns let its ends part by (1 + 2 τ/h)/4 h² times the acceleration across it: at the pin outwards of
+    the crank and, as at the wrist, along the rod; `guided`, the wrist does so across the guide alone. Rod and slider make up
+    for it. And a step turns the crank by asin(h ω): it runs ahead by (h ω)²/6 of its angle.
+    """
+    times = np.arange(round(SETTLED / time_step), round(duration / time_step) + 1) * time_step
+    theta = START + SPEED * times
+    lean, part = pin(theta)[1], (1.0 + 2.0 * RELAXATION) / 4.0 * time_step**2
+    outwards = CRANK * SPEED**2
+    along = ROD * (SPEED * slope(lambda t: pin(t)[1], theta)) ** 2
+    x = outwards * np.cos(theta) + (0.5 if guided else 1.0) * along * np.cos(lean)
+    y = outwards * np.sin(theta) - along * np.sin(lean)
+    early = (SPEED * time_step) ** 2 / 6.0 * SPEED * times
+    return part * (x - np.tan(lean) * y) + early * slope(lambda t: pin(t)[0], theta)
+
+
+def next_order(time_step: float) -> float:
+    """By what part more the next order of the step may make it."""
+    return 1.0 + SPEED * time_step
 
 
 def place_limit(time_step: float) -> float:
-    """Both together, of the turn and a half that are run [m]."""
-    return lag(time_step) + ahead(time_step, DURATION)
+    """Of the turn and a half that are run [m]."""
+    return float(np.abs(strayed(time_step, DURATION)).max()) * next_order(time_step)
 
 
 def torque_limit(time_step: float, mass: float = SLIDER) -> float:
@@ -275,7 +292,8 @@ TEST = ScalarTest(
                     "largest error of the slider's place in a turn",
                     "m",
                     place_limit(TIME_STEP),
-                    "a turning joint lags by (1 + 2 τ/h)/4 h² times the acceleration across it, and a step turns the crank by 2 arcsin(h ω/2)",
+                    "a turning joint lags by (1 + 2 τ/h)/4 h² times the acceleration across it, and a step turns the crank by asin(h ω); a part h ω "
+                    "more for the next order",
                 ),
                 error(
                     "torque_error",

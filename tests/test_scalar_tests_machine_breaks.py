@@ -14,6 +14,7 @@ from spook_tracker.scalar_tests import falling_chain, floating_box, slider_crank
 from spook_tracker.scalar_tests.bracket import is_stable
 from spook_tracker.scalar_tests.case import StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from tests.oracle_crank import cranked
 
 
 def band(test: str, study: str) -> tuple[float, float]:
@@ -126,48 +127,6 @@ def test_weights_on_a_wire_lose_nothing_but_rounding_at_any_ratio() -> None:
         assert exact_pull == closed
         assert abs(Fraction(pull) / exact_pull - 1) < 1e-3 * wires.HELD
         assert abs(Fraction(down) / exact_down - 1) < 1e-3 * wires.HELD
-
-
-def cranked(crank: float, speed: float, steps: int) -> np.ndarray:
-    """Places of the slider [m], from the rows of a step in the plane: as many as there are speeds, so no mass has a say.
-
-    G v₊ = −a g + (1 − b) G v of pin and wrist, the crank's speed as the motor wants; a step turns by asin(h w). It ends
-    where h w of the rod reaches 1.
-    """
-    s, h = slider_crank, slider_crank.TIME_STEP
-    spread = 1.0 + 4.0 * s.RELAXATION
-
-    def along(angle: float) -> np.ndarray:
-        return np.array((math.cos(angle), math.sin(angle)))
-
-    def across(arm: np.ndarray) -> np.ndarray:
-        return np.array((-arm[1], arm[0]))
-
-    turn, height = s.START, crank * math.sin(s.START)
-    lean = -math.asin(height / s.ROD)
-    slider = crank * math.cos(s.START) + math.sqrt(s.ROD**2 - height**2)
-    middle = crank * along(turn) + 0.5 * s.ROD * along(lean)
-    leaning = -speed * crank * math.cos(turn) / (s.ROD * math.cos(lean))
-    moving = speed * crank * across(along(turn)) + leaning * 0.5 * s.ROD * across(along(lean))
-    sliding = -speed * crank * math.sin(turn) - leaning * s.ROD * math.sin(lean)
-    v, found = np.array((speed, *moving, leaning, sliding)), [slider]  # of crank, rod, rod's turn, slider
-    for _ in range(steps):
-        arm, end = 0.5 * s.ROD * along(lean), np.array((slider, 0.0))
-        rows, off = np.zeros((5, 5)), np.zeros(5)
-        rows[0, 0] = 1.0
-        # A reaction acts on both bodies at the second one's point: the rod's at the pin, the slider's at the wrist.
-        rows[1:3, 0], rows[1:3, 1:3], rows[1:3, 3] = -across(middle - arm), np.eye(2), -across(arm)
-        rows[3:5, 1:3], rows[3:5, 3], rows[3:5, 4] = -np.eye(2), -across(end - middle), (1.0, 0.0)
-        off[1:3], off[3:5] = middle - arm - crank * along(turn), end - middle - arm
-        right = (rows @ v - 4.0 / h * off) / spread
-        right[0] = speed
-        v = np.linalg.solve(rows, right)
-        if abs(h * v[3]) >= 1.0:
-            break
-        turn, lean = turn + math.asin(h * v[0]), lean + math.asin(h * v[3])
-        middle, slider = middle + h * v[1:3], slider + h * v[4]
-        found.append(slider)
-    return np.array(found)
 
 
 def test_a_crank_runs_as_fast_as_the_rows_of_its_plane_can_be_stepped() -> None:
