@@ -119,7 +119,7 @@ void add_edges(Manifold& manifold, const Oriented& first, const Oriented& second
     const Vec3 p = one.at(closest.first), q = two.at(closest.second);
     const double gap = dot(edge.normal, p - q);
     const std::uint32_t feature = (1u << 13) | static_cast<std::uint32_t>(3 * edge.first + edge.second);
-    if (gap <= margin) manifold.add(0.5 * (p + q), edge.normal, gap, feature);
+    if (edges_touch(p - q, gap, margin)) manifold.add(0.5 * (p + q), edge.normal, gap, feature);
 }
 
 }  // namespace

@@ -184,27 +184,29 @@ void side_and_rims(Search<Gap>& search, const Frustum& one, const Frustum& other
     }
 }
 
-/// Where the rims come nearest: each point of the second's, and the nearest of the first's.
+/// Where the rims come nearest: each point of one, and the nearest of the other's. Round the smaller: about the larger's
+/// circle the distance changes over less than a part of it.
 template <class Gap>
-void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& two, int j) noexcept {
+void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& two, int j,
+                 double sign) noexcept {
     const double r = one.radius[i], far = two.radius[j];
+    if (far > r) return rim_and_rim(search, two, j, one, i, -sign);
     const Vec3 u = two.sideways, v = cross(two.axis, u);
     Vec3 apart, first_along, second_along;
-    const auto slope = [&](SineCosine turn) noexcept {
-        const Vec3 p = two.centre[j] + far * (turn.cosine * u + turn.sine * v);
+    const auto slope = [&](SineCosine turn, double* bend = nullptr) noexcept {
+        const Vec3 e = turn.cosine * u + turn.sine * v, p = two.centre[j] + far * e;
         second_along = turn.cosine * v - turn.sine * u;
         const Vec3 away = one.radial(p - one.centre[i]);
         const Vec3 out = one.unit_across(away);
         first_along = cross(one.axis, out);
         apart = p - (one.centre[i] + r * out);
+        if (bend != nullptr) {
+            const double side = dot(first_along, second_along), distance = norm(away);
+            *bend = far - dot(apart, e) - (distance > 0.0 ? r * far * side * side / distance : 0.0);
+        }
         return dot(apart, second_along);
     };
-    constexpr int parts = 24;
-    double before = slope(circle().turns[0]);
-    for (int k = 1; k <= parts; ++k) {
-        double low = circle_angle(k - 1, parts), high = circle_angle(k, parts);
-        const double at_low = before, at_high = before = slope(circle().turns[k * Circle::count / parts]);
-        if ((at_low > 0.0) == (at_high > 0.0)) continue;
+    const auto visit = [&](double low, double at_low, double high, double at_high) noexcept {
         double angle = high, here = at_high, old = low, there = at_low;
         for (int round = 0; round < 100 && here != 0.0;
              ++round) {  // secants, halving where one leaves the bracket
@@ -219,11 +221,53 @@ void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& 
         const Vec3 crossed = cross(first_along, second_along);
         const double sine = norm(crossed);
         // Crossing rims: the difference of two nearly equal points has no direction, their tangents have one.
-        if (distance > 1e-3 * std::min(r, far)) search.curved((1.0 / distance) * apart);
+        if (distance > 1e-3 * std::min(r, far)) search.curved((sign / distance) * apart);
         if (sine > parallel) {
             search.curved((1.0 / sine) * crossed);
             search.curved((-1.0 / sine) * crossed);
         }
+    };
+    // Between two places the slope is taken for the cubic that has its values and bends there. Where that turns beyond
+    // zero, or nearly so, it is asked: rims that nearly touch have two nearest points close to each other.
+    const auto turns = [](double at_low, double bend_low, double at_high, double bend_high) noexcept {
+        const double rise = at_high - at_low, a = 3.0 * (bend_low + bend_high - 2.0 * rise),
+                     b = 3.0 * rise - 2.0 * bend_low - bend_high, root = b * b - a * bend_low;
+        if (!(root > 0.0)) return 0.0;
+        const double q = -(b + std::copysign(std::sqrt(root), b)), one = q / a, two = bend_low / q;
+        const double early = std::min(one, two), late = std::max(one, two);
+        const double near = 0.1 * std::max(std::abs(at_low), std::abs(at_high)),
+                     side = at_low > 0.0 ? 1.0 : -1.0;
+        const auto above = [&](double t) { return side * (at_low + t * (bend_low + t * (b + t * a / 3.0))); };
+        if ((at_low > 0.0) != (at_high > 0.0))  // once; or three times
+            return early > 0.0 && late < 1.0 && above(early) < near && above(late) > -near ? early : 0.0;
+        if (early > 0.0 && early < 1.0 && above(early) < near) return early;
+        return late > 0.0 && late < 1.0 && above(late) < near ? late : 0.0;
+    };
+    struct Place {
+        double angle, slope, bend;
+    };
+    const auto between = [&](const auto& self, const Place& low, const Place& high,
+                             int depth) noexcept -> void {
+        const double width = high.angle - low.angle;
+        const bool crosses = (low.slope > 0.0) != (high.slope > 0.0);
+        const double t = turns(low.slope, width * low.bend, high.slope, width * high.bend);
+        if (t > 0.0 && depth > 0) {
+            Place middle{low.angle + t * width, 0.0, 0.0};
+            middle.slope = slope(sine_cosine(middle.angle), &middle.bend);
+            self(self, low, middle, depth - 1);
+            self(self, middle, high, depth - 1);
+        } else if (crosses) {
+            visit(low.angle, low.slope, high.angle, high.slope);
+        }
+    };
+    constexpr int parts = 24;
+    Place low{circle_angle(0, parts), 0.0, 0.0};
+    low.slope = slope(circle().turns[0], &low.bend);
+    for (int k = 1; k <= parts; ++k) {
+        Place high{circle_angle(k, parts), 0.0, 0.0};
+        high.slope = slope(circle().turns[k * Circle::count / parts], &high.bend);
+        between(between, low, high, 4);
+        low = high;
     }
 }
 
@@ -349,7 +393,7 @@ PartingAxes parting_axes(const Frustum& one, const Frustum& two, double margin) 
     side_and_rims(search, two, one, -1.0);
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j)
-            if (one.radius[i] > 0.0 && two.radius[j] > 0.0) rim_and_rim(search, one, i, two, j);
+            if (one.radius[i] > 0.0 && two.radius[j] > 0.0) rim_and_rim(search, one, i, two, j, 1.0);
     return search.found;
 }
 

@@ -32,6 +32,13 @@ struct SegmentPair {
 };
 SegmentPair closest_parameters(const Segment& first, const Segment& second) noexcept;
 
+/// Whether two edges whose nearest points are `between` apart come within `margin` [m] of each other; `gap` is that along
+/// the normal. Edges that do not cross, seen along it, are farther apart than the gap says: of solids that are apart it is
+/// a lower bound only, and a point made by it would hold bodies that pass each other's corners.
+inline bool edges_touch(Vec3 between, double gap, double margin) noexcept {
+    return gap <= margin && (gap <= 0.0 || norm(between) <= margin);
+}
+
 /// Where a segment given in the axes of a box with half edges `half` comes closest to it: the range of
 /// parameters at the least distance (low == high unless segment and box are parallel there; the range inside if
 /// it cuts the box) and that distance [m], zero if it cuts.

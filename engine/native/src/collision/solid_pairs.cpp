@@ -165,7 +165,7 @@ void add_edges(Manifold& manifold, const Solid& first, const Solid& second, cons
     const double gap = dot(edges.normal, p - q);
     const std::uint32_t feature =
         (1u << 15) | static_cast<std::uint32_t>(137 * edges.first + edges.second) % 32768u;
-    if (gap <= margin) manifold.add(0.5 * (p + q), edges.normal, gap, feature);
+    if (edges_touch(p - q, gap, margin)) manifold.add(0.5 * (p + q), edges.normal, gap, feature);
 }
 
 double deepest_gap(const Manifold& manifold) noexcept {
