@@ -264,7 +264,9 @@ def test_the_template_for_gitlab_is_yaml_and_shell() -> None:
 def test_the_template_for_gitlab_names_one_image_and_one_tracker() -> None:
     said = yaml.safe_load((ROOT / "examples" / "gitlab" / ".gitlab-ci.yml").read_text())
 
-    assert re.fullmatch(r"python:3\.\d+\.\d+-\w+", said["variables"]["IMAGE"]), "a tag that does not move"
+    assert re.fullmatch(r"python:3\.\d+\.\d+-\w+@sha256:[0-9a-f]{64}", said["variables"]["IMAGE"]), (
+        "its bytes"
+    )
     assert {job.get("image", "$IMAGE") for job in said.values() if isinstance(job, dict)} == {"$IMAGE"}
     assert said["variables"]["TRACKER"].startswith("spook-tracker[standard]")
 

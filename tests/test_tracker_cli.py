@@ -255,6 +255,8 @@ def test_trend_shows_the_series_and_names_the_bad_night(two_versions):
     assert "✗ red" in shown.output
     assert tracker("trend", "fal").exit_code == 2
     assert "it has height, position_error" in tracker("trend", "fall", "nothing").stderr
+    everything = tracker("trend", "fall").stdout
+    assert everything.index("/position_error") < everything.index("/height"), "the gate comes first"
 
 
 def test_list_show_and_explain_tell_what_is_asked_and_what_it_needs():

@@ -5,6 +5,7 @@ import re
 import time
 
 import pytest
+from click import unstyle
 
 from spook_tracker.tracker.website import printed
 from spook_tracker.tracker.website.folder import YOUNG, replacing
@@ -174,3 +175,23 @@ def test_an_engine_that_gates_nothing_is_shown_against_the_limits_and_counted_ap
     lines = {line.split()[0]: line for line in table.splitlines() if line.startswith("  ")}
     assert "PASS" in lines["kept"] and "FAIL" in lines["broken"] and "not supported" in lines["lacking"]
     assert "keeps 1 of the 2 limits it can be asked; 1 are not supported" in table
+
+
+def test_at_80_columns_the_configurations_of_a_metric_are_told_apart() -> None:
+    """One wide limit among all of a night left twelve columns to every name."""
+    from spook_tracker.tracker.cli.report_table import pass_table
+    from tests.run_documents import definition, run, sample
+
+    facts = {"parameters": {}, "limit": (-9.834567e-05, -9.634567e-05), "set_point": None}
+    keys = {f"pendulum/{told}/length_deviation": told for told in ("plain", "corrected")}
+    document = run(
+        series=tuple(definition(key, configuration=told, **facts) for key, told in keys.items()),
+        samples=tuple(sample(key) for key in keys),
+    )
+
+    narrow, wide = (unstyle(pass_table(document, room=room)).splitlines() for room in (80, 99))
+
+    assert any("length_deviation [plain" in line for line in narrow)
+    assert any("length_deviation [cor" in line for line in narrow)
+    assert max(map(len, narrow[1:])) <= 80
+    assert "margin" not in narrow[2] and "margin" in wide[2]

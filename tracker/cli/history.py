@@ -278,12 +278,12 @@ def trend(
 
         click.echo(trend_json(trends, maps))
         return
-    from spook_tracker.tracker.cli.report_trend import map_lines, summary, trend_lines
+    from spook_tracker.tracker.cli.report_trend import gates_first, map_lines, summary, trend_lines
 
     say(summary(trends, maps))
     if maps:
         say("\n".join(map_lines(maps)))
-    for told in trends:
+    for told in gates_first(trends):
         say()
         say("\n".join(trend_lines(told, last)))
 

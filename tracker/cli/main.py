@@ -41,7 +41,7 @@ Tracks whether a physics engine became less accurate, less stable or slower.
 
 \b
 Three usual ways in:
-  tracker nightly --out public     one line for a cron job: run, record, analyse, publish
+  tracker nightly --out public     for a cron job: run, record, judge, publish
   tracker compare previous latest  at a desk: what changed between two versions
   tracker serve public             look at the trend website
 

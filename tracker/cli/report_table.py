@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, Style, clean, table, width
+from spook_tracker.tracker.cli.console import Column, Style, cells, clean, table, width
 from spook_tracker.tracker.cli.report_sweep import sweep_table
 from spook_tracker.tracker.document.run_document import (
     MapData,
@@ -22,6 +22,7 @@ from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
 NARROW = 100  # columns; below, the set point has no column, and the time step stands above its values
+NAMED = 24  # columns that tell one metric's configurations apart; where fewer are left, the margin goes
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
 Pair = tuple[SeriesDefinition, Sample]
 
@@ -154,10 +155,10 @@ def title(run: RunDocument) -> str:
 def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
     """A heading row for each test, its values beneath; the set point where there is room, else the time step above."""
     narrow = room < NARROW
+    columns: tuple[Column, ...] = NARROW_COLUMNS if narrow else WIDE_COLUMNS
     rows: list[tuple[str, ...]] = []
     previous = step_above = ""
     for definition, sample in shown:
-        columns = NARROW_COLUMNS if narrow else WIDE_COLUMNS
         step = "" if definition.time_step is None else f"h = {number(definition.time_step, 4)} s"
         if definition.test != previous:
             rows.append((definition.test, step * narrow, *[""] * (len(columns) - 2)))
@@ -165,7 +166,18 @@ def _scalars(shown: Sequence[Pair], room: int) -> list[str]:
             rows.append(("", step, *[""] * (len(columns) - 2)))
         previous, step_above = definition.test, step
         rows.append(_row(definition, sample, narrow))
-    return table(NARROW_COLUMNS if narrow else WIDE_COLUMNS, rows, room, _styles(narrow))
+    if narrow and _left_for_names(columns, rows, room) < NAMED:
+        columns, rows = columns[:3] + columns[4:], [row[:3] + row[4:] for row in rows]
+    return table(columns, rows, room, _styles(narrow, len(columns)))
+
+
+def _left_for_names(columns: Sequence[Column], rows: Sequence[Sequence[str]], room: int) -> int:
+    """Columns that a table leaves to the first of its own; no more than are needed."""
+    widest = [
+        max(cells(text) for text in (c.title, *told))
+        for c, told in zip(columns, zip(*rows, strict=True), strict=True)
+    ]
+    return room - sum(widest[1:]) - 2 * len(widest[1:]) if sum(widest) + 2 * len(widest[1:]) > room else NAMED
 
 
 def _row(definition: SeriesDefinition, sample: Sample, narrow: bool) -> tuple[str, ...]:
@@ -192,7 +204,7 @@ WIDE_COLUMNS = (
 )
 
 
-def _styles(narrow: bool) -> dict[int, Style]:
+def _styles(narrow: bool, columns: int) -> dict[int, Style]:
     def paint(_row: int, text: str) -> str:
         return click.style(
             text, fg={"✓": "green", "✗": "red"}.get(text[:1]), dim=text.startswith("·") or None
@@ -201,7 +213,7 @@ def _styles(narrow: bool) -> dict[int, Style]:
     def warn(_row: int, text: str) -> str:
         return click.style(text, fg="red") if text.startswith("LEFT") else text
 
-    last = len(NARROW_COLUMNS if narrow else WIDE_COLUMNS) - 1
+    last = columns - 1
     return {last: paint} if narrow else {last: paint, last - 1: warn}
 
 

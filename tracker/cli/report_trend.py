@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import click
 
 from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
-from spook_tracker.tracker.cli.report_table import limit, number
+from spook_tracker.tracker.cli.report_table import ROLES, limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
@@ -37,6 +37,11 @@ def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
     _, _, key, name = min(named, key=lambda one: one[:2])
     words = f"✗ {len(named)} of {every} series red; the worst: {clean(key)}, {name}"
     return click.style(words, fg="red", bold=True)
+
+
+def gates_first(trends: Sequence[Told]) -> list[Told]:
+    """As one reads them: what decides, then what keeps it honest, then the many rungs of ladders."""
+    return sorted(trends, key=lambda told: (told.definition.kind != "scalar", ROLES[told.definition.role]))
 
 
 def map_lines(maps: Sequence[ToldMap]) -> list[str]:
