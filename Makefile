@@ -212,7 +212,7 @@ sanitize-python: develop
 MINUTES ?= 10
 fuzz: develop
 	$(BIN)/cmake -S engine/native -B build/fuzz $(NINJA) -DCMAKE_CXX_COMPILER=clang++-19 -DCMAKE_BUILD_TYPE=None \
-	    -DCMAKE_CXX_FLAGS="-O1 -g1" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DSPOOK_PYTHON=OFF -DSPOOK_FUZZ=ON \
+	    -DCMAKE_CXX_FLAGS="-O2 -g1" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DSPOOK_PYTHON=OFF -DSPOOK_FUZZ=ON \
 	    -DSPOOK_SANITIZE=address,undefined
 	$(BIN)/cmake --build build/fuzz
 	$(BIN)/pip install -q atheris
