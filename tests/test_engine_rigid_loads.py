@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -140,6 +141,29 @@ def test_a_divergence_under_tension_names_it_and_its_cure() -> None:
 
     assert result.status == "diverged"
     assert "tension" in result.failure and "string_stiffness=True" in result.failure
+
+
+@pytest.mark.parametrize("velocity", [-50.0, 10.0])
+def test_a_load_that_drops_on_a_taut_chain_is_named_with_its_cure(velocity: float) -> None:
+    """Stiffness from the tension of the step before cannot follow a blow; a composition holds the energy."""
+    scene = chain(1e4)
+    *links, heavy = scene.bodies
+    falling = replace(scene, bodies=(*links, replace(heavy, velocity=(0.0, 0.0, velocity))))
+    result = simulate(falling, time_step=1 / 60, duration=2.0, method=STIFF)
+
+    assert result.status == "diverged"
+    assert "load changes" in result.failure and "string_stiffness knows" in result.failure
+    assert 'composition="order4"' in result.failure
+    cured = simulate(
+        falling,
+        time_step=1 / 60,
+        duration=0.2,
+        method=Method(composition="order4"),
+        observe={"energy": Trace(quantity=Energy())},
+    )
+    assert cured.completed
+    # The first step takes what the joints forbid of the start.
+    assert np.ptp(cured["energy"][1:]) < 0.02 * np.abs(cured["energy"][0])
 
 
 @pytest.mark.parametrize("h", [1 / 60, 0.5])

@@ -174,7 +174,7 @@ RigidSystem::IslandFrame RigidSystem::island_frame(const std::vector<int>& membe
 
 /// What made a run leave the finite numbers, as far as the joints show a few steps before: the option that cures it.
 const char* RigidSystem::cause() const noexcept {
-    if (stiff_ || composed_ || early_joints_.size() != joints_.states.size()) return "";
+    if (composed_ || early_joints_.size() != joints_.states.size()) return "";
     for (const JointBlock& block : joints_.blocks()) {
         if (block.axial) continue;
         const JointSet::State& state = early_joints_[block.joint];
@@ -185,9 +185,13 @@ const char* RigidSystem::cause() const noexcept {
             const int body = second ? block.second : block.first;
             if (body < 0 || !constants_[body].moves()) continue;
             const double arm = norm(second ? state.second_reach : state.first_reach);
-            if (arm > 0.0 && h_ * impulse > TAUT * constants_[body].mass * arm)
-                return "ran away: its joints carry more tension than so light a body can take in a step "
-                       "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
+            if (!(arm > 0.0 && h_ * impulse > TAUT * constants_[body].mass * arm)) continue;
+            return stiff_
+                       ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
+                         "above 0.3), and their load changes within one, while string_stiffness knows that of "
+                         "the step before; use composition=\"order4\" without it, or a smaller time step"
+                       : "ran away: its joints carry more tension than so light a body can take in a step "
+                         "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
         }
     }
     return "";
