@@ -15,7 +15,7 @@ from typing import Any, Literal
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import number
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.series_history import Judged, Told, blame, in_lanes
+from spook_tracker.tracker.judge.series_history import Judged, Told, blame
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import badness, half_width
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
@@ -152,7 +152,7 @@ def causes_tonight(findings: Sequence[Finding]) -> list[Cause]:
 
 def hits_of(told: Told) -> list[Hit]:
     """Every worsening of one series, oldest first, each with what became of it."""
-    return [hit for nights, over in in_lanes(told) for hit in _hits_in(told, nights, over)]
+    return [hit for nights, over in told.lanes for hit in _hits_in(told, nights, over)]
 
 
 def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[Hit]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.judge.series_history import Judged, Told, in_lanes
+from spook_tracker.tracker.judge.series_history import Judged, Told
 from spook_tracker.tracker.judge.vocabulary import Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]
@@ -55,7 +55,7 @@ def name_of(judged: Judged) -> str:
 
 def events_of(told: Told) -> list[Event]:
     """The red stretches of one series, oldest first."""
-    return [event for nights, over in in_lanes(told) for event in _events_in(told, nights, over)]
+    return [event for nights, over in told.lanes for event in _events_in(told, nights, over)]
 
 
 def _events_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[Event]:

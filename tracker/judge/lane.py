@@ -183,8 +183,11 @@ def run_time_histories(
 
 
 def looked_at_again(count: int, recent: int) -> list[int]:
-    """Places of the nights that are looked at closely: the last ones, and one in `SPARSE` before them."""
-    dense = max(0, count - recent)
+    """Places of the nights that are looked at closely: the last ones, and one in `SPARSE` before them.
+
+    Where the last ones begin moves by so many nights at once: one more night leaves what was said of the others.
+    """
+    dense = max(0, count - recent) // SPARSE * SPARSE
     return [*range(0, dense, SPARSE), *range(dense, count)]
 
 
@@ -318,10 +321,16 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
             order.setdefault(point.run.id, len(order))
     newest = max((points[-1].run.id for points in timed), key=order.__getitem__)
     chosen = [points for points in timed if points[-1].run.id == newest]
-    by_run: dict[str, list[Point]] = {}
-    for points in chosen:
-        for point in points:
-            by_run.setdefault(point.run.id, []).append(point)
+    together: Iterable[Sequence[Point]]
+    ids = [[point.run.id for point in points] for points in chosen]
+    if all(of_rung == ids[0] for of_rung in ids):  # nearly always: every rung every night
+        together = zip(*chosen, strict=True)
+    else:
+        by_run: dict[str, list[Point]] = {}
+        for points in chosen:
+            for point in points:
+                by_run.setdefault(point.run.id, []).append(point)
+        together = by_run.values()
     first = rungs[0].definition
     definition = msgspec.structs.replace(
         first, key=key, metric=f"{first.metric}:run-time", description=f"run time of {first.description}",
@@ -329,7 +338,7 @@ def _run_time(key: str, rungs: Sequence[SeriesHistory]) -> SeriesHistory:
         reference=None, tolerance=0.0, relative_tolerance=first.time_tolerance,
     )  # fmt: skip
     told = []
-    for found in by_run.values():
+    for found in together:
         if len(found) == len(chosen):
             timing = ladder_timing(p.sample.timing for p in found if p.sample.timing)
             sample = Sample(

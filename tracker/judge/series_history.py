@@ -15,7 +15,7 @@ import re
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import msgspec
 from msgspec.structs import replace
@@ -64,13 +64,27 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
         return self.red and (self.worse_at is self.night or self.confirms)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Told:
     """A series with all its nights judged, oldest first."""
 
     key: str
     definition: SeriesDefinition
     nights: tuple[Judged, ...]
+
+    @cached_property
+    def lanes(self) -> list[tuple[list[Judged], Judged | None]]:
+        """The nights that were judged against each other, and the night that ended them.
+
+        A lane ends where the definition of the test changes for good.
+        """
+        nights = self.nights
+        lane = _clock if is_noisy(self.definition) else _question
+        found = []
+        for places in lanes_of([judged.night for judged in nights], lane):
+            over = nights[places[-1]].night.test_version != nights[-1].night.test_version
+            found.append(([nights[i] for i in places], nights[places[-1] + 1] if over else None))
+        return found
 
 
 def commit_of(run: Run) -> str:
@@ -164,20 +178,6 @@ def _clock(night: Point) -> Hashable:
     return night.test_version, night.run.machine.fingerprint
 
 
-def in_lanes(told: Told) -> list[tuple[list[Judged], Judged | None]]:
-    """The nights of a series that were judged against each other, and the night that ended them.
-
-    A lane ends where the definition of the test changes for good.
-    """
-    nights = told.nights
-    lanes = lanes_of([judged.night for judged in nights], _clock if is_noisy(told.definition) else _question)
-    found = []
-    for places in lanes:
-        over = nights[places[-1]].night.test_version != nights[-1].night.test_version
-        found.append(([nights[i] for i in places], nights[places[-1] + 1] if over else None))
-    return found
-
-
 def is_noisy(definition: SeriesDefinition) -> bool:
     """Whether the same build may give another value: run times only."""
     return definition.kind == "time"
@@ -211,6 +211,10 @@ def _judge_values(
         ):
             yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
             level = night
+            continue
+        if red is not None and level is not None and not accepted and _stays_red(red, level, night):
+            red = replace(red, night=night)
+            yield red
             continue
         release = next((old for old in reversed(history[looked:place]) if is_release(old.run)), release)
         looked = place + 1
@@ -309,6 +313,19 @@ def _repeats(before: Point, after: Point) -> bool:
         and old.outcome == new.outcome
         and old.set_point_held == new.set_point_held
         and (old.state_hash == new.state_hash or "" in (old.state_hash, new.state_hash))
+    )
+
+
+def _stays_red(red: Judged, level: Point, night: Point) -> bool:
+    """Whether a night repeats the one before, which is red against the level: what was said of that stands."""
+    old, new = red.night.sample, night.sample
+    return (
+        red.verdict.red
+        and red.against is level
+        and same_bits(old.value, new.value)
+        and (old.outcome, old.passed, old.set_point_held, old.state_hash, old.failure)
+        == (new.outcome, new.passed, new.set_point_held, new.state_hash, new.failure)
+        and same_commit(level.run, red.night.run) == same_commit(level.run, night.run)
     )
 
 

@@ -19,11 +19,12 @@ from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 NOT_SUPPORTED = "not_supported"  # outside the order: an engine cannot be asked this
 HAVE_VALUES = ("value", "unsettled", "out_of_limit")
 NO_VALUE = ("not_finite", "diverged", "crashed", "timed_out", "missing")
+NO_NUMBER = frozenset({*NO_VALUE, NOT_SUPPORTED})
 
 
 def honest(sample: Sample) -> Sample:
     """A sample whose class fits its value: what is not finite is no value, whatever a document says."""
-    if sample.outcome in (*NO_VALUE, NOT_SUPPORTED) or math.isfinite(sample.value):
+    if math.isfinite(sample.value) or sample.outcome in NO_NUMBER:
         return sample
     return msgspec.structs.replace(sample, outcome="not_finite", passed=False, set_point_held=False)
 

@@ -12,6 +12,7 @@ import json
 import math
 from array import array
 from collections.abc import Iterable, Sequence
+from itertools import repeat
 from typing import Any
 
 from spook_tracker.tracker.document.json_form import boxed, encode
@@ -115,15 +116,18 @@ def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list
     """The cells of each night in which any of these has a value; column by column, for there are many."""
     facts = {n.index: [inert(n.started), inert(n.engine.version), inert(n.engine.git_hash)] for n in nights}
     every = list(facts)
-    if trends and all(t.nights == every for t in trends):  # nothing was left out: whole columns
-        columns = (map(repr, t.values) for t in trends)
-        yield from map(list, zip(*zip(*facts.values(), strict=True), *columns, strict=True))
+    columns: list[Iterable[str]] = []
+    for trend in trends:
+        column = map(repr, trend.values)
+        if trend.nights != every:  # nights were left out
+            column = map(dict(zip(trend.nights, column, strict=True)).get, every, repeat(""))
+        columns.append(column)
+    lines = map(list, zip(*zip(*facts.values(), strict=True), *columns, strict=True))
+    if any(trend.nights == every for trend in trends):
+        yield from lines
         return
-    values = [dict(zip(t.nights, map(repr, t.values), strict=True)) for t in trends]
-    shown = set().union(*values)
-    for place, night in facts.items():
-        if place in shown:
-            yield night + [found.get(place, "") for found in values]
+    shown = set().union(*(trend.nights for trend in trends))
+    yield from (line for place, line in zip(every, lines, strict=True) if place in shown)
 
 
 def regressions(events: Sequence[Event]) -> Table:

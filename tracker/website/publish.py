@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 
 from spook_tracker.tracker.document.collection import no_collection
-from spook_tracker.tracker.document.json_form import plain
+from spook_tracker.tracker.document.json_form import Number, plain
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
@@ -284,7 +284,7 @@ def _bytes_of(context: dict[str, Any]) -> bytes:
     """What stands on a page, as bytes to be hashed."""
 
     def told(thing: Any) -> Any:
-        if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        if not isinstance(thing, Number) and dataclasses.is_dataclass(thing) and not isinstance(thing, type):
             return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
         return plain(thing)
 
