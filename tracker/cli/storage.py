@@ -198,7 +198,7 @@ def stats(as_json: bool, database: str) -> None:
         return
     say(f"{found.database}: schema {found.revision}, {found.size / 1e6:.1f} MB")
     for engine, runs in found.engines.items():
-        say(f"  {runs} runs of {engine}")
+        say(f"  {runs} {'run' if runs == 1 else 'runs'} of {engine}")
     if found.first and found.last:
         say(f"  from {found.first:%Y-%m-%d %H:%M} to {found.last:%Y-%m-%d %H:%M} UTC")
     for table, rows in found.rows.items():
