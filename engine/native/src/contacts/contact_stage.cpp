@@ -270,6 +270,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
             read_back(system.rows[joints + k], points_[k]);
         order_points();
     }
+    mark_held(system);  // the last round may have brought rows to bodies that had none
     judge(system, friction, report);
     if (!report.converged) {
         std::vector<double> share;
