@@ -14,7 +14,7 @@ namespace {
 
 constexpr double slack_share = 1e-10;  // of the smaller body's radius
 constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
-constexpr int late_rounds = 3;         // of solves that set others in motion towards a third
+constexpr int late_rounds = 64;  // of solves that set others in motion towards a third: each finds pairs anew
 
 }  // namespace
 
