@@ -197,8 +197,13 @@ def _failure(
     status: str, body: str | None, step: int, time_limit: float | None, reason: str, residual: float
 ) -> str:
     if status == "unsettled":
+        said = (
+            f"body {body!r} {reason}"
+            if reason
+            else f"rows of body {body!r} are off by up to {residual:.3g} m/s"
+        )
         return (
-            f"unsettled since step {step}: rows of body {body!r} are off by up to {residual:.3g} m/s; "
+            f"unsettled since step {step}: {said}; "
             "use more iterations, smaller time steps or the direct solver"
         )
     if reason:

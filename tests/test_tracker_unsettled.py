@@ -22,7 +22,9 @@ from spook_tracker.tracker.measure.run import Questions, Request, run
 from spook_tracker.tracker.store.history import History
 
 SOURCE = Questions(catalogue="toy_unsettled:CATALOGUE", engine="spook_tracker.engine")
-SAID = re.compile(r"unsettled since step \d+: rows of body 'box \d+' are off by up to [\d.]+ m/s")
+SAID = re.compile(
+    r"unsettled since step \d+: body 'box \d+' has sunk into another by a fiftieth of the smaller one's"
+)
 WIDE = "stack/asked/wide/h=0.0166667"
 TIGHT, FOLLOWED = WIDE.replace("wide", "tight"), WIDE.replace("wide", "followed")
 

@@ -109,6 +109,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     residual_ = 0.0;
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
+    sunk_ = false;
     for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
         report = sweeps_.run(options_.iterations, options_.residual_tolerance,
                              focus * options_.unsettled_residual, [this] { return find_more(); });

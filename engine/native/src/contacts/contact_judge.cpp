@@ -107,6 +107,7 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
 void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                          const FrictionReport& report) {
     residual_ = unsettled_by_ = 0.0;
+    sunk_ = false;
     unsettled_body_ = -1;
     if (!report.finite || report.rounds + report.sweeps == 0) return;
     const RowsResidual worst = rows_residual(system, points, options_.friction);
@@ -129,6 +130,7 @@ void ContactStage::blame_sunk() {
         if (!(share > worst)) continue;
         worst = share;
         unsettled_by_ = residual_;
+        sunk_ = true;
         unsettled_body_ = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
     }
 }

@@ -216,6 +216,7 @@ public:
     /// A body whose rows the last solve left further from their law than `unsettled_residual`; −1 if there is none.
     int unsettled_body() const noexcept { return unsettled_body_; }
     double unsettled_by() const noexcept { return unsettled_by_; }  // m/s
+    bool unsettled_sunk() const noexcept { return sunk_; }          // and not for what a row is off by
 
 private:
     struct Point {
@@ -356,6 +357,7 @@ private:
     bool impact_needed_ = false;
     int impact_rounds_ = 0;
     double residual_ = 0.0, unsettled_by_ = 0.0;
+    bool sunk_ = false;
     bool joint_is_worst_ = false;  // of what the last sweeps have left
     int unsettled_body_ = -1;
     ContactCounters counters_;

@@ -376,9 +376,9 @@ void RigidSystem::lead_events() {
     }
 }
 
-void RigidSystem::note_unsettled(int body, double residual) {
+void RigidSystem::note_unsettled(int body, double residual, bool sunk) {
     Unsettled& first = live_.unsettled;
-    if (first.body < 0) first.body = body, first.step = live_.step;
+    if (first.body < 0) first.body = body, first.step = live_.step, first.sunk = sunk;
     first.residual = std::max(first.residual, residual);
 }
 
@@ -418,7 +418,8 @@ void RigidSystem::solve_mixed(bool touching) {
         finite = contacts_->solve(mixed_, velocities_);
         residual_ = std::max(residual_, contacts_->residual());
         if (contacts_->unsettled_body() >= 0)
-            note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by());
+            note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(),
+                           contacts_->unsettled_sunk());
     } else if (solver_ == RigidSolver::iterative) {
         std::vector<FrictionPoint> none;
         const FrictionReport report =

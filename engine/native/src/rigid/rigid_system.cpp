@@ -372,6 +372,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         if (report.status == Status::completed) {
             report.status = Status::unsettled;
             report.failed_body = left.body;
+            if (left.sunk) report.reason = "has sunk into another by a fiftieth of the smaller one's radius";
             report.failed_step = (left.step + method_.substeps - 1) / method_.substeps;
         }
     }

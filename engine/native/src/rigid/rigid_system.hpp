@@ -85,6 +85,7 @@ public:
         int body = -1;
         std::int64_t step = 0;  // of h, counted from 1
         double residual = 0.0;  // m/s
+        bool sunk = false;      // no row is off, but the body was left in another
     };
     const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
@@ -249,7 +250,7 @@ private:
     void fill_beyond(int block, RowBlock& rows, BlockRight& numbers, std::vector<Beyond>& beyond) const;
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
-    void note_unsettled(int body, double residual);
+    void note_unsettled(int body, double residual, bool sunk = false);
     void judge_sweeps();
     void solve_block();
     void solve_locked();
