@@ -27,9 +27,7 @@ from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
     RARE,
-    RAREST,
     SPANS,
-    beyond,
     exceeded,
     remembered,
     shift,
@@ -183,7 +181,7 @@ class _Walk:
         value, against = self.values[place], self.usual[-1]
         self.suspects.append(place)
         known = self.red_since is not None or self.shifted is not None or not math.isfinite(value)
-        confirmed = known or (len(self.suspects) > 1 and self._no_chance(self.suspects))
+        confirmed = known or (len(self.suspects) > 1 and self._chance(self.suspects) <= RARE)
         verdict = slower(change, level, value, "slower" if confirmed else "")
         if accepted:
             self._begin(place)
@@ -207,12 +205,6 @@ class _Walk:
     def _drifted(self, verdict: Verdict) -> Noisy:
         first = self.anchor
         return Noisy(verdict=verdict, state="detected", against=first[0], first_bad=first[-1])
-
-    def _no_chance(self, nights: Sequence[int]) -> bool:
-        """Whether chance puts these nights so far off neither by Student's t nor by the tail that is seen."""
-        level, _ = self._spread()
-        least = min(worse_by(level, self.values[i], self.larger_is_better) for i in nights)
-        return self._chance(nights) <= RARE and beyond(self.reached, least, len(nights)) <= RAREST
 
     def _chance(self, nights: Sequence[int]) -> float:
         """How probable it is that these nights lie so far off by chance: the tail of Student's t.

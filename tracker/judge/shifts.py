@@ -38,7 +38,6 @@ APART = (
     5.0  # standard deviations inside two clusters between their middles; noise of one hump cut in two shows 3
 )
 FEWEST_CLUSTER, SMALLEST_CLUSTER = 6, 0.1  # nights, and share of all, in the smaller cluster
-TAIL = 40  # nights whose upper quarter shows how noise falls off
 MEMORY = (1, 5)  # lags, nights, at which nights that remember each other are noticed
 
 
@@ -183,21 +182,6 @@ def exceeded(t: float, freedom: float) -> float:
     """The probability that Student's t exceeds a value above zero: the inverse of `student` (Wallace 1959)."""
     z = math.sqrt(freedom * math.log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)
     return 0.5 * math.erfc(z / math.sqrt(2.0))
-
-
-def beyond(reached: Sequence[float], change: float, nights: int) -> float:
-    """How probable it is that so many nights more lie all beyond a change, if the tail of the logarithms is exponential.
-
-    The upper quarter of the nights that hold shows it; what so few tell of its mean makes Lomax' distribution of it.
-    Zero where they are too few.
-    """
-    if len(reached) < TAIL:
-        return 0.0
-    upper = [math.log1p(max(off, -0.9)) for off in sorted(reached)[-(len(reached) // 4) :]]
-    far, total = nights * (math.log1p(change) - upper[0]), sum(upper) - len(upper) * upper[0]
-    if far <= 0.0 or total <= 0.0:
-        return float(far <= 0.0)
-    return 0.25**nights * (1.0 + far / total) ** -len(upper)
 
 
 def permutation_probability(base: Values, last: Values) -> float:
