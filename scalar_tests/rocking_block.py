@@ -280,7 +280,7 @@ TEST = ScalarTest(
         "About the new corner angular momentum is kept: ω₊/ω₋ = 1 − (3/2) sin²α, tan α = b/h (Housner 1963).",
         "The energy kept is the square of that; the swing from lean to lean follows from energy by quadrature.",
         "It falls over from a lean of α; a block of b/h = √2 or more does not rock on, for ω₊/ω₋ = 0.",
-        "Its new edge slips with friction below (3/4) sin α cos α/(1 − (3/4) sin²α).",
+        "Its new edge slips with friction below 3 b h/(4 h² + b²).",
     ),
     reference="Angular momentum about the corner, and energy (closed form; times by quadrature).",
     conclusion="Green: the blow acts where it must. Red: impacts at two points at once are solved wrongly.",
