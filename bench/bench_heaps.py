@@ -4,7 +4,8 @@
     python bench/bench_heaps.py --huge [100000]      a heap of so many for the whole 4 s, and nothing else: minutes
 
 Costs are CPU time of this process. Claims are ratios of costs measured side by side in one run, and milliseconds of one
-core: what is asked of 1000 spheres, of 64 mixed bodies, of stacks and plates at rest. A heap is ten layers of bodies of 1 kg, dropped in a grid at a spacing of .55 m with a jitter of .02 m onto a plane.
+core: what is asked of 1000 spheres, of 64 mixed bodies, of stacks and plates at rest. A heap is ten layers of bodies of
+1 kg, dropped in a grid at a spacing of .55 m with a jitter of .02 m onto a plane.
 """
 
 from __future__ import annotations
@@ -59,10 +60,8 @@ CHEAP = 5e-3  # s a step of 1000 spheres within OVERLAP, the mean
 LAST, WAY = 60e-3, 150e-3  # s a step within MINUTE: the mean of the last second, and of the whole fall
 MEDIAN, LONGEST = 4e-3, 30e-3  # s a step of 64 mixed bodies, solved directly
 PLATES = 1e-3  # s a step of fallen plates
-STILL, ANY = (
-    1.2e-3,
-    10e-3,
-)  # s a step of a stack of 100: at rest, and any that starts it or follows a knock at .5 m/s
+STILL = 1.2e-3  # s a step of a stack of 100 at rest
+ANY = 10e-3  # the same in any step that starts it or follows a knock at .5 m/s
 BOXES = 5e-3  # s a step of 1000 boxes, fallen
 PACKED = ((64, Method()), (256, Method(solver="iterative")))  # spheres in a bin: 256 directly take minutes
 

@@ -58,12 +58,8 @@ DURATION = 0.75  # s
 ROUGH = Material(friction=FRICTION)
 COUNTS = (5, 20, 80, 320)  # links that are let fall flat
 LOW, ALONG, LANDED = 0.05, 3.0, 0.5  # m, m/s, s: from where, how fast ahead, and when it slides on the floor
-DRAWN, NUDGE, SLIDES, SEARCHED = (
-    10.0,
-    1e-7,
-    40,
-    4e-3,
-)  # m/s, m, steps of a chain that is drawn, the search's resolution
+DRAWN, NUDGE, SLIDES = 10.0, 1e-7, 40  # m/s, m and steps of a chain that is drawn
+SEARCHED = 4e-3  # the search's resolution
 # s: a nudge grows a hundredfold in so many steps, 0.1 % after the links' swing sideways has h ω = 2; by the step of the test
 LONGEST = 0.0607347
 

@@ -59,10 +59,8 @@ TURNING = (HEAVY - LIGHT) * GRAVITY / (HEAVY + LIGHT + DRUM / RADIUS**2)
 
 BLOCK, STRAND, SLING = 1.0, 4.0, 1.0  # kg, m, m: a block in two strands, and the load under it
 ASIDE, SWAYS, SEARCHED = 1e-7, 200, 2e-3  # m and steps, of the study of its sway, and its resolution
-RATIOS, HELD = (
-    1e12,
-    1e-9,
-)  # as far as the ratio of two weights is searched, and to what their pull must be right
+RATIOS = 1e12  # as far as the ratio of two weights is searched
+HELD = 1e-9  # to what their pull must be right
 
 
 def atwood(heavy: float = HEAVY, light: float = LIGHT) -> Scene:

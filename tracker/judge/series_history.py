@@ -212,10 +212,6 @@ def _judge_values(
             yield Judged(night=night, verdict=IDENTICAL, state="green", stands=calm, against=level)
             level = night
             continue
-        if red is not None and level is not None and not accepted and _stays_red(red, level, night):
-            red = replace(red, night=night)
-            yield red
-            continue
         release = next((old for old in reversed(history[looked:place]) if is_release(old.run)), release)
         looked = place + 1
         own = standing(definition, night.sample)
@@ -313,19 +309,6 @@ def _repeats(before: Point, after: Point) -> bool:
         and old.outcome == new.outcome
         and old.set_point_held == new.set_point_held
         and (old.state_hash == new.state_hash or "" in (old.state_hash, new.state_hash))
-    )
-
-
-def _stays_red(red: Judged, level: Point, night: Point) -> bool:
-    """Whether a night repeats the one before, which is red against the level: what was said of that stands."""
-    old, new = red.night.sample, night.sample
-    return (
-        red.verdict.red
-        and red.against is level
-        and same_bits(old.value, new.value)
-        and (old.outcome, old.passed, old.set_point_held, old.state_hash, old.failure)
-        == (new.outcome, new.passed, new.set_point_held, new.state_hash, new.failure)
-        and same_commit(level.run, red.night.run) == same_commit(level.run, night.run)
     )
 
 
