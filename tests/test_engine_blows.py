@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 
@@ -70,6 +71,33 @@ def test_a_ball_rubs_while_it_rebounds(h: float, solver: str, model: str, mu: fl
 
     assert result["v"] == pytest.approx((slip, 0.0, 1.6), abs=1e-9)
     assert result["w"] == pytest.approx((0.0, 2.5 * (3.0 - slip) / 0.1, 0.0), abs=1e-7)
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_balls_that_rebound_are_where_both_their_speeds_lead(h: float, solver: str) -> None:
+    """They meet .37 of a step after a step begins, off centre and rough, one of them or none fixed: until then they go
+    with the velocity before, from then with that after. Sweeps led them with the latter for the whole step."""
+    rough, meeting = Material(restitution=0.8, friction=0.3), 3.37 * h
+    along, speed = np.array((0.8, 0.6, 0.0)), np.array((3.0, 0.0, 0.0))  # of the centres; of the first ball
+    places = np.array((-0.3 * along - meeting * speed, (0.0, 0.0, 0.0)))
+    for fixed in (False, True):
+        struck = ball("struck", (0, 0, 0), (0, 0, 0), shape=Sphere(0.2), mass=2.0, material=rough)
+        bodies = (
+            ball("ball", tuple(places[0]), tuple(speed), material=rough),
+            dataclasses.replace(struck, motion="static") if fixed else struck,
+        )
+        result = simulate(
+            Scene(bodies=bodies),
+            time_step=h,
+            steps=6,
+            method=Method(solver=solver),  # type: ignore[arg-type]
+            observe={"x": Final(quantity=Position("ball")), "v": Final(quantity=Velocity("ball"))},
+        )
+        expected = -0.3 * along + (6 * h - meeting) * result["v"]
+
+        assert result["v"] @ along < 0.0
+        np.testing.assert_allclose(result["x"], expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -124,7 +124,9 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
         if (unsettled_body_ < 0) blame_sunk();
         shorten_unsettled(system, system.rows.size(), share);
     }
-    mark_held(system);  // by joints; of contacts those that push
+    mark_held(system);  // by joints; of contacts those that push, or did in a blow
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        if (unknown_[b] >= 0 && event_time_[b] >= 0.0) held_[unknown_[b]] = 1;
     touches_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
