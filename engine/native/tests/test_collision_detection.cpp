@@ -107,6 +107,46 @@ void filters_and_order() {
     EXPECT(all.possible());
 }
 
+/// Margins that grow for a few bodies: their pairs are those that a search from scratch would find.
+void who_goes_further_is_looked_for_again() {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    for (const int count : {5, 60}) {
+        const double side = std::cbrt(static_cast<double>(count));
+        std::vector<Collider> colliders{{0, Primitive::plane({0, 0, 1}), {}},
+                                        {1, Primitive::box({side, 1, 1}), {}}};
+        std::vector<char> dynamic{0, 0};
+        std::vector<Pose> bodies(2);
+        for (int b = 2; b < count; ++b) {
+            colliders.push_back({b, Primitive::sphere(0.2 + 0.2 * unit(random)), {}});
+            if (b % 3 == 0)
+                colliders.push_back({b, Primitive::box({0.2, 0.3, 0.4}), {{0.5, 0, 0}, Mat3::identity()}});
+            dynamic.push_back(1);
+            const Vec3 place{side * unit(random), side * unit(random), side * unit(random)};
+            bodies.push_back({place, Mat3::identity()});
+        }
+        std::vector<double> margin(bodies.size(), 0.01);
+        const std::vector<IndexPair> excluded{{2, 3}};
+        Detection one(colliders, dynamic, excluded), other(colliders, dynamic, excluded);
+        one.near(bodies, margin);
+        std::vector<IndexPair> found;
+        for (const std::vector<int>& grown : {std::vector<int>{2}, {2, 3}, {2, 3, 4}}) {
+            for (const int body : grown) margin[body] += 0.7 * side * unit(random);
+            EXPECT(one.near_again(grown, margin, found));
+            std::vector<IndexPair> theirs;
+            for (const IndexPair& pair : other.near(bodies, margin))
+                for (const int body : grown)
+                    if (one.collider(pair.first).body == body || one.collider(pair.second).body == body) {
+                        theirs.push_back(pair);
+                        break;
+                    }
+            EXPECT(found == theirs);
+            EXPECT(found.size() >= grown.size());
+        }
+        EXPECT(!one.near_again({0}, margin, found));  // a plane's margin is everybody's
+    }
+}
+
 void keys_last_while_the_touching_features_do() {
     const Primitive box = Primitive::box({1, 1, 1});
     Detection stack({{0, box, {}}, {1, box, {}}}, {0, 1}, {});
@@ -197,6 +237,7 @@ int main() {
     sizes_and_places_do_not_matter();
     not_a_number_touches_nothing();
     filters_and_order();
+    who_goes_further_is_looked_for_again();
     keys_last_while_the_touching_features_do();
     sweeps_find_what_small_steps_find();
     what_turns_in_a_plane_meets_no_side_of_it();

@@ -65,6 +65,13 @@ bool Detection::may_touch(int i, int j) const noexcept {
     return excluded_.empty() || !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
 }
 
+/// Whether a bounded shape may come as near to a plane as the margins of both.
+bool Detection::reaches(int plane, int k, const std::vector<double>& margin) const noexcept {
+    const Vec3 normal = poses_[plane].rotation * colliders_[plane].shape.normal;
+    return dot(normal, poses_[k].position - poses_[plane].position) <=
+           reach(colliders_[k].shape) + (margin[colliders_[plane].body] + margin[colliders_[k].body]);
+}
+
 void Detection::add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const {
     const auto [i, j] = pair;
     for (int k = 0; k < manifold.count; ++k) {
@@ -101,14 +108,9 @@ const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
     pairs_.resize(kept);
     on_planes_.clear();
     for (int plane : planes_) {
-        const Vec3 normal = poses_[plane].rotation * colliders_[plane].shape.normal;
-        for (int k : bounded_) {
-            const double sum = margin[colliders_[plane].body] + margin[colliders_[k].body];
-            if (dot(normal, poses_[k].position - poses_[plane].position) <=
-                    reach(colliders_[k].shape) + sum &&
-                may_touch(plane, k))
+        for (int k : bounded_)
+            if (reaches(plane, k, margin) && may_touch(plane, k))
                 on_planes_.emplace_back(std::min(plane, k), std::max(plane, k));
-        }
     }
     if (!sheets_.empty()) {
         if (!planted_) {
@@ -130,6 +132,37 @@ const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
     near_.resize(pairs_.size() + on_planes_.size());
     std::merge(pairs_.begin(), pairs_.end(), on_planes_.begin(), on_planes_.end(), near_.begin());
     return near_;
+}
+
+bool Detection::near_again(const std::vector<int>& grown, const std::vector<double>& margin,
+                           std::vector<IndexPair>& out) {
+    out.clear();
+    const auto add = [&](int i, int j) {
+        if (may_touch(i, j)) out.emplace_back(std::min(i, j), std::max(i, j));
+    };
+    const auto first_of = [this](int body) {
+        return std::lower_bound(bounded_.begin(), bounded_.end(), body,
+                                [this](int k, int b) { return colliders_[k].body < b; });
+    };
+    for (const int plane : planes_)
+        if (std::binary_search(grown.begin(), grown.end(), colliders_[plane].body)) return false;
+    for (const int body : grown)
+        for (auto at = first_of(body); at != bounded_.end() && colliders_[*at].body == body; ++at)
+            bounds_[at - bounded_.begin()] = bounds(colliders_[*at].shape, poses_[*at], margin[body]);
+    for (const int body : grown)
+        for (auto at = first_of(body); at != bounded_.end() && colliders_[*at].body == body; ++at) {
+            const Bounds own = bounds_[at - bounded_.begin()];
+            for (std::size_t k = 0; k < bounded_.size(); ++k)
+                if (overlap(own, bounds_[k])) add(*at, bounded_[k]);
+            for (const int plane : planes_)
+                if (reaches(plane, *at, margin)) add(plane, *at);
+            hits_.clear();
+            if (planted_ && dynamic_[body]) tree_.overlapping(own, hits_);
+            for (const int hit : hits_) add(sheets_[hit], *at);
+        }
+    std::sort(out.begin(), out.end());
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    return true;
 }
 
 void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double>& margin,

@@ -44,6 +44,10 @@ public:
     /// The same in two calls, for a stage that looks at pairs: the colliders that may come as near as that, as
     /// indices (i, j), i < j, in ascending order; then the points of one pair, in order of feature.
     const std::vector<IndexPair>& near(const std::vector<Pose>& bodies, const std::vector<double>& margin);
+    /// The same of these bodies alone, whose margins have grown since; at a cost proportional to all for each of them.
+    /// False if that does not do and near() is to be asked again.
+    bool near_again(const std::vector<int>& grown, const std::vector<double>& margin,
+                    std::vector<IndexPair>& out);
     void touch(IndexPair pair, double margin, std::vector<Contact>& out) const;
     /// As touch(), with the bodies of the pair elsewhere.
     void touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
@@ -65,6 +69,7 @@ public:
 
 private:
     bool may_touch(int i, int j) const noexcept;
+    bool reaches(int plane, int k, const std::vector<double>& margin) const noexcept;
     void add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const;
 
     std::vector<Collider> colliders_;  // by body

@@ -19,6 +19,7 @@ std::uint64_t pair_of(IndexPair pair) noexcept {
 }
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
+constexpr std::size_t most_grown = 256;  // bodies looked for one by one: beyond, all anew is cheaper
 constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
 constexpr double vanishing = 1e-8;       // a direction so steep on the surface has no shadow
 constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
@@ -109,12 +110,34 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
 
 /// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
 void ContactStage::find_open() {
+    open_.clear();
+    look_at(detection_.near(poses_, search_));
+}
+
+/// The same where the search has been widened for some bodies since: what is new is theirs.
+void ContactStage::find_open_again() {
+    if (grown_.size() > most_grown || !detection_.near_again(grown_, search_, near_)) {
+        changed_.assign(unknown_.size(), 1);
+        return find_open();
+    }
+    for (const int body : grown_) changed_[body] = 1;
+    const auto in_order = [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; };
+    std::erase_if(near_, [&](const IndexPair& pair) {
+        const auto at = std::lower_bound(open_.begin(), open_.end(), pair,
+                                         [](const OpenPair& a, const IndexPair& b) { return a.pair < b; });
+        return at != open_.end() && at->pair == pair;
+    });
+    const auto old = static_cast<std::ptrdiff_t>(open_.size());
+    look_at(near_);
+    std::inplace_merge(open_.begin(), open_.begin() + old, open_.end(), in_order);
+}
+
+void ContactStage::look_at(const std::vector<IndexPair>& near) {
     known_.clear();
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
-    open_.clear();
     unsigned seen = 0;
-    for (const IndexPair& pair : detection_.near(poses_, search_)) {
+    for (const IndexPair& pair : near) {
         if (++seen % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
@@ -256,7 +279,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
 
 bool ContactStage::meets(const std::vector<Vec6>& next) {
     changed_ = jointed_;  // others have been swept with what they fly with
-    if (outrun(next)) find_open();
+    if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
     if (find_strikes(next, true) > 0) take_back_strikes(closed_points, next);
     if (points_.empty()) return false;

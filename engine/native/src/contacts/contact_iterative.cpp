@@ -56,10 +56,7 @@ bool ContactStage::find_more() {
         changed_[b] = first || next_[b] != now;
         next_[b] = now;
     }
-    if (outrun(next_)) {
-        changed_.assign(unknown_.size(), 1);
-        find_open();
-    }
+    if (outrun(next_)) find_open_again();
     const std::size_t known = points_.size();
     const bool turned = find_turned(next_);
     const std::size_t taken = points_.size();

@@ -260,7 +260,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         move_on(system, next);
         const std::size_t known = points_.size();
         changed_.assign(next.size(), 1);
-        if (outrun(next)) find_open();
+        if (outrun(next)) find_open_again();
         const bool turned = find_turned(next);
         const std::size_t taken = points_.size();
         if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
@@ -357,9 +357,11 @@ bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
         faster = faster || margin > search_[b] * (1.0 + 1e-9);
         margin_[b] = std::max(margin_[b], margin);
     }
-    if (faster)
-        for (std::size_t b = 0; b < margin_.size(); ++b) search_[b] = std::max(search_[b], margin_[b]);
-    return faster;
+    if (!faster) return false;
+    grown_.clear();
+    for (std::size_t b = 0; b < margin_.size(); ++b)
+        if (margin_[b] > search_[b]) search_[b] = margin_[b], grown_.push_back(static_cast<int>(b));
+    return true;
 }
 
 /// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere.

@@ -250,6 +250,8 @@ private:
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void orient(Point& point, const Pose& first, const Pose& second) const;
     void find_open();
+    void find_open_again();
+    void look_at(const std::vector<IndexPair>& near);
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
     bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
@@ -342,6 +344,8 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     LargeArray<OpenPair> open_;
+    std::vector<IndexPair> near_;  // where the search was widened
+    std::vector<int> grown_;       // whom it was widened for
     std::vector<char> supported_;  // bodies with a closed contact
     std::vector<double> depth_;    // of a body's closed contacts, m
     std::vector<Contact> scratch_;
