@@ -20,18 +20,57 @@ constexpr int most_again = 8;   // solves until the give is gone: each leaves ab
 constexpr double left = 1e-16;  // of the fastest row: a give that is rounding
 constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 
-}  // namespace
-
-double ContactStage::kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const {
-    double twice = 0.0;
-    for (std::size_t b = 0; b < velocity.size(); ++b)
+/// Of each island's bodies, J.
+std::vector<double> kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity,
+                                   const Islands& islands) {
+    std::vector<double> energy(islands.count, 0.0);
+    for (std::size_t b = 0; b < velocity.size(); ++b) {
+        if (islands.of_body[b] < 0) continue;
         for (int i = 0; i < 6; ++i) {
             double momentum = 0.0;
             for (int j = 0; j < 6; ++j) momentum += system.mass[b][6 * i + j] * velocity[b][j];
-            twice += momentum * velocity[b][i];
+            energy[islands.of_body[b]] += 0.5 * momentum * velocity[b][i];
         }
-    return 0.5 * twice;
+    }
+    return energy;
 }
+
+/// In islands whose energy rises, velocities between the plastic ones and those of Newton's law that keep it; `share` is
+/// how much of the latter.
+void blend(MixedSystem& newton, const MixedSystem& plastic, const Islands& islands,
+           const std::vector<double>& limit, const std::vector<char>& rises, std::vector<double>& share) {
+    std::vector<double> low(islands.count, 0.0), high(islands.count, 1.0);
+    std::vector<Vec6> mixed = newton.velocity;
+    const auto mix = [&](const auto& of_island) {
+        for (std::size_t b = 0; b < mixed.size(); ++b) {
+            const int island = islands.of_body[b];
+            if (island < 0 || !rises[island]) continue;
+            const double s = of_island(island);
+            for (int i = 0; i < 6; ++i)
+                mixed[b][i] = plastic.velocity[b][i] + s * (newton.velocity[b][i] - plastic.velocity[b][i]);
+        }
+    };
+    for (int halving = 0; halving < 50; ++halving) {
+        mix([&](int k) { return 0.5 * (low[k] + high[k]); });
+        const std::vector<double> energy = kinetic_energy(newton, mixed, islands);
+        for (int k = 0; k < islands.count; ++k)
+            (energy[k] <= limit[k] ? low[k] : high[k]) = 0.5 * (low[k] + high[k]);
+    }
+    mix([&](int k) { return low[k]; });
+    newton.velocity = mixed;
+    for (int k = 0; k < islands.count; ++k)
+        if (rises[k]) share[k] = low[k];
+}
+
+Vec3 impulse_of(const RowBlock& block) {
+    Vec3 impulse;  // the solver may have turned the tangents: read them from the rows
+    for (int i = 0; i < block.size; ++i)
+        impulse += block.multiplier[i] *
+                   (block.first >= 0 ? linear(block.first_jacobian[i]) : -linear(block.second_jacobian[i]));
+    return impulse;
+}
+
+}  // namespace
 
 /// A pair that meets at more points than its motion can tell apart may share a blow among them in many ways, and
 /// friction turns the bodies otherwise with each. Points that give way alike share it in one: their rows get a
@@ -55,7 +94,8 @@ void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
 /// (the proximal point algorithm, Rockafellar 1976). Rows that contradict each other keep some: the solve is unsettled.
 void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                                FrictionModel model) {
-    bool finite = run(hit, friction, impact_solver_, model).finite;
+    FrictionReport report = run(hit, friction, impact_solver_, model);
+    bool settled = report.converged;
     std::vector<double> asked;
     std::vector<char> answered(hit.rows.size(), 1);
     double fastest = 0.0;
@@ -67,7 +107,7 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
         soft = soft || block.softness[0] > 0.0;
     }
     double change = 0.0;
-    for (int again = 0; soft && finite && again <= most_again; ++again) {
+    for (int again = 0; soft && report.finite && again <= most_again; ++again) {
         change = 0.0;
         for (std::size_t k = 0; k < asked.size(); ++k) {
             RowBlock& block = hit.rows[joints + k];
@@ -77,15 +117,20 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
             block.right[0] = right;
         }
         if (change <= left * fastest || again == most_again) break;
-        finite = run(hit, friction, impact_solver_, model, &answered).finite;
+        report = run(hit, friction, impact_solver_, model, &answered);
+        settled = settled && report.converged;
     }
     const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
-    if (finite && change > std::max(enough, tolerated * fastest)) ++counters_.unsettled;
+    if (report.finite && change > std::max(enough, tolerated * fastest)) ++counters_.unsettled;
+    if (report.finite && !settled) judge_blow(hit, friction, model);
 }
 
 void ContactStage::impact(MixedSystem& system) {
     ++counters_.impacts;
     ++impact_rounds_;
+    residual_ = unsettled_by_ = 0.0;
+    unsettled_body_ = -1;
+    sunk_ = false;
     const bool successive = options_.impacts == ImpactOrder::successive &&
                             impact_rounds_ <= 100 + 20 * static_cast<int>(points_.size());
     MixedSystem hit;
@@ -104,12 +149,14 @@ void ContactStage::impact(MixedSystem& system) {
     const std::size_t joints = system.rows.size();
     std::vector<std::size_t> who;
     std::vector<FrictionPoint> friction;
-    bool pushed_by_motion = false;
+    std::vector<std::size_t> pushed;  // rows against what moves as it is told, or along itself
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         if (point.bounce < 0.0 || (successive && !(point.approach < -point.rounding))) continue;
         RowBlock block = row_block(point, point.material.friction > 0.0 ? 3 : 1);
-        for (int i = 0; i < block.size; ++i) pushed_by_motion = pushed_by_motion || block.right[i] != 0.0;
+        if (std::any_of(block.right.begin(), block.right.begin() + block.size,
+                        [](double r) { return r != 0.0; }))
+            pushed.push_back(hit.rows.size());
         block.right[0] += std::max(0.0, -point.bounce * point.approach);
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
         if (block.size == 3) {
@@ -129,47 +176,36 @@ void ContactStage::impact(MixedSystem& system) {
     const std::vector<FrictionPoint> fresh = friction;
     hit_exactly(hit, joints, friction, model);
 
-    const double limit = kinetic_energy(hit, before);
-    double share = 1.0;
+    const Islands islands = find_islands(hit);
+    const auto island = [&islands](const RowBlock& block) {
+        return islands.of_body[std::max(block.first, block.second)];
+    };
+    const std::vector<double> limit = kinetic_energy(hit, before, islands),
+                              energy = kinetic_energy(hit, hit.velocity, islands);
+    std::vector<double> share(islands.count, 1.0);  // of Newton's law, the rest plastic
+    std::vector<char> rises(islands.count, 0);
+    for (int k = 0; k < islands.count; ++k) rises[k] = energy[k] > limit[k] * (1.0 + gain);
+    for (const std::size_t k : pushed) rises[island(hit.rows[k])] = 0;
     MixedSystem plastic;
-    if (!pushed_by_motion && kinetic_energy(hit, hit.velocity) > limit * (1.0 + gain)) {
+    if (std::find(rises.begin(), rises.end(), 1) != rises.end()) {
         plastic = start;
         std::vector<FrictionPoint> plastic_friction = fresh;
         for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
         hit_exactly(plastic, joints, plastic_friction, model);
-        double low = 0.0, high = 1.0;
-        std::vector<Vec6> blend(before.size());
-        auto mix = [&](double s) {
-            for (std::size_t b = 0; b < blend.size(); ++b)
-                for (int i = 0; i < 6; ++i)
-                    blend[b][i] = plastic.velocity[b][i] + s * (hit.velocity[b][i] - plastic.velocity[b][i]);
-        };
-        for (int halving = 0; halving < 50; ++halving) {
-            mix(0.5 * (low + high));
-            (kinetic_energy(hit, blend) <= limit ? low : high) = 0.5 * (low + high);
-        }
-        share = low;
-        mix(share);
-        hit.velocity = blend;
+        blend(hit, plastic, islands, limit, rises, share);
     }
     system.velocity = hit.velocity;
     mark_held(hit);
-    auto impulse_of = [](const RowBlock& block) {
-        Vec3 impulse;  // the solver may have turned the tangents: read them from the rows
-        for (int i = 0; i < block.size; ++i)
-            impulse += block.multiplier[i] * (block.first >= 0 ? linear(block.first_jacobian[i])
-                                                               : -linear(block.second_jacobian[i]));
-        return impulse;
-    };
     for (std::size_t j = 0; j < who.size(); ++j) {
         Point& point = points_[who[j]];
         const RowBlock& block = hit.rows[joints + j];
+        const double s = share[island(block)];
         double normal = block.multiplier[0];
         Vec3 impulse = impulse_of(block);
-        if (share < 1.0) {
+        if (s < 1.0) {
             const RowBlock& soft = plastic.rows[joints + j];
-            normal = soft.multiplier[0] + share * (normal - soft.multiplier[0]);
-            impulse = (1.0 - share) * impulse_of(soft) + share * impulse;
+            normal = soft.multiplier[0] + s * (normal - soft.multiplier[0]);
+            impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
         }
         point.impact += normal;
         point.impact_impulse += impulse;

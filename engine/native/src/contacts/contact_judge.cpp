@@ -118,6 +118,16 @@ void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPo
     if (unsettled_body_ < 0 && !report.converged) blame_sunk();
 }
 
+/// The same of a blow whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
+void ContactStage::judge_blow(const MixedSystem& hit, const std::vector<FrictionPoint>& points,
+                              FrictionModel model) {
+    const RowsResidual worst = rows_residual(hit, points, model);
+    if (!(worst.residual > residual_)) return;
+    residual_ = worst.residual;
+    const RowBlock& block = hit.rows[worst.row];
+    blame(worst.residual, std::max(block.first, block.second));
+}
+
 /// Sweeps that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
 /// load is not carried. What parting could not lift again shows it.
 void ContactStage::blame_sunk() {

@@ -14,7 +14,37 @@ namespace {
 
 constexpr double slack_share = 1e-10;  // of the smaller body's radius
 constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
+constexpr std::size_t few_rows = 24;   // blocks: so many are solved directly at little cost
 constexpr int late_rounds = 64;  // of solves that set others in motion towards a third: each finds pairs anew
+
+FrictionReport sweep(const ContactOptions& o, FrictionModel model, MixedSystem& island,
+                     std::vector<FrictionPoint>& points, DirectSolver& solver) {
+    return o.solver == SolverKind::iterative
+               ? solve_iterative(island, points, model, o.iterations, o.residual_tolerance)
+               : solve_hybrid(island, points, model, solver.pivot, o.iterations, o.residual_tolerance);
+}
+
+/// Sweeps; where they stop with few rows off by more than `enough`, as in the rough blow of an end whose pushing and
+/// rubbing turn it alike, more of them go in circles, and a direct solve costs little.
+FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, double enough,
+                              MixedSystem& island, std::vector<FrictionPoint>& points, DirectSolver& solver) {
+    MixedSystem start = island;
+    std::vector<FrictionPoint> fresh = points;
+    FrictionReport report = sweep(o, model, island, points, solver);
+    if (!report.finite || report.converged) return report;
+    const double left = rows_residual(island, points, model).residual;
+    if (!(left > enough)) return report;
+    const FrictionReport direct = solve_friction_direct(start, fresh, model, solver);
+    if (direct.finite && rows_residual(start, fresh, model).residual < left) {
+        island = std::move(start), points = std::move(fresh);
+        for (const FrictionPoint& point : points)  // what is left is the direct solver's own
+            for (int i = point.row; i < point.row + point.size; ++i)
+                island.rows[point.block].softness[i] = point.slip_softness;
+        report.converged = direct.converged;
+    }
+    report.rounds += direct.rounds, report.pivots += direct.pivots, report.sweeps += direct.sweeps;
+    return report;
+}
 
 }  // namespace
 
@@ -129,17 +159,14 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
     if (o.solver == SolverKind::direct && system.velocity.size() == system.mass.size() &&
         still_right(system, points, model))
         return {};
+    // What a resting solve leaves, the next step sees; what a blow leaves stays.
+    const double enough = &islands == &impact_solver_ ? 0.0 : o.unsettled_residual;
     const FrictionReport report = islands.run(
         system, points,
-        [&o, model](MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
-            switch (o.solver) {
-                case SolverKind::iterative:
-                    return solve_iterative(island, own, model, o.iterations, o.residual_tolerance);
-                case SolverKind::hybrid:
-                    return solve_hybrid(island, own, model, solver.pivot, o.iterations, o.residual_tolerance);
-                case SolverKind::direct: break;
-            }
-            return solve_friction_direct(island, own, model, solver);
+        [&o, model, enough](MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
+            if (o.solver == SolverKind::direct) return solve_friction_direct(island, own, model, solver);
+            if (island.rows.size() > few_rows) return sweep(o, model, island, own, solver);
+            return sweep_or_solve(o, model, enough, island, own, solver);
         },
         answered);
     counters_.friction_rounds += report.rounds;

@@ -28,8 +28,8 @@
 // impulse P, M (v_p − v₋) = P and E_p − E₋ = v_p·P − ½ |v_p − v₋|²_M, where v_p·P = Σ nu C v_p + beta·D v_p, whose
 // first part is zero by complementarity and whose second is negative, friction acting against the slip. So
 // E_p <= E₋. Newton's law, v_N, can raise E where restitutions differ, or where friction turns a slip round: then
-// v₊ = v_p + s (v_N − v_p) with the largest s in 0 … 1 for which E(v₊) <= E₋. It exists, E being convex in s and
-// E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
+// v₊ = v_p + s (v_N − v_p) with the largest s in 0 … 1 for which E(v₊) <= E₋, island by island. It exists, E being
+// convex in s and E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
 //
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was
@@ -212,7 +212,7 @@ public:
 
     ContactCounters counters() const noexcept { return counters_; }
     BlockLdlt::Counters factor_counters() const noexcept;
-    double residual() const noexcept { return residual_; }  // the last solve's rows_residual(), m/s
+    double residual() const noexcept { return residual_; }  // the last solve's or blow's rows_residual(), m/s
     /// A body whose rows the last solve left further from their law than `unsettled_residual`; −1 if there is none.
     int unsettled_body() const noexcept { return unsettled_body_; }
     double unsettled_by() const noexcept { return unsettled_by_; }  // m/s
@@ -270,7 +270,6 @@ private:
     double carried(const Point& point, Vec3 direction) const noexcept;
     double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                     bool only_prescribed) const;
-    double kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
                        FrictionModel model, const std::vector<char>* answered = nullptr);
     void share_blow(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& who) const;
@@ -295,6 +294,7 @@ private:
     void hand_over();
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
+    void judge_blow(const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel model);
     void blame(double residual, int unknown);
     void blame_sunk();
     void shorten_unsettled(MixedSystem& system, std::size_t joints, std::vector<double>& share) const;

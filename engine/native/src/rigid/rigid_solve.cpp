@@ -392,10 +392,18 @@ void RigidSystem::judge_sweeps() {
     note_unsettled(body_of(worst.row), worst.residual);
 }
 
+/// Takes over what the contact stage has found of its last solve.
+void RigidSystem::judge_contacts() {
+    residual_ = std::max(residual_, contacts_->residual());
+    if (contacts_->unsettled_body() >= 0)
+        note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(), contacts_->unsettled_sunk());
+}
+
 void RigidSystem::impact() {
     fill_momenta(false);
     fill_rows();
     contacts_->impact(mixed_);
+    judge_contacts();
     take_velocities(true, [this](int k) { return !contacts_->held(k); });
     for (std::size_t k = 0; k < tied_.size(); ++k)
         if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
@@ -416,10 +424,7 @@ void RigidSystem::solve_mixed(bool touching) {
     bool finite = true;
     if (touching) {
         finite = contacts_->solve(mixed_, velocities_);
-        residual_ = std::max(residual_, contacts_->residual());
-        if (contacts_->unsettled_body() >= 0)
-            note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(),
-                           contacts_->unsettled_sunk());
+        judge_contacts();
     } else if (solver_ == RigidSolver::iterative) {
         std::vector<FrictionPoint> none;
         const FrictionReport report =

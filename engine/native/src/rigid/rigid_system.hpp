@@ -252,6 +252,7 @@ private:
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual, bool sunk = false);
     void judge_sweeps();
+    void judge_contacts();
     void solve_block();
     void solve_locked();
     void deliver_locked();
