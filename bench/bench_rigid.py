@@ -4,23 +4,29 @@
 
 Each time is the shortest of many short runs, because other work on the machine only ever adds. The chain is the
 peers' scene: n boxes locked in a row to the wall, full inertia, rows, one factorisation and one refinement. The ring is
-held at both ends: no tree, so that its blocks are factored, with everything else the same.
+held at both ends: no tree, so that its blocks are factored, with everything else the same. Mechanisms in a plane stand
+beside the same ones by the rows of space, interleaved.
 
-Two limits, with exit code 1: at its longest a chain costs no more per body than GROWTH times its cheapest length, and
+Three limits, with exit code 1: at its longest a chain costs no more per body than GROWTH times its cheapest length, and
 MOST ns. The second is a time of this machine and loose elsewhere. The first holds steps and what a run keeps of them to
-take them back: 0.8 kB a link are read once they have left the caches, and copied once in sixteen steps.
+take them back: 0.8 kB a link are read once they have left the caches, and copied once in sixteen steps. The third:
+numbers of a plane are FASTER times as fast as rows of space.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
+import math
 from dataclasses import replace
 
-from spook_tracker.engine import WORLD, Box, Hinge, Lock, Plane, Program, RigidBody, Scene, compile
+from spook_tracker.engine import WORLD, Box, Hinge, Lock, Method, Plane, Program, RigidBody, Scene, compile
+from spook_tracker.scalar_tests.multibody import four_bars
 
 TIME_STEP = 1.0 / 60.0  # s
 EDGE = (0.125, 0.1, 0.1)  # m
 GROWTH, MOST = 1.2, 350.0  # ×; ns per locked body and step
+FASTER = 2.0  # ×
 
 
 def chain(count: int) -> Scene:
@@ -83,6 +89,58 @@ def seconds_per_step(program: Program, size: int) -> float:
     return min(program.run(steps).cpu_seconds / steps for _ in range(rounds))
 
 
+def rods(count: int, both_ends: bool = False) -> Scene:
+    """Rods of half a metre in a row on hinges, along an arc that hangs if both its ends are held."""
+    points = [(0.5 * k, -0.3 * math.sin(math.pi * k / count) if both_ends else 0.0) for k in range(count + 1)]
+    bodies, hinges = [], []
+    for k, ((x, y), (u, v)) in enumerate(itertools.pairwise(points)):
+        half, across = 0.5 * math.atan2(v - y, u - x), (0.25 + (v - y) ** 2) / 12.0
+        bodies.append(
+            RigidBody(
+                name=f"rod {k}",
+                mass=1.0,
+                inertia=(0.1 * across, across, across),
+                position=(0.5 * (x + u), 0.5 * (y + v), 0.0),
+                orientation=(math.cos(half), 0.0, 0.0, math.sin(half)),
+            )
+        )
+        hinges.append(
+            Hinge(name=f"pin {k}", between=(f"rod {k - 1}" if k else WORLD, f"rod {k}"), at=(x, y, 0.0))
+        )
+    if both_ends:
+        hinges.append(Hinge(name="end", between=(WORLD, f"rod {count - 1}"), at=(*points[-1], 0.0)))
+    return Scene(bodies=tuple(bodies), constraints=tuple(hinges), gravity=(0.0, -9.81, 0.0), contacts=False)
+
+
+PLANES = {
+    "one rod": rods(1),
+    "two rods": rods(2),
+    "five rods": rods(5),
+    "four rods, both ends held": rods(4, both_ends=True),
+    "two four-bars": four_bars.scene(2, TIME_STEP / 4.0),
+    "forty four-bars": four_bars.scene(40, TIME_STEP / 4.0),
+}
+
+
+def planes() -> bool:
+    """A line per mechanism: ns a step in a plane and by the rows of space. Whether one is not fast enough."""
+    print(f"mechanisms in a plane: ns per step, by rows of space, × (at least {FASTER:g})")
+    missed = False
+    for name, scene in PLANES.items():
+        methods = (Method(), Method(force_stages=("solve_block",)))
+        programs = [compile(scene, time_step=TIME_STEP / 4.0, method=method) for method in methods]
+        steps = 20_000 // len(scene.bodies)
+        rounds = [[p.run(steps).cpu_seconds / steps for p in programs] for _ in range(9)]
+        plane, space = (1e9 * min(times) for times in zip(*rounds, strict=True))
+        late = space < FASTER * plane
+        missed = missed or late
+        print(
+            f"  {name:28s} {plane:8.0f}  {space:8.0f}  {space / plane:6.2f}{'  MISSED' if late else ''}",
+            flush=True,
+        )
+    return missed
+
+
 def report(title: str, unit: str, make: object, sizes: tuple[int, ...]) -> list[float]:
     """One line per size: time and block operations per step and element, and growth against the smallest. The times
     [ns]."""
@@ -116,6 +174,7 @@ def main() -> None:
     report("ring of locked boxes", "body", ring, tuple(10**k for k in range(1, 5) if 10**k <= largest))
     report("door", "hinge", door, (1, 2, 10, 50, 200))
     report("stack of boxes", "box", stack, (1, 5, 20))
+    missed = planes() or missed
     if missed:
         raise SystemExit(1)
 

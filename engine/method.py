@@ -47,7 +47,8 @@ class Method:
                        and left bodies sunk into each other by a fiftieth of the smaller one's radius
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
-    force_stages       stages to keep although the scene does not need them, to measure what they cost
+    force_stages       stages to keep although the scene does not need them, to measure what they cost; solve_block: the
+                       general factorisation also where a chain or a mechanism in a plane has a faster way
     """
 
     corrections: int = 0

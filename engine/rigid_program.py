@@ -152,6 +152,7 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
             "correction_cap": method.correction_cap,
             "force_collision": "collision" in method.force_stages,
             "force_rotation": "rotation" in method.force_stages,
+            "force_block": "solve_block" in method.force_stages,
         },
     }
 

@@ -342,6 +342,7 @@ RigidMethod to_method(const nb::dict& method) {
     options.read("correction_cap", out.correction_cap);
     options.read("force_collision", out.force_collision);
     options.read("force_rotation", out.force_rotation);
+    options.read("force_block", out.force_block);
     options.expect_all_read();
     return out;
 }

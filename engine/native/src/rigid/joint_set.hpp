@@ -141,6 +141,7 @@ public:
     void follow(std::span<const BodyState> bodies) noexcept {
         for (const int joint : followed_) states[joint].angle = coordinate(joint, bodies);
     }
+    bool follows() const noexcept { return !followed_.empty(); }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);
     /// Energy of the spring of a joint's free coordinate about `rest` [J]; of a broken joint none.

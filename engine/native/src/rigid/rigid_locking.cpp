@@ -190,11 +190,36 @@ double RigidSystem::motion_of(const Loop& loop) const {
     return motion;
 }
 
-void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
-    const double motion = motion_of(loop);
+bool RigidSystem::stops(const Live::Watched& seen, double motion) const noexcept {
     // What stands moves by rounding, and that may stop as it likes: it would be looked at in nearly every step.
     const double told = LITTLE * TAKEN * std::max(seen.motion, AT_REST * seen.given);
-    const bool stopped = motion < 0.5 * seen.last && seen.last > told;
+    return motion < 0.5 * seen.last && seen.last > told;
+}
+
+/// Whether a step in a plane needs a look at some loop, which the rows of the space are for. If not, it is seen.
+bool RigidSystem::wants_look() {
+    const auto motion = [this](const Loop& loop) {
+        double sum = 0.0;
+        for (int member : loop.members) sum += plane_.motion(member);
+        return 0.5 * sum;
+    };
+    const auto watched = [this](const Loop& loop) { return loop.may_lock && live_.locked < 0; };
+    for (std::size_t k = 0; k < loops_.size(); ++k) {
+        const Live::Watched& seen = live_.watched[k];
+        if (watched(loops_[k]) && (live_.step >= seen.next || stops(seen, motion(loops_[k])))) return true;
+    }
+    for (std::size_t k = 0; k < loops_.size(); ++k) {
+        if (!watched(loops_[k])) continue;
+        Live::Watched& seen = live_.watched[k];
+        seen.last = motion(loops_[k]);
+        seen.motion = std::max(seen.motion, seen.last);
+    }
+    return false;
+}
+
+void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
+    const double motion = motion_of(loop);
+    const bool stopped = stops(seen, motion);
     const bool due = live_.step >= seen.next;
     seen.last = motion;
     seen.motion = std::max(seen.motion, motion);

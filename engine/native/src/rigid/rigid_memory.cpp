@@ -25,6 +25,7 @@ void RigidSystem::keep(Memory& memory) const {
 }
 
 void RigidSystem::go_back(const Memory& memory) {
+    at_hand_ = false;
     redundant_.restore(matrix_, memory.redundancy);
     live_ = memory.live, joints_.states = memory.joints, mixed_ = memory.mixed;
     joints_.breaks = memory.breaks;
@@ -60,6 +61,8 @@ void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
     if (!stages_.runs(Stage::apply_loads)) throw std::invalid_argument("loads need the stage apply_loads");
     BodyConstants& constants = constants_[body];
     if (!constants.moves()) return;
+    if (in_plane_) leave_plane();
+    in_plane_ = false;
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
     constants.force = force;
     constants.torque = torque;

@@ -156,6 +156,7 @@ struct RigidMethod {
     double correction_cap = 0.3;        // of the joint's arms, or rad
     bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs
     bool force_rotation = false;   // give particles a rotation nobody sees, to measure what it costs
+    bool force_block = false;      // factor blocks also where numbers of a plane would do
 };
 
 /// A fluid at rest or in steady motion below the plane up · x = level.

@@ -63,7 +63,7 @@ void RigidSystem::assemble_blocks() {
     const auto blocks = joints_.blocks();
     const int row_blocks = static_cast<int>(blocks.size());
     double* right = right_.data();
-    mixed_values_ = false;
+    mixed_values_ = plane_values_ = false;
     for (int k = 0; k < row_blocks; ++k) {
         const JointBlock& block = blocks[k];
         const BlockPlace& place = places_[k];
@@ -157,12 +157,6 @@ void RigidSystem::solve_locked() {
     tied_are_moved_ = at_once && finite;
     undelivered_ = finite;
     if (clock_) clock_->mark(Stage::solve_block);
-}
-
-/// What the coming steps do not read, and a reader between them does.
-void RigidSystem::deliver_locked() {
-    if (undelivered_) locked_.deliver(joints_.states);
-    undelivered_ = false;
 }
 
 void RigidSystem::solve_block() {
@@ -463,6 +457,11 @@ void RigidSystem::solve_mixed(bool touching) {
 void RigidSystem::wrench(int joint, double* out) const noexcept {
     std::fill_n(out, 6, 0.0);
     const JointSet::State& state = joints_.states[joint];
+    if (plane_values_) {
+        plane_.wrench(joint, state, out);
+        for (int k = 0; k < 6; ++k) out[k] /= h_;
+        return;
+    }
     if (!locked_.empty() && !mixed_values_) {  // along the world's axes, at the joint
         for (int k = 0; k < 6; ++k) out[k] = state.multiplier[k] / h_;
         return;

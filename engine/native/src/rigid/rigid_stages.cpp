@@ -208,6 +208,9 @@ void RigidSystem::tell(StageChoices& choices) const {
     if (!locked_.empty())
         solve = std::string("locks make trees: solved link by link, leaves first, without a matrix") +
                 (contacts_ ? " (while nothing touches)" : "");
+    if (in_plane_)
+        solve = std::string("the mechanism lies in the plane across ") + "xyz"[plane_.normal()] + ": " +
+                std::to_string(plane_.rows()) + " rows of that plane, factored in an envelope";
     if (!in_tree_) return;
     solve = "joints make trees: " + std::to_string(tree_.coordinates()) + " joint coordinates, " +
             std::to_string(tree_.rows()) + " rows to close loops, by Newton's method in a band";

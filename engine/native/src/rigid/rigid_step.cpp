@@ -43,15 +43,27 @@ void RigidSystem::step() {
     if (!live_.velocity_ready) velocity_stage();
     live_.velocity_ready = false;
     if (replaying_ && early_joints_.empty()) {
-        deliver_locked();
+        deliver();
         early_joints_ = joints_.states;
     }
-    integrate_all();
+    if (in_plane_ && half_step_ && !at_hand_) take_plane();  // also where its velocities were found in space
+    if (at_hand_) move_in_plane();
+    else integrate_all();
     ++live_.moved;
+    if (at_hand_ && joints_.follows()) write_plane();
     joints_.follow(live_.bodies);
 }
 
+/// What the coming steps do not read, and a reader between them does.
+void RigidSystem::deliver() {
+    if (undelivered_) locked_.deliver(joints_.states);
+    undelivered_ = false;
+    if (at_hand_) write_plane();
+    if (at_hand_ && plane_values_) plane_.deliver(joints_.states);
+}
+
 void RigidSystem::velocity_stage() {
+    if (in_plane_ && plane_velocities()) return;
     if (half_step_)
         for (int i = 0; i < bodies(); ++i)
             live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
@@ -74,6 +86,7 @@ void RigidSystem::look_ahead() {
     if (live_.velocity_ready) return;
     if (contacts_) keep(before_ahead_);
     velocity_stage();
+    if (at_hand_) deliver();
     live_.velocity_ready = true;
 }
 

@@ -101,6 +101,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
                     [](const BodyConstants& body) { return body.tilted; });
     if (composed_ && solver_ == RigidSolver::block && !tilted)
         tree_.analyse(constants_, joints_, tied_, start_);
+    if (may_lie_in_plane(scene)) plane_.analyse(constants_, joints_, tied_, h_, method_.refinements);
     reset(nullptr);
 }
 
@@ -160,6 +161,8 @@ void RigidSystem::take_stages(const RigidScene& scene) {
 void RigidSystem::reset(StageClock* clock) {
     live_ = {};
     tied_are_moved_ = false;
+    at_hand_ = plane_values_ = false;
+    plane_solves_ = 0;
     replaying_ = false;
     early_joints_.clear();
     live_.bodies = start_;
@@ -188,6 +191,7 @@ void RigidSystem::reset(StageClock* clock) {
         make_room_beyond();
         if (!may_touch) start_half_step();
     }
+    in_plane_ = !plane_.empty() && plane_.holds(constants_, acceleration_, live_.bodies);
     if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
     mixed_.mass.assign(tied_.size(), Mat6{});
     mixed_.momentum.resize(tied_.size());
@@ -206,7 +210,7 @@ void RigidSystem::reset(StageClock* clock) {
 void RigidSystem::advance(std::int64_t steps) {
     if (composed_) return compose(steps * method_.substeps);
     for (std::int64_t n = steps * method_.substeps; n > 0; --n) step();
-    deliver_locked();
+    deliver();
 }
 
 void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
@@ -342,6 +346,9 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     };
     add(pivot_.counters());
     const LockedTree::Counters locked = locked_.counters();
+    work.factorisations += plane_solves_;
+    work.block_operations += plane_solves_ * plane_.blocks();
+    work.solves += plane_solves_;
     work.factorisations += locked.factorisations;
     work.block_operations += locked.block_operations;
     work.solves += locked.solves;

@@ -18,6 +18,7 @@
 #include "rigid/joint_set.hpp"
 #include "rigid/joint_tree.hpp"
 #include "rigid/locked_tree.hpp"
+#include "rigid/plane_step.hpp"
 #include "run/quantities.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
@@ -195,12 +196,14 @@ private:
     double motion_of(const Loop& loop) const;
     double driven(const Loop& loop);
     bool find_repeated(Loop& loop);
+    bool stops(const Live::Watched& seen, double motion) const noexcept;
     void note_locked(const Loop& loop);
     void note_parted();
     std::vector<double> shares(const Loop& loop) const;
     void find_extents(Loop& loop);
     void take_stages(const RigidScene& scene);
     void step();
+    void deliver();
     void velocity_stage();
     void look_ahead();
 
@@ -215,6 +218,15 @@ private:
     double row_speed(int block, int row, bool solved) const;
     void bend_rows_back();
     void correct_curvature();
+
+    // rigid_plane.cpp: steps by numbers of a plane
+    bool may_lie_in_plane(const RigidScene& scene) const;
+    bool plane_velocities();
+    void move_in_plane();
+    void take_plane();
+    void leave_plane();
+    void write_plane();
+    bool wants_look();
 
     // rigid_composition.cpp: symmetric compositions of higher order
     void start_composition();
@@ -255,7 +267,6 @@ private:
     void judge_contacts();
     void solve_block();
     void solve_locked();
-    void deliver_locked();
     struct
         Worst {  // row residual, its block, and the largest speed that rows and forces ask for, m/s or rad/s
         double residual = 0.0, speed = 0.0;
@@ -402,8 +413,13 @@ private:
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body
     std::vector<double> first_right_, violation_, bias_, multiplier_;
-    LockedTree locked_;         // of plain steps in which all joints are locks that make trees; else empty
-    bool undelivered_ = false;  // its multipliers are not in joints_.states yet
+    LockedTree locked_;          // of plain steps in which all joints are locks that make trees; else empty
+    bool undelivered_ = false;   // its multipliers are not in joints_.states yet
+    PlaneStep plane_;            // of plain and half-step steps that stay in a plane; else empty
+    bool in_plane_ = false;      // whether this run may use it
+    bool at_hand_ = false;       // whether the bodies are in it, live_.bodies behind
+    bool plane_values_ = false;  // whether the last step's rows are in it
+    std::uint64_t plane_solves_ = 0;
     JointTree tree_;
     bool in_tree_ = false;
     std::size_t unknowns_ = 0;  // of a stage: rows, or joint coordinates

@@ -1,0 +1,446 @@
+#include "rigid/plane_step.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace spook {
+
+namespace {
+
+constexpr double ROUNDING = 4e-16;  // of a unit vector
+constexpr double IN_PLANE = 1e-14;  // of a state, which may come from a run in space
+constexpr double DOUBTFUL = 1e-4;   // of a row's diagonal: a pivot below has lost four digits
+constexpr std::size_t WIDEST = 12;  // columns of the envelope, in the mean: beyond, blocks are as fast
+
+}  // namespace
+
+void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                        std::span<const int> tied, double time_step, int refinements) {
+    joints_.clear(), nodes_.clear(), rows_.clear();
+    h_ = time_step;
+    refinements_ = refinements;
+    const auto blocks = joints.blocks();
+    int normal = -1;
+    for (const JointBlock& block : blocks) {
+        const JointConstants& joint = joints.constants(block.joint);
+        for (int i = 0; i < 3 && normal < 0 && joint.kind == JointKind::hinge; ++i)
+            if (std::fabs(joint.axes[0][i]) > 0.9) normal = i;
+    }
+    if (normal < 0) return;
+    plane_ = {normal};
+    std::vector<int> node_of(constants.size(), static_cast<int>(tied.size()));
+    for (const int body : tied) {
+        const BodyConstants& c = constants[body];
+        if (c.particle) return;
+        const Mat3& p = c.start_principal;
+        const Vec3 axis{p(normal, 0), p(normal, 1), p(normal, 2)};
+        const Vec3 spin{c.inertia.x * axis.x, c.inertia.y * axis.y, c.inertia.z * axis.z};
+        Node node;
+        node.body = body;
+        node.mass = c.mass;
+        node.inertia = dot(axis, spin);
+        if (!(norm(spin - node.inertia * axis) <= 4.0 * ROUNDING * node.inertia)) return;  // it would wobble
+        node.over_mass = 1.0 / node.mass;
+        node.over_inertia = 1.0 / node.inertia;
+        node_of[body] = static_cast<int>(nodes_.size());
+        nodes_.push_back(node);
+    }
+    nodes_.emplace_back();
+    std::vector<int> root(nodes_.size());
+    std::iota(root.begin(), root.end(), 0);
+    const auto find = [&root](int i) {
+        while (root[i] != i) i = root[i] = root[root[i]];
+        return i;
+    };
+    joint_at_.assign(static_cast<std::size_t>(joints.count()), -1);
+    for (const JointBlock& block : blocks) {
+        if (!take_joint(constants, joints, block, node_of)) return joints_.clear();
+        root[find(joints_.back().first)] = find(joints_.back().second);
+    }
+    for (int k = 0; k < static_cast<int>(nodes_.size()); ++k)  // what floats could tip over
+        if (find(k) != find(static_cast<int>(tied.size()))) return joints_.clear();
+    if (!order_rows(joints)) joints_.clear();
+}
+
+/// False if it is none of the joints that hold bodies in the plane, or holds them beside it.
+bool PlaneStep::take_joint(std::span<const BodyConstants> constants, const JointSet& joints,
+                           const JointBlock& block, std::span<const int> node_of) {
+    const JointConstants& from = joints.constants(block.joint);
+    if (block.axial || (from.kind != JointKind::hinge && from.kind != JointKind::lock &&
+                        from.kind != JointKind::prismatic && from.kind != JointKind::planar))
+        return false;
+    const auto lies = [this](Vec3 v) { return std::fabs(v[plane_.normal]) <= ROUNDING * norm(v); };
+    const auto stands = [this](Vec3 v) {
+        return std::fabs(v[plane_.first()]) <= ROUNDING && std::fabs(v[plane_.second()]) <= ROUNDING;
+    };
+    if (!lies(from.first_arm) || !lies(from.second_arm)) return false;
+    const auto node = [&](int body) {
+        return body < 0 ? static_cast<int>(nodes_.size()) - 1 : node_of[static_cast<std::size_t>(body)];
+    };
+    for (const int body : {block.first, block.second})
+        if (body >= 0 && constants[body].motion == Motion::kinematic) return false;
+    if ((from.kind == JointKind::hinge || from.kind == JointKind::planar) && !stands(from.axes[0]))
+        return false;
+    Joint joint;
+    joint.joint = block.joint;
+    joint.first = node(block.first);
+    joint.second = node(block.second);
+    joint.first_arm = plane_(from.first_arm);
+    joint.second_arm = plane_(from.second_arm);
+    joint.row = static_cast<int>(rows_.size());
+    int index = 0;
+    const auto add = [&] {
+        const JointSet::RowLaw law = joints.law(block.joint, index);
+        rows_.push_back({block.joint, index, law.upsilon - 1.0, law.violation});
+    };
+    for (int k = from.holds.linear_first; k < from.holds.linear_end; ++k, ++index) {
+        if (stands(from.axes[k])) continue;
+        if (!lies(from.axes[k]) || joint.linear == 2) return false;
+        joint.axes[joint.linear++] = plane_(from.axes[k]);
+        add();
+    }
+    for (int k = 0; k < 3 && from.holds.turning == Turning::held; ++k, ++index) {
+        if (lies(from.axes[k])) continue;
+        if (!stands(from.axes[k]) || joint.sense != 0.0) return false;
+        joint.sense = from.axes[k][plane_.normal];
+        add();
+    }
+    joint_at_[block.joint] = static_cast<int>(joints_.size());
+    joints_.push_back(joint);
+    return true;
+}
+
+/// Joints that follow each other along the mechanism have their rows near each other: Cuthill and McKee's order. False if
+/// the envelope is too wide all the same.
+bool PlaneStep::order_rows(const JointSet& joints) {
+    const int count = static_cast<int>(joints_.size()), fixed = static_cast<int>(nodes_.size()) - 1;
+    std::vector<std::vector<int>> at(nodes_.size());
+    for (int k = 0; k < count; ++k)
+        for (const int node : {joints_[k].first, joints_[k].second})
+            if (node != fixed) at[node].push_back(k);
+    const auto degree = [&](int k) {
+        std::size_t sum = 0;
+        for (const int node : {joints_[k].first, joints_[k].second})
+            if (node != fixed) sum += at[node].size();
+        return sum;
+    };
+    std::vector<int> order, free(static_cast<std::size_t>(count));
+    std::vector<char> met(static_cast<std::size_t>(count), 0);
+    std::iota(free.begin(), free.end(), 0);
+    const auto lighter = [&](int a, int b) { return degree(a) < degree(b); };
+    std::stable_sort(free.begin(), free.end(), lighter);
+    for (const int begin : free) {
+        if (met[begin]) continue;
+        met[begin] = 1;
+        order.push_back(begin);
+        for (std::size_t next = order.size() - 1; next < order.size(); ++next) {
+            std::vector<int> around;
+            for (const int node : {joints_[order[next]].first, joints_[order[next]].second})
+                if (node != fixed)
+                    for (const int k : at[node])
+                        if (!met[k]) met[k] = 1, around.push_back(k);
+            std::stable_sort(around.begin(), around.end(), lighter);
+            order.insert(order.end(), around.begin(), around.end());
+        }
+    }
+    std::vector<Joint> sorted;
+    std::vector<Row> rows;
+    for (auto k = order.rbegin(); k != order.rend(); ++k) {
+        Joint joint = joints_[*k];
+        const int size = joint.linear + (joint.sense != 0.0 ? 1 : 0), from = joint.row;
+        joint.row = static_cast<int>(rows.size());
+        rows.insert(rows.end(), rows_.begin() + from, rows_.begin() + from + size);
+        joint_at_[joint.joint] = static_cast<int>(sorted.size());
+        sorted.push_back(joint);
+    }
+    joints_ = std::move(sorted);
+    rows_ = std::move(rows);
+
+    return place_rows(joints);
+}
+
+/// Where the rows stand in the envelope, and which of them meet on a body that moves. False if it is too wide.
+bool PlaneStep::place_rows(const JointSet& joints) {
+    const int count = static_cast<int>(joints_.size()), n = static_cast<int>(rows_.size());
+    std::vector<std::vector<std::pair<int, int>>> at(nodes_.size() -
+                                                     1);  // per node: joints, and with which end
+    const auto end_of = [this](int k) {
+        return k + 1 < static_cast<int>(joints_.size()) ? joints_[k + 1].row : static_cast<int>(rows_.size());
+    };
+    first_.assign(rows_.size(), n), start_.assign(rows_.size(), 0);
+    int size = 0;
+    for (int k = 0; k < count; ++k) {
+        int first = joints_[k].row;
+        for (const int end : {0, 1}) {
+            const int node = end ? joints_[k].second : joints_[k].first;
+            if (node == static_cast<int>(at.size())) continue;
+            at[node].emplace_back(k, end);
+            first = std::min(first, joints_[at[node].front().first].row);
+        }
+        for (int r = joints_[k].row; r < end_of(k); ++r) {
+            first_[r] = first;
+            start_[r] = size - first;
+            size += r - first + 1;
+        }
+    }
+    if (n == 0 || static_cast<std::size_t>(size) > WIDEST * rows_.size()) return false;
+    std::vector<std::pair<int, int>> met;
+    meetings_.clear();
+    for (const auto& ends : at)
+        for (std::size_t one = 0; one < ends.size(); ++one)
+            for (std::size_t two = 0; two <= one; ++two) {
+                const auto [k, end] = ends[one];
+                const auto [j, other] = ends[two];
+                met.emplace_back(k, j);
+                for (int r = joints_[k].row; r < end_of(k); ++r)
+                    for (int s = joints_[j].row; s < end_of(j) && s <= r; ++s)
+                        meetings_.push_back({start_[r] + s, 2 * r + end, 2 * s + other});
+            }
+    std::stable_sort(meetings_.begin(), meetings_.end(),
+                     [](const Meeting& a, const Meeting& b) { return a.to < b.to; });
+    std::sort(met.begin(), met.end());
+    blocks_ = static_cast<std::uint64_t>(std::unique(met.begin(), met.end()) - met.begin());
+    blank_.assign(static_cast<std::size_t>(size), 0.0);
+    for (int r = 0; r < n; ++r) blank_[start_[r] + r] = joints.law(rows_[r].joint, rows_[r].index).softness;
+    envelope_ = blank_;
+    levers_.assign(2 * rows_.size(), {}), shares_.assign(2 * rows_.size(), {});
+    inverse_.assign(rows_.size(), 0.0), multiplier_ = right_ = asked_ = inverse_;
+    softness_.clear();
+    for (const Row& row : rows_) softness_.push_back(joints.law(row.joint, row.index).softness);
+    for (int k = 0; k < count; ++k) joints_[k].end = end_of(k);
+    return true;
+}
+
+bool PlaneStep::holds(std::span<const BodyConstants> constants, std::span<const Vec3> acceleration,
+                      const LargeArray<BodyState>& bodies) {
+    const auto lies = [this](Vec3 v, double part) { return std::fabs(v[plane_.normal]) <= part * norm(v); };
+    const auto stands = [this](Vec3 v, double part) {
+        return norm(plane_.lifted(plane_(v))) <= part * norm(v);
+    };
+    for (std::size_t i = 0; i < constants.size(); ++i)
+        if (!constants[i].moves() && (!is_zero(bodies[i].displacement) || bodies[i].turn.w != 1.0))
+            return false;
+    for (Node& node : nodes_) {
+        if (node.body < 0) continue;
+        const BodyState& s = bodies[node.body];
+        const Vec3 torque = constants[node.body].torque, turn{s.turn.x, s.turn.y, s.turn.z};
+        if (!lies(acceleration[node.body], ROUNDING) || !stands(torque, ROUNDING) ||
+            !lies(s.displacement, IN_PLANE) || !lies(s.velocity, IN_PLANE) || !stands(turn, IN_PLANE) ||
+            !stands(s.angular_momentum, IN_PLANE))
+            return false;
+        node.kick = plane_(h_ * acceleration[node.body]);
+        node.turn_kick = node.over_inertia * (h_ * torque[plane_.normal]);
+    }
+    read(bodies);
+    assemble();
+    return factor();
+}
+
+void PlaneStep::read(const LargeArray<BodyState>& bodies) noexcept {
+    for (Node& node : nodes_) {
+        if (node.body < 0) continue;
+        const BodyState& s = bodies[node.body];
+        const Vec3 turn{s.turn.x, s.turn.y, s.turn.z};
+        node.displacement = plane_(s.displacement);
+        node.turn = {s.turn.w, turn[plane_.normal]};
+        node.turned = less_one(node.turn);
+        node.velocity = plane_(s.velocity);
+        node.spin = s.angular_momentum[plane_.normal];
+        node.rate = node.over_inertia * node.spin;
+    }
+}
+
+void PlaneStep::write(LargeArray<BodyState>& bodies) const noexcept {
+    for (const Node& node : nodes_) {
+        if (node.body < 0) continue;
+        BodyState& s = bodies[node.body];
+        const Vec3 turn = upright(node.turn.sine);
+        s.displacement = plane_.lifted(node.displacement);
+        s.turn = {node.turn.cosine, turn.x, turn.y, turn.z};
+        s.velocity = plane_.lifted(node.velocity);
+        s.angular_velocity = upright(node.rate);
+        s.angular_momentum = upright(node.spin);
+        s.turn_less_one = {};
+        const int u = plane_.first(), v = plane_.second();
+        s.turn_less_one(u, u) = s.turn_less_one(v, v) = node.turned.fall;
+        s.turn_less_one(u, v) = -node.turned.sine;
+        s.turn_less_one(v, u) = node.turned.sine;
+    }
+}
+
+/// Levers and shares, what the rows ask of the change of velocities, and the matrix.
+void PlaneStep::assemble() noexcept {
+    for (Joint& joint : joints_) {
+        const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
+        const Vec2 first = a.turned * joint.first_arm, second = b.turned * joint.second_arm;
+        const Vec2 gap = b.displacement - a.displacement + second - first;
+        joint.second_reach = joint.second_arm + second;
+        joint.first_reach = joint.first_arm + first + gap;
+        int r = joint.row;
+        const auto put = [&](Lever on_first, Lever on_second, double violation) {
+            levers_[2 * r] = on_first;
+            levers_[2 * r + 1] = on_second;
+            shares_[2 * r] = {a.over_mass * on_first.x, a.over_mass * on_first.y,
+                              a.over_inertia * on_first.turn};
+            shares_[2 * r + 1] = {b.over_mass * on_second.x, b.over_mass * on_second.y,
+                                  b.over_inertia * on_second.turn};
+            // G v₊ + Sig λ = Ups G v − (4/h) Ups g: without the speed that both sides have.
+            const double rate = on_first.x * a.velocity.x + on_first.y * a.velocity.y +
+                                on_first.turn * a.rate + on_second.x * b.velocity.x +
+                                on_second.y * b.velocity.y + on_second.turn * b.rate;
+            asked_[r] = rows_[r].damped * rate - rows_[r].gain * violation;
+            ++r;
+        };
+        for (int k = 0; k < joint.linear; ++k) {
+            const Vec2 u = carried(a.turned, joint.axes[k]);
+            put({-u.x, -u.y, -cross(joint.first_reach, u)}, {u.x, u.y, cross(joint.second_reach, u)},
+                dot(u, gap));
+        }
+        if (joint.sense == 0.0) continue;
+        HalfTurn between = conjugate(a.turn) * b.turn;
+        if (between.cosine < 0.0) between = {-between.cosine, -between.sine};
+        const double on = joint.sense * between.cosine;
+        put({0.0, 0.0, -on}, {0.0, 0.0, on}, 2.0 * joint.sense * between.sine);
+    }
+    std::copy(blank_.begin(), blank_.end(), envelope_.begin());
+    for (const Meeting& m : meetings_) {
+        const Lever &one = levers_[m.lever], &two = shares_[m.other];
+        envelope_[m.to] += one.x * two.x + one.y * two.y + one.turn * two.turn;
+    }
+}
+
+/// L D Lᵀ in place. False where a pivot is too small.
+bool PlaneStep::factor() noexcept {
+    const int n = rows();
+    for (int r = 0; r < n; ++r) {
+        double* row = envelope_.data() + start_[r];
+        const double scale = row[r];
+        double pivot = scale;
+        for (int s = first_[r]; s < r; ++s) {
+            const double* above = envelope_.data() + start_[s];
+            double entry = row[s];
+            for (int k = std::max(first_[r], first_[s]); k < s; ++k) entry -= row[k] * above[k];
+            row[s] = entry;
+        }
+        for (int s = first_[r]; s < r; ++s) {
+            const double lower = row[s] * inverse_[s];
+            pivot -= row[s] * lower;
+            row[s] = lower;
+        }
+        if (!(pivot > DOUBTFUL * scale)) return false;
+        inverse_[r] = 1.0 / pivot;
+    }
+    return true;
+}
+
+/// What the rows still ask for, right_, into the impulses that give it to them.
+void PlaneStep::solve() noexcept {
+    const int n = rows();
+    for (int r = 1; r < n; ++r) {
+        const double* row = envelope_.data() + start_[r];
+        double value = right_[r];
+        for (int s = first_[r]; s < r; ++s) value -= row[s] * right_[s];
+        right_[r] = value;
+    }
+    for (int r = 0; r < n; ++r) right_[r] *= inverse_[r];
+    for (int r = n - 1; r > 0; --r) {
+        const double* row = envelope_.data() + start_[r];
+        const double value = right_[r];
+        for (int s = first_[r]; s < r; ++s) right_[s] -= row[s] * value;
+    }
+}
+
+bool PlaneStep::find_velocities() noexcept {
+    assemble();
+    if (!factor()) return false;
+    for (Node& node : nodes_) {
+        node.next_velocity = node.kick;  // for now, what the step changes
+        node.next_rate = node.turn_kick;
+    }
+    const int n = rows();
+    std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
+    for (int round = 0; round <= refinements_; ++round) {
+        for (const Joint& joint : joints_) {
+            const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
+            for (int r = joint.row; r < joint.end; ++r) {
+                const Lever &one = levers_[2 * r], &two = levers_[2 * r + 1];
+                right_[r] = asked_[r] - softness_[r] * multiplier_[r] -
+                            (one.x * a.next_velocity.x + one.y * a.next_velocity.y + one.turn * a.next_rate +
+                             two.x * b.next_velocity.x + two.y * b.next_velocity.y + two.turn * b.next_rate);
+            }
+        }
+        solve();
+        for (int r = 0; r < n; ++r) multiplier_[r] += right_[r];
+        for (const Joint& joint : joints_) {
+            Node &a = nodes_[joint.first], &b = nodes_[joint.second];
+            for (int r = joint.row; r < joint.end; ++r) {
+                const double value = right_[r];
+                const Lever &one = shares_[2 * r], &two = shares_[2 * r + 1];
+                a.next_velocity += value * Vec2{one.x, one.y};
+                b.next_velocity += value * Vec2{two.x, two.y};
+                a.next_rate += value * one.turn;
+                b.next_rate += value * two.turn;
+            }
+        }
+    }
+    nodes_.back().next_velocity = {};
+    nodes_.back().next_rate = 0.0;
+    for (Node& node : nodes_) {
+        node.next_velocity += node.velocity;
+        node.next_spin = node.spin + node.inertia * node.next_rate;
+        node.next_rate = node.over_inertia * node.next_spin;
+    }
+    return true;
+}
+
+void PlaneStep::take_velocities() noexcept {
+    for (Node& node : nodes_) {
+        std::swap(node.velocity, node.next_velocity);
+        std::swap(node.spin, node.next_spin);
+        std::swap(node.rate, node.next_rate);
+    }
+}
+
+/// J sin θ/h of a turn θ is the angular momentum: see rotation.hpp.
+int PlaneStep::move() noexcept {
+    int too_fast = -1;
+    for (Node& node : nodes_) {
+        node.displacement += h_ * node.velocity;
+        const double sine = h_ * node.rate, z = sine * sine;
+        if (!(z <= 1.0)) {
+            if (too_fast < 0) too_fast = node.body;
+            continue;
+        }
+        const double y = 0.5 * z / (1.0 + std::sqrt(1.0 - z)), cosine = std::sqrt(1.0 - y);
+        node.turn = unit(HalfTurn{cosine, 0.5 * sine / cosine} * node.turn);
+        node.turned = less_one(node.turn);
+    }
+    return too_fast;
+}
+
+void PlaneStep::deliver(LargeArray<JointSet::State>& states) const noexcept {
+    for (const Joint& joint : joints_) {
+        JointSet::State& state = states[joint.joint];
+        state.multiplier = {};
+        state.first_reach = plane_.lifted(joint.first_reach);
+        state.second_reach = plane_.lifted(joint.second_reach);
+    }
+    for (std::size_t r = 0; r < rows_.size(); ++r)
+        states[rows_[r].joint].multiplier[rows_[r].index] = multiplier_[r];
+}
+
+void PlaneStep::wrench(int joint, const JointSet::State& state, double* out) const noexcept {
+    const Joint& at = joints_[joint_at_[joint]];
+    Vec2 force;
+    double torque = 0.0;
+    const int end = at.row + at.linear;  // of its rows of places
+    for (int r = at.row; r < end; ++r)
+        force += state.multiplier[rows_[r].index] * Vec2{levers_[2 * r + 1].x, levers_[2 * r + 1].y};
+    if (at.sense != 0.0) torque = state.multiplier[rows_[end].index] * levers_[2 * end + 1].turn;
+    const Vec3 push = plane_.lifted(force), twist = upright(torque);
+    for (int k = 0; k < 3; ++k) out[k] = push[k], out[3 + k] = twist[k];
+}
+
+}  // namespace spook
