@@ -278,6 +278,7 @@ class DocumentHistory:
 
     def __init__(self, documents: Sequence[RunDocument]) -> None:
         self.documents = {d.id: d for d in documents}
+        self.bare: dict[int, list[Sample]] = {}
         made = {id(d.samples): d for d in documents}  # many nights may have the same
         self.made = {
             samples: hashlib.sha256(encode((d.series, d.samples))).hexdigest() for samples, d in made.items()
@@ -296,12 +297,25 @@ class DocumentHistory:
         newest: dict[str, SeriesDefinition] = {}
         for run in self.documents.values():
             newest |= {d.key: d for d in run.series}
-            for found in run.samples:
+            for found in run.samples if evidence else self._bare(run):
                 points.setdefault(found.series, []).append(
                     Point(run, found, newest[found.series].test_version)
                 )
         chosen = points.keys() if keys is None else points.keys() & set(keys)
         return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(chosen)}
+
+    def _bare(self, run: RunDocument) -> list[Sample]:
+        """The samples of a run without what stands behind them."""
+        place = id(run.samples)  # many nights may have the same
+        if place not in self.bare:
+            self.bare[place] = [
+                Sample(
+                    series=s.series, value=s.value, outcome=s.outcome, passed=s.passed,
+                    set_point_held=s.set_point_held,
+                )
+                for s in run.samples
+            ]  # fmt: skip
+        return self.bare[place]
 
     def samples(self, run_id: str) -> dict[str, tuple[SeriesDefinition, Sample]]:
         run = self.documents[run_id]

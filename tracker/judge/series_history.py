@@ -16,6 +16,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from functools import cached_property, lru_cache
+from operator import attrgetter
 
 import msgspec
 from msgspec.structs import replace
@@ -76,15 +77,21 @@ class Told:
     def lanes(self) -> list[tuple[list[Judged], Judged | None]]:
         """The nights that were judged against each other, and the night that ended them.
 
-        A lane ends where the definition of the test changes for good.
+        A lane ends where the definition of the test changes for good. There are none where nothing ever became
+        worse, as in most series: nobody has anything to look for in them.
         """
         nights = self.nights
+        if {judged.state for judged in nights}.isdisjoint(("detected", "accepted")):
+            return []
         lane = _clock if is_noisy(self.definition) else _question
         found = []
         for places in lanes_of([judged.night for judged in nights], lane):
             over = nights[places[-1]].night.test_version != nights[-1].night.test_version
             found.append(([nights[i] for i in places], nights[places[-1] + 1] if over else None))
         return found
+
+
+VERSION, MACHINE = attrgetter("test_version"), attrgetter("run.machine")  # of a night
 
 
 def commit_of(run: Run) -> str:
@@ -147,10 +154,7 @@ def judge_history(
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
-    versions, machines = (
-        {night.test_version for night in history},
-        {id(night.run.machine) for night in history},
-    )
+    versions, machines = set(map(VERSION, history)), set(map(id, map(MACHINE, history)))
     if len(versions) == len(machines) == 1:
         return [list(range(len(history)))]
     known: dict[

@@ -42,6 +42,7 @@ LAST_BITS = 16  # doubles apart: a limit crossed by so few is a matter of roundi
 EXACT_ZERO = 1e-6  # of the limit: how far a value may leave an exact zero
 ROUNDING = {"ladder": 1e-10}  # of the reference or of 1: what is rounding where no limit gives a scale
 ROUNDING_ELSE = 1e-12
+AS_DOUBLES, AS_WHOLES = struct.Struct("<dd").pack, struct.Struct("<qq").unpack  # the bits of two doubles
 NEW_DEFINITION = "the definition of the test changed"
 CELL_RANK = {"settled": 0, "bounded": 1, "growing": 2, "diverged": 3, "not_finite": 4}
 
@@ -238,13 +239,13 @@ def ulp_distance(a: float, b: float) -> int | None:
     """How many doubles lie from one to the other; None where one is not finite."""
     if not (math.isfinite(a) and math.isfinite(b)):
         return None
-    return abs(_place(a) - _place(b))
+    first, second = AS_WHOLES(AS_DOUBLES(a, b))
+    return abs(_rank(first) - _rank(second))
 
 
-def _place(value: float) -> int:
-    """Rank of a double among all doubles; both zeros have rank 0."""
-    (bits,) = struct.unpack("<q", struct.pack("<d", value))
-    return int(bits) if bits >= 0 else -(int(bits) & 0x7FFF_FFFF_FFFF_FFFF)
+def _rank(bits: int) -> int:
+    """Of a double among all doubles; both zeros have rank 0."""
+    return bits if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF)
 
 
 def _decades(definition: SeriesDefinition, old: float, new: float) -> float | None:

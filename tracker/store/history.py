@@ -72,6 +72,7 @@ class History:
         self._canonical = self._read_names()
         self._definitions: dict[int, SeriesDefinition] = {}
         self._with_maps: frozenset[str] | None = None
+        self._maps: dict[str, tuple[document.MapData, ...]] = {}  # by run, those that were asked for
 
     @classmethod
     @contextmanager
@@ -186,7 +187,9 @@ class History:
 
     def maps(self, run_id: str) -> tuple[document.MapData, ...]:
         """The stability maps of a run; empty once the retention rule has dropped them."""
-        return self._bodies("stability_map", run_id, document.MapData)
+        if run_id not in self._maps:
+            self._maps[run_id] = self._bodies("stability_map", run_id, document.MapData)
+        return self._maps[run_id]
 
     def with_maps(self) -> frozenset[str]:
         """Ids of the runs that have stability maps; read once."""

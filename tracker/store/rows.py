@@ -57,6 +57,11 @@ def packed(part: Any) -> bytes:
 
 
 def unpacked(body: bytes, kind: type[Part]) -> Part:
+    return _unpacked(body, kind)  # type: ignore[no-any-return, arg-type]
+
+
+@lru_cache(maxsize=256)  # a map that stands still is the same bytes night after night
+def _unpacked(body: bytes, kind: Any) -> Any:
     try:
         return decode(zlib.decompress(body), kind)
     except (zlib.error, msgspec.DecodeError) as error:

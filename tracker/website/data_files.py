@@ -45,7 +45,17 @@ def table(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow([inert(name) for name in columns])
-    writer.writerows([inert(cell) for cell in line] for line in lines)
+    known: dict[str, str] = {}  # the same texts stand night after night
+
+    def shown(cell: Any) -> Any:
+        if type(cell) is not str:
+            return inert(cell)
+        found = known.get(cell)
+        if found is None:
+            found = known[cell] = inert(cell)
+        return found
+
+    writer.writerows([list(map(shown, line)) for line in lines])
     return out.getvalue().encode("utf-8", "replace")
 
 

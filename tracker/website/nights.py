@@ -229,13 +229,14 @@ def _chapter(
         if not told.nights:
             continue
         points = [judged.night for judged in told.nights]
+        samples = [point.sample for point in points]
         trends[key] = Trend(
             told,
             nights=[point.run.index for point in points],
-            values=[point.value for point in points],
-            outcomes=[point.sample.outcome for point in points],
-            held=[point.sample.set_point_held for point in points],
-            latest=points[-1].sample,
+            values=[sample.value for sample in samples],
+            outcomes=[sample.outcome for sample in samples],
+            held=[sample.set_point_held for sample in samples],
+            latest=samples[-1],
         )
     _add_evidence(history, nights, trends)
     earlier = _add_earlier_ladders(history, nights, trends)

@@ -189,7 +189,8 @@ def sparkline(
         if not math.isfinite(value):
             pen = "M"
             continue
-        across, down = (_n(v) for v in point(i, value))
+        x, y = point(i, value)
+        across, down = f"{x:.1f}", f"{y:.1f}"
         if pen == "L" and down == level:
             if path[-1].startswith("H"):
                 path.pop()
@@ -205,7 +206,7 @@ def sparkline(
     last = len(values) - 1
     end = point(last, values[last]) if math.isfinite(values[last]) else None
     return {
-        "path": "".join(path),
+        "path": _short("".join(path)),
         "last": (_n(end[0]), _n(end[1])) if end and states[last] != "fail" else None,
         "failed": failed[-12:],
         "width": width,
@@ -246,8 +247,7 @@ def _mark(line: Line, x_of: Callable[[float], float], y_of: Callable[[float], fl
     pieces, pen, before = [], "M", 0.0
     places = thinned(len(line.x), MOST_POINTS)
     if line.style == "both" and len(places) > MOST_MARKERS and all(map(math.isfinite, line.y)):
-        points = [f"{x_of(line.x[i]):.1f} {y_of(line.y[i]):.1f}" for i in places]
-        mark.path = WHOLE.sub("", f"M{'L'.join(points)}")
+        mark.path = _short("M" + "L".join([f"{x_of(line.x[i]):.1f} {y_of(line.y[i]):.1f}" for i in places]))
         return mark
     for i in places:
         if not math.isfinite(line.y[i]):
@@ -256,8 +256,8 @@ def _mark(line: Line, x_of: Callable[[float], float], y_of: Callable[[float], fl
         x, y = x_of(line.x[i]), y_of(line.y[i])
         if line.style not in ("points", "failed", "broken"):
             if line.style == "steps" and pen == "L":
-                pieces.append(f"L{_n(x)} {_n(before)}")
-            pieces.append(f"{pen}{_n(x)} {_n(y)}")
+                pieces.append(f"L{x:.1f} {before:.1f}")
+            pieces.append(f"{pen}{x:.1f} {y:.1f}")
             pen, before = "L", y
         if line.style in ("points", "both", "failed", "broken") and (
             len(places) <= MOST_MARKERS or line.style != "both"
@@ -270,12 +270,16 @@ def _mark(line: Line, x_of: Callable[[float], float], y_of: Callable[[float], fl
             )
     for i in places if line.upto else ():
         if math.isfinite(line.y[i]) and line.upto[i] > line.x[i]:
-            pieces.append(f"M{_n(x_of(line.x[i]))} {_n(y_of(line.y[i]))}H{_n(x_of(line.upto[i]))}")
-    mark.path = "".join(pieces)
+            pieces.append(f"M{x_of(line.x[i]):.1f} {y_of(line.y[i]):.1f}H{x_of(line.upto[i]):.1f}")
+    mark.path = _short("".join(pieces))
     return mark
 
 
 def _n(value: float) -> str:
     """A coordinate with one decimal, so that the same chart is the same bytes."""
-    text = f"{value:.1f}"
-    return text[:-2] if text.endswith(".0") else text
+    return f"{value:.1f}".removesuffix(".0")
+
+
+def _short(path: str) -> str:
+    """The coordinates of a path as `_n` writes them, in one go."""
+    return WHOLE.sub("", path)
