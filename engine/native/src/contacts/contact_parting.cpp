@@ -10,8 +10,11 @@ namespace spook {
 
 namespace {
 
-constexpr double joint_give = 1e-6;  // of a row's own inertia: what a joint yields while overlaps are parted
-constexpr double contact_give = 1e-3;   // and what a contact of jointed bodies does
+constexpr double contact_give =
+    1e-3;  // what a contact of jointed bodies yields, of 1/m of all that moves with them
+constexpr double joint_give = 1e-6;     // and a joint, of its row's own inertia
+constexpr double joint_share = 1e-3;    // and of what the contacts do
+constexpr double least_give = 1e-12;    // of its row's own inertia: repeated joints share a load by it
 constexpr double around = 4.0;          // of the deepest overlap: gaps that parting may close
 constexpr int feature_bits = 16;        // of a contact's key; the rest is the pair
 constexpr unsigned pairs_a_look = 256;  // between two looks at the clock
@@ -34,8 +37,26 @@ double ContactStage::pressed(const MixedSystem& system, const Point& point) cons
     return std::max(0.0, before - time_left(point) * speed);
 }
 
-/// Rows of joints hold displacements instead of velocities; limits only push, and motors let go.
-void ContactStage::hold_joints(MixedSystem& parting) const {
+/// What a contact yields, 1/kg, per moving body on either side. A light body that is jointed to a heavy one, or touches
+/// one, must not be what gives way in its stead: a contact that is soft against the heavier side lifts nothing.
+std::vector<double> ContactStage::find_gives(const MixedSystem& parting) const {
+    const Islands hanging = find_islands(parting);
+    std::vector<double> mass(hanging.count, 0.0), give(parting.mass.size(), 0.0);
+    for (std::size_t b = 0; b < give.size(); ++b)
+        if (hanging.of_body[b] >= 0) mass[hanging.of_body[b]] += parting.mass[b][0];
+    for (std::size_t b = 0; b < give.size(); ++b)
+        give[b] = contact_give / (hanging.of_body[b] >= 0 ? mass[hanging.of_body[b]] : parting.mass[b][0]);
+    return give;
+}
+
+double ContactStage::give_of(const Contact& contact, const std::vector<double>& gives) const noexcept {
+    const int a = unknown_[contact.first], b = unknown_[contact.second];
+    return std::min(a < 0 ? unbounded : gives[a], b < 0 ? unbounded : gives[b]);
+}
+
+/// Rows of joints hold displacements instead of velocities; limits only push, and motors let go. They give far less
+/// than the contacts, the least of which gives `least`.
+void ContactStage::hold_joints(MixedSystem& parting, double least) const {
     for (std::size_t k = 0; k < parting.rows.size(); ++k) {
         RowBlock& block = parting.rows[k];
         for (int i = 0; i < block.size; ++i) {
@@ -45,7 +66,9 @@ void ContactStage::hold_joints(MixedSystem& parting) const {
             if (k < yielding_.size() && yielding_[k] != 0) continue;
             const double softness = block.softness[i];
             block.softness[i] = 0.0;
-            block.softness[i] = std::min(softness, joint_give * own_inertia(parting, block, i));
+            const double own = own_inertia(parting, block, i);
+            block.softness[i] =
+                std::min({softness, joint_give * own, std::max(joint_share * least, least_give * own)});
         }
     }
 }
@@ -184,7 +207,13 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     parting.mass = system.mass;
     parting.momentum.assign(system.mass.size(), Vec6{});
     parting.rows.assign(system.rows.begin(), system.rows.begin() + static_cast<std::ptrdiff_t>(joints));
-    hold_joints(parting);
+    gives_.clear();
+    if (joints > 0) {
+        gives_ = find_gives(parting);
+        double least = unbounded;
+        for (const Point& lap : laps_) least = std::min(least, give_of(lap.contact, gives_));
+        hold_joints(parting, least);
+    }
     std::vector<Islands::Tie> ties;
     if (!(parts_by_sweeps() ? part_by_sweeps(parting, ties, again) : part_directly(parting, ties, again)))
         return false;
@@ -201,7 +230,7 @@ bool ContactStage::part_directly(MixedSystem& parting, std::vector<Islands::Tie>
         RowBlock block = row_block(lap, 1);
         block.right[0] = parting_speed(lap, again);
         block.state[0] = lap.push > 0.0 ? RowState::free : RowState::at_lower;
-        if (joints > 0) block.softness[0] = contact_give * own_inertia(parting, block, 0);
+        if (joints > 0) block.softness[0] = give_of(lap.contact, gives_);
         parting.rows.push_back(block);
     }
     parting.velocity.clear();
@@ -227,7 +256,7 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie
         row.second_arm = lap.second_arm;
         row.right[0] = parting_speed(lap, again);
         row.impulse[0] = lap.parting_before;
-        if (!parting.rows.empty()) row.softness = contact_give * own_inertia(parting, row_block(lap, 1), 0);
+        if (!parting.rows.empty()) row.softness = give_of(lap.contact, gives_);
         parting_sweeps_.add(row);
     }
     const FrictionReport report =

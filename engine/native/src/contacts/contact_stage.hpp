@@ -306,7 +306,9 @@ private:
     double parting_speed(const Point& lap, bool again) const;
     bool part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
     bool part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
-    void hold_joints(MixedSystem& parting) const;
+    std::vector<double> find_gives(const MixedSystem& parting) const;
+    double give_of(const Contact& contact, const std::vector<double>& gives) const noexcept;
+    void hold_joints(MixedSystem& parting, double least) const;
     void note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties);
     bool is_supplied(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
@@ -334,6 +336,7 @@ private:
     MixedSystem parting_system_;
     Parting parting_;
     std::vector<char> yielding_;
+    std::vector<double> gives_;              // of contacts of jointed bodies, see find_gives(), 1/kg
     LargeArray<Point> laps_;                 // points of the step's pairs where it ends
     std::map<std::uint64_t, double> given_;  // by pair: overlap the scene began with, as far as it is left, m
     bool begun_ = false;                     // whether it is known
