@@ -216,10 +216,10 @@ fuzz: develop
 	    -DSPOOK_SANITIZE=address,undefined
 	$(BIN)/cmake --build build/fuzz
 	$(BIN)/pip install -q atheris
-	sh .ci/fuzz $(BIN)/python $(MINUTES)
+	sh .ci/fuzz $(BIN)/python $(MINUTES) $(TARGETS)
 
 fuzz-keep:
-	sh .ci/fuzz $(BIN)/python keep
+	sh .ci/fuzz $(BIN)/python keep $(TARGETS)
 
 clean:
 	rm -rf build $(VENV) public .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -10,12 +10,18 @@ A simulation that diverges is not an exception: `simulate` returns a Result whos
 
 from __future__ import annotations
 
+LONGEST = 800  # characters of a message
+
 
 class EngineError(Exception):
-    """Base of every error the engine raises on purpose: one sentence on one line, also where it shows a matrix."""
+    """Base of every error the engine raises on purpose: one sentence on one line, also where it shows a matrix, and of
+    what it shows no more than begins to tell what was given: a hull prints as all its corners."""
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(" ".join(message.split()) if "\n" in message else message)
+        sentence = " ".join(message.split()) if "\n" in message else message
+        if len(sentence) > LONGEST:
+            sentence = f"{sentence[: LONGEST - 203]} … {sentence[-200:]}"
+        super().__init__(sentence)
 
 
 class SceneError(EngineError, ValueError):

@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     Capsule,
     CentralGravity,
     Compound,
+    ConvexHull,
     Distance,
     EngineError,
     Final,
@@ -179,6 +180,16 @@ def test_a_senseless_scene_is_refused_in_one_sentence(
     assert all(word in sentence for word in words), sentence
     assert "\n" not in sentence and len(sentence) < 160
     assert isinstance(refused.value, EngineError) and isinstance(refused.value, ValueError)
+
+
+def test_what_is_refused_is_shown_in_part_where_it_is_long() -> None:
+    hull = ConvexHull.placed([(math.cos(k), math.sin(k), k % 3) for k in range(30)]).shape
+    with pytest.raises(SceneError) as refused:
+        Compound((Part(shape=Compound((Part(shape=hull), Part(shape=Box((1, 1, 1)))))),))
+    sentence = str(refused.value)
+
+    assert sentence.startswith("compound: a part must be a bounded shape and no compound, not Compound(")
+    assert len(sentence) == 800 and " … " in sentence and sentence.endswith(")))")
 
 
 METHODS: list[dict[str, Any]] = [

@@ -17,7 +17,7 @@ using namespace fuzz;
 constexpr int kSteps = 12;
 // A direct solve of shapes that lie deep in each other may take seconds a step, and thirty times as long where every
 // access is watched. The engine ends it itself, and is held to that; what went further is not asked.
-constexpr double kPatience = 4.0;  // s of a run
+constexpr double kPatience = 0.5;  // s of a run, so that ten minutes are thousands of scenes
 constexpr double kUnlooked =
     0.2;  // s of the processor: a tenth between two questions, and a tenth until one is put
 

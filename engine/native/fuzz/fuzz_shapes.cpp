@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "../tests/support_distance.hpp"
 #include "bytes.hpp"
 #include "collision/narrow_phase.hpp"
 #include "collision/submerged.hpp"
@@ -53,6 +54,45 @@ double reach(const Primitive& shape) {
     return 0.0;
 }
 
+/// What is said of two shapes against bounds of their distance that the engine has no part in.
+void as_far_as_supports_say(const Primitive& first, const Pose& at_first, const Primitive& second,
+                            const Pose& at_second, double margin, double rounding, const Manifold& found) {
+    if (second.kind == ShapeKind::plane || first.kind == ShapeKind::plane) {
+        const bool swapped = first.kind == ShapeKind::plane;
+        const Primitive &solid = swapped ? second : first, &plane = swapped ? first : second;
+        const Pose &at = swapped ? at_second : at_first, &at_plane = swapped ? at_first : at_second;
+        if (solid.kind == ShapeKind::plane) return;
+        const Vec3 up = at_plane.rotation * plane.normal;
+        const double lowest = dot(up, support::farthest_point(solid, at, -up) - at_plane.position);
+        if (lowest > margin + rounding) PROMISE(found.count == 0);
+        if (lowest < margin - rounding) PROMISE(found.count > 0);
+        double deepest = margin;
+        for (int k = 0; k < found.count; ++k) deepest = std::min(deepest, found.points[k].gap);
+        if (found.count > 0) PROMISE(std::abs(deepest - lowest) <= rounding);
+        return;
+    }
+    const Vec3 between = at_first.position - at_second.position;
+    const support::Distance apart =
+        support::distance(first, at_first, second, at_second, norm(between) > 0.0 ? between : Vec3{0, 0, 1});
+    if (!(apart.least > rounding)) return;
+    if (apart.least > margin + rounding) PROMISE(found.count == 0);
+    // Flat sides that face each other at corners alone have no point, and a lower bound for a distance.
+    const bool flat = (first.faceted() || first.kind == ShapeKind::triangle) &&
+                      (second.faceted() || second.kind == ShapeKind::triangle);
+    // A face is preferred to an edge within this of the thickness: see collision/overlay.hpp.
+    const double tie = 2e-5 * std::min(reach(first), reach(second)) + rounding;
+    double deepest = HUGE_VAL;
+    for (int k = 0; k < found.count; ++k) deepest = std::min(deepest, found.points[k].gap);
+    if (!flat) PROMISE(deepest >= apart.least - tie);
+    PROMISE(deepest > -rounding);
+    if (first.kind == ShapeKind::triangle || second.kind == ShapeKind::triangle) return;
+    if (!flat && found.count > 0) PROMISE(deepest <= apart.most + tie);
+    if (!flat && apart.most < margin - rounding) PROMISE(found.count > 0);
+    const Separation told = separation(first, at_first, second, at_second);
+    PROMISE(told.gap > 0.0 && told.gap <= apart.most + rounding);
+    if (!flat) PROMISE(told.gap >= apart.least - rounding);
+}
+
 void touch(const Primitive& first, const Pose& at_first, const Primitive& second, const Pose& at_second,
            double margin, double scale) {
     const Manifold found = collide(first, at_first, second, at_second, margin);
@@ -71,6 +111,7 @@ void touch(const Primitive& first, const Pose& at_first, const Primitive& second
     PROMISE(again.count == found.count);
     for (int k = 0; k < found.count; ++k) PROMISE(again.points[k].gap == found.points[k].gap);
 
+    as_far_as_supports_say(first, at_first, second, at_second, margin, rounding, found);
     if (first.kind == ShapeKind::triangle || second.kind == ShapeKind::triangle) return;
     // Two solids with a point in common push each other apart; the point is found without the engine.
     const double inside = 1e-6 * scale;

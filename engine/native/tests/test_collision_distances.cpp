@@ -1,5 +1,5 @@
-// Every pair of bounded shapes against their distance, found from supports alone (Gilbert 1966), sizes from 1/1000 to
-// 1000: nothing touches that is farther off than the margin, and what is apart is told apart.
+// Every pair of bounded shapes against their distance, found from supports alone, sizes from 1/1000 to 1000: nothing
+// touches that is farther off than the margin, and what is apart is told apart.
 #include <cstdio>
 #include <memory>
 #include <random>
@@ -8,8 +8,10 @@
 #include "collision/narrow_phase.hpp"
 #include "collision/sweep.hpp"
 #include "expect.hpp"
+#include "support_distance.hpp"
 
 using namespace spook;
+using support::farthest_point;
 
 namespace {
 
@@ -58,55 +60,6 @@ private:
     std::mt19937 bits_;
 };
 
-/// The point of a shape that is farthest along n.
-Vec3 farthest_point(const Primitive& shape, const Pose& at, Vec3 n) {
-    const Vec3 l = local(at.rotation, n);
-    const double across = std::sqrt(l.x * l.x + l.y * l.y),
-                 share = across > 0.0 ? shape.radius / across : 0.0;
-    const Vec3 rim{share * l.x, share * l.y, 0.0};
-    Vec3 p;
-    switch (shape.kind) {
-        case ShapeKind::sphere: p = (shape.radius / norm(l)) * l; break;
-        case ShapeKind::capsule:
-            p = (shape.radius / norm(l)) * l + Vec3{0, 0, std::copysign(shape.half_length, l.z)};
-            break;
-        case ShapeKind::box:
-            p = {std::copysign(shape.half.x, l.x), std::copysign(shape.half.y, l.y),
-                 std::copysign(shape.half.z, l.z)};
-            break;
-        case ShapeKind::cylinder: p = rim + Vec3{0, 0, std::copysign(shape.half_length, l.z)}; break;
-        case ShapeKind::cone: {
-            const Vec3 base = rim - Vec3{0, 0, 0.5 * shape.half_length}, top{0, 0, 1.5 * shape.half_length};
-            p = dot(base, l) > dot(top, l) ? base : top;
-            break;
-        }
-        case ShapeKind::hull:
-            p = shape.hull->corners[0];
-            for (const Vec3 c : shape.hull->corners)
-                if (dot(c, l) > dot(p, l)) p = c;
-            break;
-        case ShapeKind::plane:
-        case ShapeKind::triangle: break;
-    }
-    return apply(at, p);
-}
-
-/// A lower bound of the distance, close to it: the shapes are as far apart along any direction.
-double surely_apart(const Primitive& a, const Pose& at_a, const Primitive& b, const Pose& at_b, Vec3 first) {
-    const auto difference = [&](Vec3 n) { return farthest_point(a, at_a, -n) - farthest_point(b, at_b, n); };
-    Vec3 v = difference(first);
-    double best = -1e300;
-    for (int round = 0; round < 500; ++round) {
-        const double length = norm(v);
-        if (!(length > 1e-12)) return best;
-        const Vec3 w = difference(v), way = w - v;
-        best = std::max(best, dot(v, w) / length);
-        if (length - best <= 1e-10 * length) break;
-        v += std::min(1.0, -dot(v, way) / dot(way, way)) * way;
-    }
-    return best;
-}
-
 void nothing_touches_beyond_the_margin_and_what_is_apart_is_told_apart() {
     Draw draw(15);
     int apart = 0, near = 0;
@@ -120,7 +73,7 @@ void nothing_touches_beyond_the_margin_and_what_is_apart_is_told_apart() {
             const double margin = draw.share();
             at_b.position = p - q + 1.5 * draw.share() * n;  // at least as far apart
             const double rounding = 1e-9 * (1.0 + norm(p) + norm(q));
-            const double distance = surely_apart(a, at_a, b, at_b, -n);
+            const double distance = support::distance(a, at_a, b, at_b, -n).least;
             const Manifold found = collide(a, at_a, b, at_b, margin);
             const Separation told = separation(a, at_a, b, at_b);
             const bool touches_far = found.count > 0 && distance > margin + rounding;
@@ -138,9 +91,112 @@ void nothing_touches_beyond_the_margin_and_what_is_apart_is_told_apart() {
     EXPECT(apart > 10000 && near > 10000);
 }
 
+/// A sheet with rims, and shapes beside, above and behind it: what is apart is not held deep below a face it passed.
+void nothing_that_is_apart_is_pushed_through_a_sheet() {
+    Draw draw(16);
+    int apart = 0, near = 0;
+    for (int kind = 0; kind < 6; ++kind)
+        for (int round = 0; round < 4000; ++round) {
+            const auto corner = [&] { return (0.5 + 3.0 * draw.share()) * draw.direction(); };
+            const auto mesh =
+                std::make_shared<const Mesh>(std::vector<Vec3>{corner(), corner(), corner(), corner()},
+                                             std::vector<std::array<int, 3>>{{0, 1, 2}, {2, 1, 3}});
+            const Primitive face = Primitive::sheet(mesh, round % 2), a = draw.shape(kind);
+            const Pose at_face{{}, draw.turn()};
+            Pose at{{}, draw.turn()};
+            // Nearest from any side; in two of three from behind or beside, with its centre before the face.
+            Vec3 n = draw.direction(), p, q;
+            const Vec3 out = at_face.rotation * mesh->normals[static_cast<std::size_t>(round % 2)];
+            for (int again = 0; again < 20; ++again) {
+                p = farthest_point(face, at_face, n), q = farthest_point(a, at, -n);
+                at.position = p - q + 0.5 * draw.share() * n;
+                if (round % 3 == 0 || (dot(n, out) < 0.0 && dot(out, at.position - p) > 0.0)) break;
+                n = draw.direction(), at.rotation = draw.turn();
+            }
+            const double margin = draw.share(), rounding = 1e-9 * (1.0 + norm(p) + norm(q));
+            const double distance = support::distance(a, at, face, at_face, n).least;
+            const Manifold found = collide(a, at, face, at_face, margin);
+            const bool far = found.count > 0 && distance > margin + rounding;
+            bool deep = false;
+            for (int k = 0; k < found.count; ++k)
+                deep = deep ||
+                       (distance > rounding && found.points[static_cast<std::size_t>(k)].gap < -rounding);
+            if (far || deep) {
+                std::printf("kind %d, round %d: distance %.9g, margin %.9g, first gap %.9g\n",
+                            static_cast<int>(a.kind), round, distance, margin, found.points[0].gap);
+                ++failures;
+            }
+            apart += distance > margin, near += found.count > 0;
+        }
+    EXPECT(apart > 1000 && near > 1000);
+}
+
+/// Caps that lie nearly flat before something: the face wins near ties, but the place that is nearest is held.
+void the_nearest_place_of_nearly_flat_caps_is_held() {
+    Draw draw(17);
+    int asked = 0;
+    for (int kind = 1; kind < 6; ++kind)
+        for (int round = 0; round < 4000; ++round) {
+            const Primitive a = Primitive::cylinder(0.5 + 3.0 * draw.share(), 0.2 + 3.0 * draw.share()),
+                            b = draw.shape(kind);
+            const Pose at_b{{}, draw.turn()};
+            // Leaning by 10^-4 to 0.1, and up to its radius aside.
+            const double lean = std::pow(10.0, -1.0 - 3.0 * draw.share());
+            const Vec3 up = column(at_b.rotation, 2), side = column(at_b.rotation, 0);
+            const Vec3 axis = (1.0 / std::sqrt(1.0 + lean * lean)) * (up + lean * side),
+                       across = any_normal_to(axis);
+            const Vec3 third = cross(axis, across);
+            const Mat3 turn{
+                {across.x, third.x, axis.x, across.y, third.y, axis.y, across.z, third.z, axis.z}};
+            Pose at_a{{}, turn};
+            const double margin = 0.2 + draw.share();
+            const Vec3 p = farthest_point(b, at_b, up), q = farthest_point(a, at_a, -up);
+            const Vec3 aside = draw.direction();
+            at_a.position =
+                p - q + 0.9 * margin * draw.share() * up + 2.0 * a.radius * (aside - dot(aside, up) * up);
+            const support::Distance apart = support::distance(a, at_a, b, at_b, up);
+            const double size = 1.0 + norm(p) + norm(q);
+            if (!(apart.least > 1e-9 * size && apart.most < margin - 1e-9 * size)) continue;
+            double deepest = HUGE_VAL;
+            for (const bool swapped : {false, true}) {
+                const Manifold found =
+                    swapped ? collide(b, at_b, a, at_a, margin) : collide(a, at_a, b, at_b, margin);
+                deepest = HUGE_VAL;
+                for (int k = 0; k < found.count; ++k)
+                    deepest = std::min(deepest, found.points[static_cast<std::size_t>(k)].gap);
+                const double tie = 1e-5 * std::min(2.0 * a.half_length, 2.0 * a.radius) + 1e-9 * size;
+                if (!(std::abs(deepest - apart.most) <= 2.0 * tie)) {
+                    std::printf("kind %d, round %d: distance %.9g, margin %.9g, deepest %.9g\n",
+                                static_cast<int>(b.kind), round, apart.most, margin, deepest);
+                    ++failures;
+                }
+            }
+            ++asked;
+        }
+    EXPECT(asked > 3000);
+}
+
+/// Rims whose nearest places lie where the search round them begins and ends.
+void rims_are_nearest_in_any_quarter() {
+    for (int quarter = 0; quarter < 4; ++quarter)
+        for (const bool cones : {false, true}) {
+            const double c = quarter % 2 ? 0.0 : 1.0 - quarter, s = quarter % 2 ? 2.0 - quarter : 0.0;
+            const Pose at_a{{-1.0 / 12, -1.0 / 12, -1.0 / 12}, {{0, 0, 1, 1, 0, 0, 0, 1, 0}}};
+            const Pose at_b{{-4.0, -1.0 / 12 - 4.0 * c, -1.0 / 12 - 4.0 * s}, at_a.rotation};
+            const Primitive a = cones ? Primitive::cone(0.5, 0.5) : Primitive::cylinder(0.5, 0.5),
+                            b = cones ? Primitive::cone(3.0625, 0.0625) : Primitive::cylinder(3.0625, 0.0625);
+            const support::Distance apart = support::distance(a, at_a, b, at_b, {1, 0, 0});
+            EXPECT_NEAR(separation(a, at_a, b, at_b).gap, apart.most, 1e-9);
+            EXPECT_NEAR(separation(b, at_b, a, at_a).gap, apart.most, 1e-9);
+        }
+}
+
 }  // namespace
 
 int main() {
+    rims_are_nearest_in_any_quarter();
     nothing_touches_beyond_the_margin_and_what_is_apart_is_told_apart();
+    nothing_that_is_apart_is_pushed_through_a_sheet();
+    the_nearest_place_of_nearly_flat_caps_is_held();
     return report();
 }

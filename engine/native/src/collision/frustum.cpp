@@ -55,9 +55,10 @@ struct Around {
         if (r == 0.0) return apex(visit);
         constexpr int parts = 16;
         double bend, before = slope(circle().turns[0], bend);
+        const double first = before;  // and last: rounding may not part the circle from itself
         for (int k = 1; k <= parts; ++k) {
             const double start = before;
-            before = slope(circle().turns[k * Circle::count / parts], bend);
+            before = k < parts ? slope(circle().turns[k * Circle::count / parts], bend) : first;
             if (start > 0.0 && before <= 0.0) peak(circle_angle(k - 1, parts), circle_angle(k, parts), visit);
         }
     }
@@ -208,6 +209,7 @@ void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& 
     };
     const auto visit = [&](double low, double at_low, double high, double at_high) noexcept {
         double angle = high, here = at_high, old = low, there = at_low;
+        if (here == 0.0) slope(sine_cosine(angle));  // what was asked last may lie elsewhere
         for (int round = 0; round < 100 && here != 0.0;
              ++round) {  // secants, halving where one leaves the bracket
             double next = angle - here / (here - there) * (angle - old);
@@ -263,9 +265,10 @@ void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& 
     constexpr int parts = 24;
     Place low{circle_angle(0, parts), 0.0, 0.0};
     low.slope = slope(circle().turns[0], &low.bend);
+    const Place first = low;  // and last: rounding may not part the circle from itself
     for (int k = 1; k <= parts; ++k) {
-        Place high{circle_angle(k, parts), 0.0, 0.0};
-        high.slope = slope(circle().turns[k * Circle::count / parts], &high.bend);
+        Place high{circle_angle(k, parts), first.slope, first.bend};
+        if (k < parts) high.slope = slope(circle().turns[k * Circle::count / parts], &high.bend);
         between(between, low, high, 4);
         low = high;
     }

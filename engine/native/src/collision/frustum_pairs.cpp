@@ -9,31 +9,49 @@ namespace spook {
 
 namespace {
 
+constexpr std::uint32_t beside = 128;  // features beyond those of an overlay
+
 template <class Other, class Facing, class Line>
 Manifold meet(const Frustum& frustum, const Other& other, double radius, double thickness, double margin,
               Facing facing_of, Line line_of) noexcept {
     const PartingAxes axes = parting_axes(frustum, other, margin);
     if (axes.best().gap > margin) return {};
     const double smallest = std::min(frustum.thickness, thickness), slop = overlay_slop * smallest;
-    PartingAxis axis = axes.curved;
-    if (axes.curved.gap <= axes.flat.gap + prefer_flat * smallest) {
-        axis = axes.flat;
+    const double tie = prefer_flat * smallest;
+    const auto lines_along = [&](const PartingAxis& axis) noexcept {
+        return lines(farthest_line(frustum, axis.normal, slop), line_of(axis, slop), axis.normal, axis.gap,
+                     radius, margin);
+    };
+    if (axes.curved.gap <= axes.flat.gap + tie) {
+        const PartingAxis& axis = axes.flat;
         const Patch theirs = facing_of(axis.normal);
         const Patch ours = facing(frustum, axis.normal, theirs.normal);
         double least;
         Manifold manifold = overlay(ours, theirs, axis, radius, margin, slop, least);
         if (least <= axis.gap + slop) return manifold;
-        // The deepest point lies beside the other's patch.
-        if (axis.gap > 0.0 && manifold.count > 0) return manifold;
+        // The deepest point lies beside the other's patch: off the face that looks along the axis most, or where the axis
+        // that the tie kept off meets it. Apart, it is added; else it would arrive before those found.
+        if (axis.gap > 0.0) {
+            if (manifold.count > 0 && least <= axes.best().gap + tie) return manifold;
+            if (axes.curved.gap > axis.gap + slop) {  // else the two are one direction
+                const Manifold nearest = lines_along(axes.curved);
+                for (int k = 0; k < nearest.count; ++k) {
+                    const ContactPoint& point = nearest.points[static_cast<std::size_t>(k)];
+                    manifold.add(point.position, point.normal, point.gap, beside + point.feature);
+                }
+                return manifold;
+            }
+        }
         const bool on_cap = std::abs(dot(axis.normal, frustum.axis)) > 1.0 - 1e-9;
+        const Segment line = line_of(axis, 0.0);
+        const Vec3 cap = frustum.centre[dot(axis.normal, frustum.axis) > 0.0];
         const Vec3 deepest =
-            on_cap ? line_of(axis, 0.0).centre - (radius + 0.5 * axis.gap) * axis.normal
+            on_cap ? line.at(closest_parameter(line, cap)) - (radius + 0.5 * axis.gap) * axis.normal
                    : farthest_line(frustum, axis.normal, 0.0).centre + 0.5 * axis.gap * axis.normal;
-        manifold.add(deepest, axis.normal, axis.gap, 24);
+        manifold.add(deepest, axis.normal, axis.gap, beside);
         return manifold;
     }
-    return lines(farthest_line(frustum, axis.normal, slop), line_of(axis, slop), axis.normal, axis.gap,
-                 radius, margin);
+    return lines_along(axes.curved);
 }
 
 Manifold turned(

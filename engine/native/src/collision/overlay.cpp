@@ -93,13 +93,18 @@ private:
         if (std::abs(turned) < 0.1) return;
         const double way = dot(other.normal, other.corners[0] - p) / turned, gap = sign * way - radius_;
         if (gap > margin_ || gap < deepest_) return;  // deeper than the shapes are: beside the other's patch
+        // Midway between the surfaces: a round second's stands out of its core by its radius.
+        const ContactPoint point{p + (0.5 * way - 0.5 * radius_) * n_, n_, gap, feature};
         for (int k = 0; k < manifold.count; ++k) {
-            const Vec3 between = p + 0.5 * way * n_ - manifold.points[static_cast<std::size_t>(k)].position;
-            if (norm(between - dot(between, n_) * n_) <= slop_) return;
+            ContactPoint& known = manifold.points[static_cast<std::size_t>(k)];
+            const Vec3 between = p + 0.5 * way * n_ - known.position;
+            if (norm(between - dot(between, n_) * n_) > slop_) continue;
+            if (gap < known.gap - slop_)
+                known = point, least = std::min(least, gap);  // a line along n: its near end
+            return;
         }
         least = std::min(least, gap);
-        // Midway between the surfaces: a round second's stands out of its core by its radius.
-        manifold.add(p + (0.5 * way - 0.5 * radius_) * n_, n_, gap, feature);
+        manifold.add(point.position, n_, gap, feature);
     }
     bool before(Vec3 p, const Patch& other) const noexcept {
         if (other.kind == Patch::disc) {
@@ -234,7 +239,9 @@ Manifold lines(const Segment& first, const Segment& second, Vec3 n, double gap, 
     const auto add = [&](double t, double u, std::uint32_t feature) {
         const Vec3 p = first.at(t), q = second.at(u);
         const double here = feature == 24 ? gap : dot(n, q - p) - radius;
-        if (here <= margin) manifold.add(0.5 * (p + q - radius * n), n, here, feature);
+        // Edges that do not cross, seen along n, are farther apart than the gap says: see edges_touch.
+        if (here > margin || (here > 0.0 && norm(q - p) - radius > margin)) return;
+        manifold.add(0.5 * (p + q - radius * n), n, here, feature);
     };
     const SegmentPair closest = closest_parameters(first, second);
     if (closest.parallel && first.half > 0.0 && second.half > 0.0) {

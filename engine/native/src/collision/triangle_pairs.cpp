@@ -36,7 +36,9 @@ Manifold meet(const Triangle& triangle, const Other& other, Vec3 centre, double 
         const Vec3 n = axes.flat.normal;
         const Manifold found =
             overlay(face_of(triangle, n), facing_of(n), axes.flat, radius, margin, slop, least);
-        if (found.count > 0) return least <= nearest ? found : Manifold{};
+        // Apart and yet below the face: it has passed the rim and lies behind.
+        const bool behind = axes.all.gap > slop && least < 0.0;
+        if (found.count > 0) return least <= nearest && !behind ? found : Manifold{};
         if (axis.gap < axes.flat.gap) return {};
     }
     // Along the face's own normal an edge or a corner holds what the faces round it do not: nothing.

@@ -95,6 +95,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
             system.restore();
             recorder.restore();
             done = from;
+            health = {};  // a block that ended unfit, and was not replayed to the step that made it so
             stop(done);
             break;
         }
