@@ -20,6 +20,7 @@ import click
 import spook_tracker.tracker.document.outside as outside
 
 PIPE_WIDTH = 120  # columns, where no terminal says otherwise
+NARROW = 100  # columns; below, tables are laid out for a terminal of eighty
 PLAIN = str.maketrans(
     {
         "✓": "+",
@@ -37,11 +38,12 @@ PLAIN = str.maketrans(
     }
 )
 BARS = "▁▂▃▄▅▆▇█"
+MOST_LINES = 12  # of one cell: what comes from outside may have no end
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table; flexible ones give way when the terminal is narrow, the last one first."""
+    """A column of a table; flexible ones give way when the terminal is narrow, the last one first: their texts wrap."""
 
     title: str
     align: Literal["left", "right"] = "left"
@@ -103,17 +105,42 @@ def fit(text: str, room: int, align: str = "left") -> str:
     return padding + text if align == "right" else text + padding
 
 
+def wrapped(text: str, room: int) -> list[str]:
+    """A text in lines of at most that many columns: parted after spaces, else after the signs that part names, else
+    anywhere. Lines after a mark or an indent of two columns begin below what follows it."""
+    indent = "  " if text[:2] in ("● ", "  ") and room > 10 else ""
+    lines: list[str] = []
+    while cells(text) > room:
+        end, taken = 0, 0
+        while taken + cells(text[end]) <= room or end == 0:
+            taken += cells(text[end])
+            end += 1
+        spaces = text[: end + 1].rfind(" ")
+        joints = max(text[:end].rfind(sign) for sign in "/_-,:·") + 1
+        if spaces > len(indent):
+            end = spaces
+        elif joints > len(indent) + room // 3:
+            end = joints
+        if len(lines) == MOST_LINES - 1:
+            return [*lines, fit(text, room)]
+        lines.append(text[:end].rstrip())
+        text = indent + text[end:].lstrip()
+    return [*lines, text]
+
+
 def table(
     columns: Sequence[Column],
     rows: Sequence[Sequence[str]],
     room: int | None = None,
     colour: dict[int, Style] | None = None,
 ) -> list[str]:
-    """Aligned lines with a heading and a rule; flexible columns shrink until the table fits."""
+    """Aligned lines with a heading and a rule; flexible columns shrink until the table fits, and what they hold goes on
+    in the next line. A row of one cell alone reaches across all columns."""
     room = room or width()
     rows = [[clean(cell) for cell in row] for row in rows]
+    aligned = [row for row in rows if len(row) > 1 or len(columns) == 1]
     widths = [
-        max([cells(column.title), *(cells(row[i]) for row in rows)]) for i, column in enumerate(columns)
+        max([cells(column.title), *(cells(row[i]) for row in aligned)]) for i, column in enumerate(columns)
     ]
     excess = sum(widths) + 2 * (len(columns) - 1) - room
     for i in reversed(range(len(columns))):
@@ -122,14 +149,37 @@ def table(
             if cut > 0:
                 widths[i] -= cut
                 excess -= cut
-    heading = "  ".join(fit(c.title, w, c.align) for c, w in zip(columns, widths, strict=True))
-    lines = [click.style(heading.rstrip(), bold=True), "─" * min(room, sum(widths) + 2 * (len(widths) - 1))]
+    titles = [wrapped(c.title, w) for c, w in zip(columns, widths, strict=True)]
+    lines = [click.style(line, bold=True) for line in _beside(titles, columns, widths, {}, 0)]
+    lines.append("─" * min(room, sum(widths) + 2 * (len(widths) - 1)))
     for number, row in enumerate(rows):
-        padded = [fit(cell, w, c.align) for cell, w, c in zip(row, widths, columns, strict=True)]
-        for place, style in (colour or {}).items():
-            padded[place] = style(number, padded[place])
-        lines.append("  ".join(padded).rstrip())
+        if len(row) == 1 < len(columns):
+            lines += wrapped(row[0], room)
+            continue
+        parts = [
+            wrapped(cell, w) if c.flexible else [cell]
+            for cell, w, c in zip(row, widths, columns, strict=True)
+        ]
+        lines += _beside(parts, columns, widths, colour or {}, number)
     return lines
+
+
+def _beside(
+    parts: Sequence[Sequence[str]],
+    columns: Sequence[Column],
+    widths: Sequence[int],
+    colour: dict[int, Style],
+    number: int,
+) -> Iterator[str]:
+    """The lines of one row: its cells beside each other, each in its column."""
+    for k in range(max(map(len, parts))):
+        padded = [
+            fit(part[k] if k < len(part) else "", w, c.align)
+            for part, w, c in zip(parts, widths, columns, strict=True)
+        ]
+        for place, style in colour.items():
+            padded[place] = style(number, padded[place])
+        yield "  ".join(padded).rstrip()
 
 
 def sparkline(values: Sequence[float], room: int = 60) -> str:

@@ -39,7 +39,7 @@ def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -
     from fnmatch import fnmatchcase
 
     import spook_tracker.tracker.judge.rank as ranks
-    from spook_tracker.tracker.cli.console import Column, clean, table, width
+    from spook_tracker.tracker.cli.console import NARROW, Column, clean, table, width
     from spook_tracker.tracker.document.wording import day
 
     runs = {name: history.resolve(name if "@" in name else f"{name}@latest") for name in names}
@@ -59,7 +59,7 @@ def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -
     columns = (
         Column("scene", flexible=True),
         Column("engine"),
-        Column("error at 1/60", "right"),
+        Column("error at 1/60", "right", flexible=True, least=17),
         *(Column(f"to {error:g}", "right") for error in ranks.ERRORS),
     )
     rows: list[tuple[str, ...]] = []
@@ -68,6 +68,8 @@ def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -
         scene = f"{one.test} {one.ladder} [{one.unit}]"
         rows.append(("" if scene == previous else scene, one.engine, _error(one), *map(_time, one.seconds)))
         previous = scene
+    if width() < NARROW:  # the scene stands above its engines
+        columns, rows = columns[1:], [part for row in rows for part in (row[:1], row[1:]) if any(part)]
     lines = [*heading, "", *table(columns, rows, width(), {}), ""]
     machines = {run.machine.fingerprint for run in runs.values()}
     if len(machines) > 1:

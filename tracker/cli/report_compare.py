@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, clean, table, width
+from spook_tracker.tracker.cli.console import NARROW, Column, clean, table, width
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.causes import causes_tonight
@@ -99,14 +99,18 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
             )
             for change in shown
         ]
-        columns = (
+        columns: tuple[Column, ...] = (
             Column("what"),
             Column("series", flexible=True, least=30),
             Column("before", "right"),
             Column("after", "right"),
             Column("how", flexible=True, least=12),
         )
-        lines += [*table(columns, rows, room or width(), {0: _paint}), ""]
+        told: list[tuple[str, ...]] = [*rows]
+        if (room or width()) < NARROW:  # the series stands above what became of it
+            columns = (columns[0], *columns[2:])
+            told = [part for row in rows for part in (row[1:2], (row[0], *row[2:]))]
+        lines += [*table(columns, told, room or width(), {0: _paint}), ""]
     reds = [click.style(line, fg="red") for line in red_lines(document.changes)]
     lines += [*reds, ""] if reds else []
     lines += _frontier_lines(_moved(document), room or width())

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, table
+from spook_tracker.tracker.cli.console import NARROW, Column, table
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.judge.standing import NO_VALUE
 from spook_tracker.tracker.judge.vocabulary import spaced
 
-WIDE = 100  # columns; below, order and time to error are all there is room for
 Pair = tuple[SeriesDefinition, Sample]
 
 
@@ -50,7 +49,7 @@ def sweep_table(found: Sequence[Pair], room: int) -> list[str]:
         Column("rungs", "right"),
         Column("verdict"),
     )
-    if room < WIDE:
+    if room < NARROW:  # order and time to error are all there is room for
         columns, rows = (*columns[:3], columns[5]), [(*row[:3], row[5]) for row in rows]
 
     def paint(row: int, text: str) -> str:

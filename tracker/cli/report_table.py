@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, Style, cells, clean, table, width
+from spook_tracker.tracker.cli.console import NARROW, Column, Style, cells, clean, table, width
 from spook_tracker.tracker.cli.report_sweep import sweep_table
 from spook_tracker.tracker.document.run_document import (
     MapData,
@@ -21,7 +21,6 @@ from spook_tracker.tracker.judge.standing import HAVE_VALUES, against_limit, cou
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
-NARROW = 100  # columns; below, the set point has no column, and the time step stands above its values
 NAMED = 24  # columns that tell one metric's configurations apart; where fewer are left, the margin goes
 ROLES = {"gate": 0, "companion": 1, "reported": 2}
 Pair = tuple[SeriesDefinition, Sample]

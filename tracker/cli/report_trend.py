@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, clean, sparkline, table, width
+from spook_tracker.tracker.cli.console import NARROW, Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import ROLES, limit, number
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import day
@@ -84,7 +84,11 @@ def trend_lines(told: Told, last: int = 10) -> list[str]:
         Column("verdict"),
         Column("how", flexible=True),
     )
-    return lines + table(columns, rows)
+    if width() >= NARROW:
+        return lines + table(columns, rows)
+    # What was found stands below its night.
+    below = [part for row in rows for part in (row[:-1], (f"  {row[-1]}",)) if part[0].strip()]
+    return lines + table(columns[:-1], below)
 
 
 def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]:
