@@ -86,7 +86,9 @@ private:
             const double here = slope(sine_cosine(angle), bend);
             (here > 0.0 ? low : high) = angle;
             double next = angle - here / bend;
-            if (!(next > low && next < high)) next = 0.5 * (low + high);
+            // Steps round a kink can go to and fro for ever: after a few every second one halves.
+            const bool halves = round > 8 && round % 2 != 0;
+            if (halves || !(next > low && next < high)) next = 0.5 * (low + high);
             const double way = std::abs(next - angle);
             angle = next;
             if (way <= 4e-16) break;

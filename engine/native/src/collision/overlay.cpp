@@ -51,6 +51,9 @@ Patch facing(const Facets& facets, Vec3 n) noexcept {
 
 namespace {
 
+constexpr double level =
+    1e-12;  // sine of a slope that is rounding: of a line far longer than thick more than the slop
+
 /// Numbers of a corner of the first (0) or second (1) patch, and of the first of two points on a side. Those beyond
 /// eight stand behind all others.
 constexpr std::uint32_t corner_feature(std::uint32_t whose, int k) noexcept {
@@ -212,7 +215,8 @@ Segment farthest_line(const Frustum& frustum, Vec3 n, double slop) noexcept {
     const Vec3 a = frustum.centre[0] + frustum.radius[0] * out,
                b = frustum.centre[1] + frustum.radius[1] * out;
     const double half = 0.5 * norm(b - a);
-    if (std::abs(low - high) <= slop) return {0.5 * (a + b), (0.5 / half) * (b - a), half};
+    if (std::abs(low - high) <= std::max(slop, level * half))
+        return {0.5 * (a + b), (0.5 / half) * (b - a), half};
     return {low > high ? a : b, (0.5 / half) * (b - a), 0.0};
 }
 
@@ -221,13 +225,13 @@ Segment lowest_line(const Facets& facets, Vec3 n, int edge, double slop) noexcep
     int lowest = 0;
     for (int k = 1; k < facets.corner_count; ++k)
         if (dot(n, facets.corners[k]) < dot(n, facets.corners[lowest])) lowest = k;
-    const double level = dot(n, facets.corners[lowest]);
+    const double lowest_of_all = dot(n, facets.corners[lowest]);
     for (const bool any : {false, true})
         for (int k = 0; k < facets.edge_count; ++k) {
             if (!any && k != edge) continue;
             const Vec3 a = facets.corners[facets.edges[k].from], b = facets.corners[facets.edges[k].to];
-            if (std::max(dot(n, a), dot(n, b)) - level > slop) continue;
             const double half = 0.5 * norm(b - a);
+            if (std::max(dot(n, a), dot(n, b)) - lowest_of_all > std::max(slop, level * half)) continue;
             return {0.5 * (a + b), (0.5 / half) * (b - a), half};
         }
     return {facets.corners[lowest], any_normal_to(n), 0.0};
