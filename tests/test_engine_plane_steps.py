@@ -1,4 +1,4 @@
-"""Plain and half-step steps by numbers of a plane: those of the dense oracle and of the rows in space; refusals, too."""
+"""Plain, half-step and corrected steps by numbers of a plane: those of the dense oracle and of the rows in space; refusals, too."""
 
 from __future__ import annotations
 
@@ -41,6 +41,12 @@ from tests.oracle_rigid import RigidOracle
 from tests.plane_scenes import mechanism
 
 HALF = Method(half_step_velocities=True)
+METHODS = {
+    "plain": PLAIN,
+    "half-step": HALF,
+    "corrected": Method(corrections=1),
+    "half-step, corrected": Method(corrections=2, half_step_velocities=True),
+}
 
 
 def in_rows_of_space(method: Method = PLAIN) -> Method:
@@ -96,7 +102,7 @@ def test_steps_are_those_of_the_dense_oracle(seed: int, loops: int) -> None:
             assert np.abs(run[f"off {name}"][k] - off).max() < 1e-11, name
 
 
-@pytest.mark.parametrize("method", [Method(), HALF], ids=["plain", "half-step"])
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])  # m
 def test_steps_are_those_of_rows_in_space(size: float, method: Method) -> None:
     """Sixty mechanisms each: masses of six decades, compliance from none to 1 m/N, loops that fit no motion."""
@@ -192,7 +198,7 @@ def test_a_body_that_turns_too_fast_is_named() -> None:
     assert (plane.failed_step, plane.failed_body) == (space.failed_step, space.failed_body)
 
 
-@pytest.mark.parametrize("method", [Method(), HALF, Method(substeps=3)], ids=["plain", "half", "substeps"])
+@pytest.mark.parametrize("method", [*METHODS.values(), Method(substeps=3)], ids=[*METHODS, "substeps"])
 @pytest.mark.parametrize("make", [lambda: rods(3), four_bar], ids=["rods", "four-bars"])
 def test_whoever_looks_changes_no_bit(make: Callable[[], Scene], method: Method) -> None:
     """Samples of all kinds, stage times, and a run that is held, kept and taken back."""
@@ -229,7 +235,7 @@ def test_joint_forces_and_energy_are_those_of_space() -> None:
         row.name: Trace(quantity=ConstraintForce(row.name)) for row in scene.constraints
     }
     observe["energy"] = Trace(quantity=Energy())
-    for method in (Method(), HALF):
+    for method in METHODS.values():
         plane, space = (
             simulate(scene, time_step=0.02, steps=30, method=m, observe=observe)
             for m in (method, in_rows_of_space(method))
@@ -285,7 +291,6 @@ def test_what_may_leave_the_plane_is_solved_in_space(name: str) -> None:
 @pytest.mark.parametrize(
     "method",
     [
-        Method(corrections=1),
         Method(string_stiffness=True),
         Method(solver="iterative"),
         Method(force_stages=("solve_block",)),

@@ -12,15 +12,13 @@ namespace {
 constexpr double ROUNDING = 4e-16;  // of a unit vector
 constexpr double IN_PLANE = 1e-14;  // of a state, which may come from a run in space
 constexpr double DOUBTFUL = 1e-4;   // of a row's diagonal: a pivot below has lost four digits
-constexpr std::size_t WIDEST = 12;  // columns of the envelope, in the mean: beyond, blocks are as fast
 
 }  // namespace
 
 void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
-                        std::span<const int> tied, double time_step, int refinements) {
+                        std::span<const int> tied, const Options& options) {
     joints_.clear(), nodes_.clear(), rows_.clear();
-    h_ = time_step;
-    refinements_ = refinements;
+    options_ = options;
     const auto blocks = joints.blocks();
     int normal = -1;
     for (const JointBlock& block : blocks) {
@@ -55,8 +53,10 @@ void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet
         return i;
     };
     joint_at_.assign(static_cast<std::size_t>(joints.count()), -1);
+    int row = 0;
     for (const JointBlock& block : blocks) {
-        if (!take_joint(constants, joints, block, node_of)) return joints_.clear();
+        if (!take_joint(constants, joints, block, row, node_of)) return joints_.clear();
+        row += block.size;
         root[find(joints_.back().first)] = find(joints_.back().second);
     }
     for (int k = 0; k < static_cast<int>(nodes_.size()); ++k)  // what floats could tip over
@@ -66,7 +66,7 @@ void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet
 
 /// False if it is none of the joints that hold bodies in the plane, or holds them beside it.
 bool PlaneStep::take_joint(std::span<const BodyConstants> constants, const JointSet& joints,
-                           const JointBlock& block, std::span<const int> node_of) {
+                           const JointBlock& block, int first_row, std::span<const int> node_of) {
     const JointConstants& from = joints.constants(block.joint);
     if (block.axial || (from.kind != JointKind::hinge && from.kind != JointKind::lock &&
                         from.kind != JointKind::prismatic && from.kind != JointKind::planar))
@@ -93,7 +93,9 @@ bool PlaneStep::take_joint(std::span<const BodyConstants> constants, const Joint
     int index = 0;
     const auto add = [&] {
         const JointSet::RowLaw law = joints.law(block.joint, index);
-        rows_.push_back({block.joint, index, law.upsilon - 1.0, law.violation});
+        const JointSet::RowGain size = joints.gain(static_cast<int>(&block - joints.blocks().data()), index);
+        rows_.push_back({block.joint, index, first_row + index, law.upsilon - 1.0, law.violation,
+                         0.25 + size.relaxation, options_.cap * size.extent});
     };
     for (int k = from.holds.linear_first; k < from.holds.linear_end; ++k, ++index) {
         if (stands(from.axes[k])) continue;
@@ -109,107 +111,6 @@ bool PlaneStep::take_joint(std::span<const BodyConstants> constants, const Joint
     }
     joint_at_[block.joint] = static_cast<int>(joints_.size());
     joints_.push_back(joint);
-    return true;
-}
-
-/// Joints that follow each other along the mechanism have their rows near each other: Cuthill and McKee's order. False if
-/// the envelope is too wide all the same.
-bool PlaneStep::order_rows(const JointSet& joints) {
-    const int count = static_cast<int>(joints_.size()), fixed = static_cast<int>(nodes_.size()) - 1;
-    std::vector<std::vector<int>> at(nodes_.size());
-    for (int k = 0; k < count; ++k)
-        for (const int node : {joints_[k].first, joints_[k].second})
-            if (node != fixed) at[node].push_back(k);
-    const auto degree = [&](int k) {
-        std::size_t sum = 0;
-        for (const int node : {joints_[k].first, joints_[k].second})
-            if (node != fixed) sum += at[node].size();
-        return sum;
-    };
-    std::vector<int> order, free(static_cast<std::size_t>(count));
-    std::vector<char> met(static_cast<std::size_t>(count), 0);
-    std::iota(free.begin(), free.end(), 0);
-    const auto lighter = [&](int a, int b) { return degree(a) < degree(b); };
-    std::stable_sort(free.begin(), free.end(), lighter);
-    for (const int begin : free) {
-        if (met[begin]) continue;
-        met[begin] = 1;
-        order.push_back(begin);
-        for (std::size_t next = order.size() - 1; next < order.size(); ++next) {
-            std::vector<int> around;
-            for (const int node : {joints_[order[next]].first, joints_[order[next]].second})
-                if (node != fixed)
-                    for (const int k : at[node])
-                        if (!met[k]) met[k] = 1, around.push_back(k);
-            std::stable_sort(around.begin(), around.end(), lighter);
-            order.insert(order.end(), around.begin(), around.end());
-        }
-    }
-    std::vector<Joint> sorted;
-    std::vector<Row> rows;
-    for (auto k = order.rbegin(); k != order.rend(); ++k) {
-        Joint joint = joints_[*k];
-        const int size = joint.linear + (joint.sense != 0.0 ? 1 : 0), from = joint.row;
-        joint.row = static_cast<int>(rows.size());
-        rows.insert(rows.end(), rows_.begin() + from, rows_.begin() + from + size);
-        joint_at_[joint.joint] = static_cast<int>(sorted.size());
-        sorted.push_back(joint);
-    }
-    joints_ = std::move(sorted);
-    rows_ = std::move(rows);
-
-    return place_rows(joints);
-}
-
-/// Where the rows stand in the envelope, and which of them meet on a body that moves. False if it is too wide.
-bool PlaneStep::place_rows(const JointSet& joints) {
-    const int count = static_cast<int>(joints_.size()), n = static_cast<int>(rows_.size());
-    std::vector<std::vector<std::pair<int, int>>> at(nodes_.size() -
-                                                     1);  // per node: joints, and with which end
-    const auto end_of = [this](int k) {
-        return k + 1 < static_cast<int>(joints_.size()) ? joints_[k + 1].row : static_cast<int>(rows_.size());
-    };
-    first_.assign(rows_.size(), n), start_.assign(rows_.size(), 0);
-    int size = 0;
-    for (int k = 0; k < count; ++k) {
-        int first = joints_[k].row;
-        for (const int end : {0, 1}) {
-            const int node = end ? joints_[k].second : joints_[k].first;
-            if (node == static_cast<int>(at.size())) continue;
-            at[node].emplace_back(k, end);
-            first = std::min(first, joints_[at[node].front().first].row);
-        }
-        for (int r = joints_[k].row; r < end_of(k); ++r) {
-            first_[r] = first;
-            start_[r] = size - first;
-            size += r - first + 1;
-        }
-    }
-    if (n == 0 || static_cast<std::size_t>(size) > WIDEST * rows_.size()) return false;
-    std::vector<std::pair<int, int>> met;
-    meetings_.clear();
-    for (const auto& ends : at)
-        for (std::size_t one = 0; one < ends.size(); ++one)
-            for (std::size_t two = 0; two <= one; ++two) {
-                const auto [k, end] = ends[one];
-                const auto [j, other] = ends[two];
-                met.emplace_back(k, j);
-                for (int r = joints_[k].row; r < end_of(k); ++r)
-                    for (int s = joints_[j].row; s < end_of(j) && s <= r; ++s)
-                        meetings_.push_back({start_[r] + s, 2 * r + end, 2 * s + other});
-            }
-    std::stable_sort(meetings_.begin(), meetings_.end(),
-                     [](const Meeting& a, const Meeting& b) { return a.to < b.to; });
-    std::sort(met.begin(), met.end());
-    blocks_ = static_cast<std::uint64_t>(std::unique(met.begin(), met.end()) - met.begin());
-    blank_.assign(static_cast<std::size_t>(size), 0.0);
-    for (int r = 0; r < n; ++r) blank_[start_[r] + r] = joints.law(rows_[r].joint, rows_[r].index).softness;
-    envelope_ = blank_;
-    levers_.assign(2 * rows_.size(), {}), shares_.assign(2 * rows_.size(), {});
-    inverse_.assign(rows_.size(), 0.0), multiplier_ = right_ = asked_ = inverse_;
-    softness_.clear();
-    for (const Row& row : rows_) softness_.push_back(joints.law(row.joint, row.index).softness);
-    for (int k = 0; k < count; ++k) joints_[k].end = end_of(k);
     return true;
 }
 
@@ -230,8 +131,8 @@ bool PlaneStep::holds(std::span<const BodyConstants> constants, std::span<const 
             !lies(s.displacement, IN_PLANE) || !lies(s.velocity, IN_PLANE) || !stands(turn, IN_PLANE) ||
             !stands(s.angular_momentum, IN_PLANE))
             return false;
-        node.kick = plane_(h_ * acceleration[node.body]);
-        node.turn_kick = node.over_inertia * (h_ * torque[plane_.normal]);
+        node.kick = plane_(options_.time_step * acceleration[node.body]);
+        node.turn_kick = node.over_inertia * (options_.time_step * torque[plane_.normal]);
     }
     read(bodies);
     assemble();
@@ -243,9 +144,9 @@ void PlaneStep::read(const LargeArray<BodyState>& bodies) noexcept {
         if (node.body < 0) continue;
         const BodyState& s = bodies[node.body];
         const Vec3 turn{s.turn.x, s.turn.y, s.turn.z};
-        node.displacement = plane_(s.displacement);
-        node.turn = {s.turn.w, turn[plane_.normal]};
-        node.turned = less_one(node.turn);
+        node.at.displacement = plane_(s.displacement);
+        node.at.turn = {s.turn.w, turn[plane_.normal]};
+        node.at.turned = less_one(node.at.turn);
         node.velocity = plane_(s.velocity);
         node.spin = s.angular_momentum[plane_.normal];
         node.rate = node.over_inertia * node.spin;
@@ -256,26 +157,36 @@ void PlaneStep::write(LargeArray<BodyState>& bodies) const noexcept {
     for (const Node& node : nodes_) {
         if (node.body < 0) continue;
         BodyState& s = bodies[node.body];
-        const Vec3 turn = upright(node.turn.sine);
-        s.displacement = plane_.lifted(node.displacement);
-        s.turn = {node.turn.cosine, turn.x, turn.y, turn.z};
+        const Vec3 turn = upright(node.at.turn.sine);
+        s.displacement = plane_.lifted(node.at.displacement);
+        s.turn = {node.at.turn.cosine, turn.x, turn.y, turn.z};
         s.velocity = plane_.lifted(node.velocity);
         s.angular_velocity = upright(node.rate);
         s.angular_momentum = upright(node.spin);
         s.turn_less_one = {};
         const int u = plane_.first(), v = plane_.second();
-        s.turn_less_one(u, u) = s.turn_less_one(v, v) = node.turned.fall;
-        s.turn_less_one(u, v) = -node.turned.sine;
-        s.turn_less_one(v, u) = node.turned.sine;
+        s.turn_less_one(u, u) = s.turn_less_one(v, v) = node.at.turned.fall;
+        s.turn_less_one(u, v) = -node.at.turned.sine;
+        s.turn_less_one(v, u) = node.at.turned.sine;
     }
+}
+
+/// How far the rows of a joint are off where its bodies are.
+void PlaneStep::look(const Joint& joint, const Pose& a, const Pose& b, double* violation) const noexcept {
+    const Vec2 gap =
+        b.displacement - a.displacement + b.turned * joint.second_arm - a.turned * joint.first_arm;
+    for (int k = 0; k < joint.linear; ++k) *violation++ = dot(carried(a.turned, joint.axes[k]), gap);
+    if (joint.sense == 0.0) return;
+    const HalfTurn between = conjugate(a.turn) * b.turn;
+    *violation = (between.cosine < 0.0 ? -2.0 : 2.0) * joint.sense * between.sine;
 }
 
 /// Levers and shares, what the rows ask of the change of velocities, and the matrix.
 void PlaneStep::assemble() noexcept {
     for (Joint& joint : joints_) {
         const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
-        const Vec2 first = a.turned * joint.first_arm, second = b.turned * joint.second_arm;
-        const Vec2 gap = b.displacement - a.displacement + second - first;
+        const Vec2 first = a.at.turned * joint.first_arm, second = b.at.turned * joint.second_arm;
+        const Vec2 gap = b.at.displacement - a.at.displacement + second - first;
         joint.second_reach = joint.second_arm + second;
         joint.first_reach = joint.first_arm + first + gap;
         int r = joint.row;
@@ -290,16 +201,18 @@ void PlaneStep::assemble() noexcept {
             const double rate = on_first.x * a.velocity.x + on_first.y * a.velocity.y +
                                 on_first.turn * a.rate + on_second.x * b.velocity.x +
                                 on_second.y * b.velocity.y + on_second.turn * b.rate;
+            rate_[r] = rate;
+            violation_[r] = violation;
             asked_[r] = rows_[r].damped * rate - rows_[r].gain * violation;
             ++r;
         };
         for (int k = 0; k < joint.linear; ++k) {
-            const Vec2 u = carried(a.turned, joint.axes[k]);
+            const Vec2 u = carried(a.at.turned, joint.axes[k]);
             put({-u.x, -u.y, -cross(joint.first_reach, u)}, {u.x, u.y, cross(joint.second_reach, u)},
                 dot(u, gap));
         }
         if (joint.sense == 0.0) continue;
-        HalfTurn between = conjugate(a.turn) * b.turn;
+        HalfTurn between = conjugate(a.at.turn) * b.at.turn;
         if (between.cosine < 0.0) between = {-between.cosine, -between.sine};
         const double on = joint.sense * between.cosine;
         put({0.0, 0.0, -on}, {0.0, 0.0, on}, 2.0 * joint.sense * between.sine);
@@ -355,21 +268,69 @@ void PlaneStep::solve() noexcept {
 bool PlaneStep::find_velocities() noexcept {
     assemble();
     if (!factor()) return false;
+    if (options_.corrections > 0) bend_back();
+    solve_refined();
+    if (options_.corrections > 0) correct();
     for (Node& node : nodes_) {
-        node.next_velocity = node.kick;  // for now, what the step changes
+        node.next_velocity += node.velocity;
+        node.next_spin = node.spin + node.inertia * node.next_rate;
+        node.next_rate = node.over_inertia * node.next_spin;
+    }
+    return true;
+}
+
+/// As RigidSystem::bend_rows_back(): where the rows came from is known.
+void PlaneStep::bend_back() noexcept {
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+        const double back = last_violation_[r] - violation_[r] + options_.time_step * rate_[r];
+        asked_[r] -= rows_[r].gain * 0.25 * std::clamp(back, -rows_[r].cap, rows_[r].cap);
+    }
+    first_asked_ = asked_;
+}
+
+/// As RigidSystem::correct_curvature(): where the solution, then the corrected one, would take the rows.
+void PlaneStep::correct() noexcept {
+    const double h = options_.time_step;
+    for (int round = 0; round < options_.corrections; ++round) {
+        for (Node& node : nodes_) {
+            node.ahead = node.at;
+            const double spin = node.spin + node.inertia * node.next_rate;
+            if (!moved(node.velocity + node.next_velocity, node.over_inertia * spin, node.ahead))
+                return;  // the step itself will say so
+        }
+        for (const Joint& joint : joints_) {
+            const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
+            look(joint, a.ahead, b.ahead, ahead_.data() + joint.row);
+            for (int r = joint.row; r < joint.end; ++r) {
+                const double curved = ahead_[r] - violation_[r] - h * (rate_[r] + changed(r, a, b));
+                asked_[r] = first_asked_[r] -
+                            rows_[r].gain * rows_[r].ahead * std::clamp(curved, -rows_[r].cap, rows_[r].cap);
+            }
+        }
+        solve_refined();
+    }
+}
+
+/// What the step changes of a row's speed so far.
+double PlaneStep::changed(int row, const Node& a, const Node& b) const noexcept {
+    const Lever &one = levers_[2 * row], &two = levers_[2 * row + 1];
+    return one.x * a.next_velocity.x + one.y * a.next_velocity.y + one.turn * a.next_rate +
+           two.x * b.next_velocity.x + two.y * b.next_velocity.y + two.turn * b.next_rate;
+}
+
+/// Impulses for what the rows ask, and into the nodes what the step changes of their velocities.
+void PlaneStep::solve_refined() noexcept {
+    for (Node& node : nodes_) {
+        node.next_velocity = node.kick;
         node.next_rate = node.turn_kick;
     }
     const int n = rows();
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
-    for (int round = 0; round <= refinements_; ++round) {
+    for (int round = 0; round <= options_.refinements; ++round) {
         for (const Joint& joint : joints_) {
             const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
-            for (int r = joint.row; r < joint.end; ++r) {
-                const Lever &one = levers_[2 * r], &two = levers_[2 * r + 1];
-                right_[r] = asked_[r] - softness_[r] * multiplier_[r] -
-                            (one.x * a.next_velocity.x + one.y * a.next_velocity.y + one.turn * a.next_rate +
-                             two.x * b.next_velocity.x + two.y * b.next_velocity.y + two.turn * b.next_rate);
-            }
+            for (int r = joint.row; r < joint.end; ++r)
+                right_[r] = asked_[r] - softness_[r] * multiplier_[r] - changed(r, a, b);
         }
         solve();
         for (int r = 0; r < n; ++r) multiplier_[r] += right_[r];
@@ -387,12 +348,6 @@ bool PlaneStep::find_velocities() noexcept {
     }
     nodes_.back().next_velocity = {};
     nodes_.back().next_rate = 0.0;
-    for (Node& node : nodes_) {
-        node.next_velocity += node.velocity;
-        node.next_spin = node.spin + node.inertia * node.next_rate;
-        node.next_rate = node.over_inertia * node.next_spin;
-    }
-    return true;
 }
 
 void PlaneStep::take_velocities() noexcept {
@@ -401,23 +356,33 @@ void PlaneStep::take_velocities() noexcept {
         std::swap(node.spin, node.next_spin);
         std::swap(node.rate, node.next_rate);
     }
+    if (options_.corrections > 0) std::copy(violation_.begin(), violation_.end(), last_violation_.begin());
 }
 
-/// J sin θ/h of a turn θ is the angular momentum: see rotation.hpp.
+/// A pose a step on. J sin θ/h of a turn θ is the angular momentum: see rotation.hpp. False if it turns too fast.
+bool PlaneStep::moved(Vec2 velocity, double rate, Pose& pose) const noexcept {
+    pose.displacement += options_.time_step * velocity;
+    const double sine = options_.time_step * rate, z = sine * sine;
+    if (!(z <= 1.0)) return false;
+    const double y = 0.5 * z / (1.0 + std::sqrt(1.0 - z)), cosine = std::sqrt(1.0 - y);
+    pose.turn = unit(HalfTurn{cosine, 0.5 * sine / cosine} * pose.turn);
+    pose.turned = less_one(pose.turn);
+    return true;
+}
+
 int PlaneStep::move() noexcept {
     int too_fast = -1;
-    for (Node& node : nodes_) {
-        node.displacement += h_ * node.velocity;
-        const double sine = h_ * node.rate, z = sine * sine;
-        if (!(z <= 1.0)) {
-            if (too_fast < 0) too_fast = node.body;
-            continue;
-        }
-        const double y = 0.5 * z / (1.0 + std::sqrt(1.0 - z)), cosine = std::sqrt(1.0 - y);
-        node.turn = unit(HalfTurn{cosine, 0.5 * sine / cosine} * node.turn);
-        node.turned = less_one(node.turn);
-    }
+    for (Node& node : nodes_)
+        if (!moved(node.velocity, node.rate, node.at) && too_fast < 0) too_fast = node.body;
     return too_fast;
+}
+
+void PlaneStep::read_violations(std::span<const double> all) noexcept {
+    for (std::size_t r = 0; r < rows_.size(); ++r) last_violation_[r] = all[rows_[r].place];
+}
+
+void PlaneStep::write_violations(std::span<double> all) const noexcept {
+    for (std::size_t r = 0; r < rows_.size(); ++r) all[rows_[r].place] = last_violation_[r];
 }
 
 void PlaneStep::deliver(LargeArray<JointSet::State>& states) const noexcept {

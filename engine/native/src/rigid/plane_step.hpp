@@ -1,10 +1,11 @@
-// Plain steps of mechanisms that are their own mirror image in a plane: three numbers a body, two rows a hinge.
+// Plain, half-step and corrected steps of mechanisms that are their own mirror image in a plane: three numbers a body, two
+// rows a hinge.
 //
 // Where bodies, joints and loads lie in one plane of the world, all that leaves it stays zero, and the step is the
 // one of rigid_step.cpp without it, to rounding: the same rows with compliance and damping, the same turn. Of
-// (G M⁻¹ Gᵀ + Sig) λ = right − G v, with v after the forces, few rows are left; they are factored in an envelope.
-// A pivot far below its diagonal tells of redundant rows, or of loads far heavier than what carries them: such a step
-// is left to the block factorisation, which is made for both.
+// (G M⁻¹ Gᵀ + Sig) λ = right − G v, with v after the forces, few rows are left; they are factored in an envelope, and
+// refined by what the rows themselves still ask for. A pivot far below its diagonal tells of redundant rows, or of loads
+// far heavier than what carries them: such a step is left to the block factorisation, which is made for both.
 #pragma once
 
 #include <cstdint>
@@ -19,10 +20,15 @@ namespace spook {
 
 class PlaneStep {
 public:
+    struct Options {
+        double time_step = 0.0;
+        int refinements = 1, corrections = 0;
+        double cap = 0.0;  // of a correction, part of the joint's size
+    };
     /// Takes the scene if every tied body moves in the plane and is held there by hinges, locks, slides and planar joints
     /// on each other, and somewhere on what is fixed. Empty otherwise.
     void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
-                 double time_step, int refinements);
+                 const Options& options);
     bool empty() const noexcept { return joints_.empty(); }
     /// The axis of the world that stands on the plane (0: x).
     int normal() const noexcept { return plane_.normal; }
@@ -46,6 +52,9 @@ public:
         return n.mass * dot(n.next_velocity, n.next_velocity) + n.next_spin * n.next_rate;
     }
     void take_velocities() noexcept;
+    /// Of all rows of the scene, where the step before began.
+    void read_violations(std::span<const double> all) noexcept;
+    void write_violations(std::span<double> all) const noexcept;
     /// Velocity and angular momentum of the k-th tied body before the last take_velocities().
     void read_before(int k, Vec3 velocity, Vec3 spin) noexcept {
         nodes_[k].next_velocity = plane_(velocity);
@@ -62,14 +71,17 @@ public:
     void wrench(int joint, const JointSet::State& state, double* out) const noexcept;
 
 private:
+    struct Pose {
+        Vec2 displacement;
+        HalfTurn turn;
+        TurnLessOne turned;
+    };
     struct Node {
         int body = -1;
         double mass = 0.0, inertia = 0.0, over_mass = 0.0, over_inertia = 0.0;
         Vec2 kick;               // of a step, m/s
         double turn_kick = 0.0;  // rad/s
-        Vec2 displacement;
-        HalfTurn turn;
-        TurnLessOne turned;
+        Pose at, ahead;
         Vec2 velocity, next_velocity;
         double spin = 0.0, rate = 0.0, next_spin = 0.0, next_rate = 0.0;  // angular momentum; over inertia
     };
@@ -78,7 +90,9 @@ private:
     };
     struct Row {
         int joint = 0, index = 0;         // of the joint's own
+        int place = 0;                    // among all of the scene
         double damped = 0.0, gain = 0.0;  // Ups − 1, (4/h) Ups
+        double ahead = 0.0, cap = 0.0;    // ¼ + θ; of a correction
     };
     struct Joint {
         int joint = 0, first = 0, second = 0;  // nodes; the last one stands for all that is fixed
@@ -98,16 +112,21 @@ private:
         return out;
     }
     bool take_joint(std::span<const BodyConstants> constants, const JointSet& joints, const JointBlock& block,
-                    std::span<const int> node_of);
+                    int first_row, std::span<const int> node_of);
     bool order_rows(const JointSet& joints);
     bool place_rows(const JointSet& joints);
     void assemble() noexcept;
     bool factor() noexcept;
     void solve() noexcept;
+    void solve_refined() noexcept;
+    void look(const Joint& joint, const Pose& a, const Pose& b, double* violation) const noexcept;
+    double changed(int row, const Node& a, const Node& b) const noexcept;
+    void bend_back() noexcept;
+    void correct() noexcept;
+    bool moved(Vec2 velocity, double rate, Pose& pose) const noexcept;
 
     Plane3 plane_;
-    double h_ = 0.0;
-    int refinements_ = 1;
+    Options options_;
     std::vector<Node> nodes_;
     std::vector<Joint> joints_;
     std::vector<int> joint_at_;  // per joint of the scene: its place in joints_
@@ -118,6 +137,7 @@ private:
     std::uint64_t blocks_ = 0;
     std::vector<int> first_, start_;  // of a row in the envelope: its first column, and where that stands
     std::vector<double> blank_, envelope_, inverse_, softness_, asked_, right_, multiplier_;
+    std::vector<double> violation_, rate_, last_violation_, first_asked_, ahead_;  // per row
 };
 
 }  // namespace spook

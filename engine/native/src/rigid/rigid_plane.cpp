@@ -9,13 +9,14 @@ namespace spook {
 /// Whether nothing of the scene but its joints, steady forces and steps of the plain kind bears on the bodies.
 bool RigidSystem::may_lie_in_plane(const RigidScene& scene) const {
     return solver_ == RigidSolver::block && locked_.empty() && !composed_ && !stiff_ && !fresh_contacts_ &&
-           method_.corrections == 0 && !method_.force_block && !scene.loads_change && force_.empty() &&
-           load_follows_.empty() && drives_.empty() && free_.empty() && driven_.empty();
+           !method_.force_block && !scene.loads_change && force_.empty() && load_follows_.empty() &&
+           drives_.empty() && free_.empty() && driven_.empty();
 }
 
 void RigidSystem::take_plane() {
     plane_.read(live_.bodies);
     at_hand_ = true;
+    if (method_.corrections > 0) plane_.read_violations(live_.last_violation);
     if (!half_step_) return;
     for (std::size_t k = 0; k < tied_.size(); ++k) {
         const BodyMomenta& before = live_.before[tied_[k]];
@@ -25,6 +26,7 @@ void RigidSystem::take_plane() {
 
 void RigidSystem::write_plane() {
     plane_.write(live_.bodies);
+    if (method_.corrections > 0) plane_.write_violations(live_.last_violation);
     if (!half_step_) return;
     for (std::size_t k = 0; k < tied_.size(); ++k)
         live_.before[tied_[k]] = {plane_.velocity_before(static_cast<int>(k)),

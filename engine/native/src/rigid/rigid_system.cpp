@@ -101,7 +101,9 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
                     [](const BodyConstants& body) { return body.tilted; });
     if (composed_ && solver_ == RigidSolver::block && !tilted)
         tree_.analyse(constants_, joints_, tied_, start_);
-    if (may_lie_in_plane(scene)) plane_.analyse(constants_, joints_, tied_, h_, method_.refinements);
+    if (may_lie_in_plane(scene))
+        plane_.analyse(constants_, joints_, tied_,
+                       {h_, method_.refinements, method_.corrections, method_.correction_cap});
     reset(nullptr);
 }
 
@@ -348,7 +350,8 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     const LockedTree::Counters locked = locked_.counters();
     work.factorisations += plane_solves_;
     work.block_operations += plane_solves_ * plane_.blocks();
-    work.solves += plane_solves_;
+    work.solves +=
+        plane_solves_ * static_cast<std::uint64_t>((1 + method_.refinements) * (1 + method_.corrections));
     work.factorisations += locked.factorisations;
     work.block_operations += locked.block_operations;
     work.solves += locked.solves;
