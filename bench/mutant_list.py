@@ -394,7 +394,7 @@ MUTANTS = (
         "doubles between two values are counted by their difference",
         "test_tracker_verdict.py::test_ulps_count_the_doubles_between",
         "judge/verdict.py",
-        "return abs(_place(a) - _place(b))",
+        "return abs(_rank(first) - _rank(second))",
         "return int(abs(a - b))",
     ),
     judged(
