@@ -22,6 +22,7 @@ JUDGE = "tracker/judge"
 TESTS = (
     "tests/test_judge_rules.py", "tests/test_judge_detection.py", "tests/test_tracker_verdict.py", "tests/test_tracker_noise.py",
     "tests/test_tracker_compare.py", "tests/test_tracker_analyse.py", "tests/test_tracker_accepted.py",
+    "tests/test_judge_normal_nights.py",
 )  # fmt: skip
 RUN = "import sys; sys.path[:0] = sys.argv[1:3]; import pytest; sys.exit(pytest.main(sys.argv[3:]))"
 
@@ -44,13 +45,13 @@ MUTANTS = (
     mutant("three-sigmas", "noise", "SIGMAS = 4.0", "SIGMAS = 3.0"),
     mutant("short-window", "noise", "WINDOW = 30 ", "WINDOW = 8 "),
     mutant("long-window", "noise", "WINDOW = 30 ", "WINDOW = 60 "),
-    mutant("noise-times-level", "noise", "in finite]) / abs(level)", "in finite]) * abs(level)"),
+    mutant("noise-times-level", "usual", "in finite]) / abs(level)", "in finite]) * abs(level)"),
     mutant("no-floor", "noise", "max(FLOOR, SIGMAS * noise)", "SIGMAS * noise"),
     mutant("low-floor", "noise", "FLOOR = 0.05", "FLOOR = 0.03"),
     mutant("noise-from-four", "noise", "FEWEST = 5", "FEWEST = 4"),
     mutant("lenient-start", "noise", "FEW_NIGHTS_FLOOR = 0.5", "FEW_NIGHTS_FLOOR = 0.6"),
     mutant("one-night-confirms", "noise", "len(self.suspects) > 1 and", "len(self.suspects) > 0 and"),
-    mutant("no-normal", "noise", "NORMAL = 1.4826", "NORMAL = 1.0"),
+    mutant("no-normal", "usual", "NORMAL = 1.4826", "NORMAL = 1.0"),
     mutant("larger-is-not-better", "slower", "return -change if larger_is_better else change", "return change"),
     mutant("no-creep", "noise", "if old is None or recent is None:", "if True:"),
     mutant("clusters-are-not-learnt", "noise", "REACH = 1.25", "REACH = 0.0"),
@@ -63,6 +64,15 @@ MUTANTS = (
     mutant(
         "small-shifts-count", "shifts", "from spook_tracker.tracker.judge.slower import LEAST", "LEAST = 0.0"
     ),
+    mutant("accidents-count-in-full", "normal_nights", "WEIGHT = 3.5", "WEIGHT = 6.0"),
+    mutant("any-noise-is-normal", "normal_nights", "NORMAL_SCORE = 2.3263", "NORMAL_SCORE = 99.0"),
+    mutant("memory-is-normal", "normal_nights", "WHITE = 1.2816", "WHITE = 99.0"),
+    mutant("few-nights-tell-how-they-lie", "normal_nights", "LEARNT = 40", "LEARNT = 30"),
+    mutant("one-freedom-more", "normal_nights", "1.0 / count)), count - 1)", "1.0 / count)), 4 * count)"),
+    mutant("old-series-spend-as-young", "shifts", "RARE * min(1.0, LEARNING / max(age, 1.0))", "RARE"),
+    mutant("normal-nights-need-a-permutation", "shifts", "if (by_chance := chance(base, last, rare)) < rare else None", "if (by_chance := 1.0) < rare else None"),
+    mutant("a-visit-hides-a-step", "noise", "if found is None or not found.apart:", "if True:"),
+    mutant("all-nights-are-of-one-age", "noise", "self.ages[places[-1]] - self.ages[self.start]", "0"),
     mutant("bounded-is-growing", "verdict", '"bounded": 1, "growing": 2', '"bounded": 1, "growing": 1'),
     mutant("unknown-cell-is-best", "verdict", "CELL_RANK.get(cell, len(CELL_RANK))", "CELL_RANK.get(cell, 0)"),
     mutant("diverged-is-not-finite", "verdict", '"diverged": 4,\n    "crashed"', '"diverged": 3,\n    "crashed"'),
@@ -95,7 +105,7 @@ def copied(folder: Path) -> None:
     from spook_tracker.engine import _core
 
     only = shutil.ignore_patterns("native", "__pycache__", "*.so")
-    for name in ("engine", "scalar_tests", "tracker", "migrations", "site", "tests"):
+    for name in ("engine", "scalar_tests", "tracker", "migrations", "site", "tests", "bench"):
         shutil.copytree(ROOT / name, folder / name, ignore=only)
     shutil.copytree(ROOT / "spook_tracker", folder / "spook_tracker", symlinks=True)
     (folder / "docs").mkdir()

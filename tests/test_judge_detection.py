@@ -17,7 +17,8 @@ from scipy import special, stats
 from bench import detectors
 from spook_tracker.tracker.judge import noise, shifts
 from spook_tracker.tracker.judge.noise import judge_noisy
-from spook_tracker.tracker.judge.shifts import permutation_probability, remembered, standard_error, student
+from spook_tracker.tracker.judge.normal_nights import student
+from spook_tracker.tracker.judge.shifts import permutation_probability, remembered, standard_error
 from tests import noise_battery as battery
 
 SERIES, NIGHTS = 5, 460  # of each kind: 2000 night-values after the nights of learning

@@ -10,7 +10,8 @@ import pytest
 from scipy import stats
 
 from spook_tracker.tracker.judge.noise import judge_noisy
-from spook_tracker.tracker.judge.shifts import RARE, exceeded, student
+from spook_tracker.tracker.judge.normal_nights import exceeded, student
+from spook_tracker.tracker.judge.shifts import RARE
 from tests import noise_battery as battery
 
 LEARNING, NIGHTS, EACH = 100, 140, 8

@@ -23,23 +23,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
+from spook_tracker.tracker.judge.normal_nights import exceeded
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
     RARE,
     SPANS,
-    exceeded,
     remembered,
     shift,
     standard_error,
 )
 from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower, worse_by
+from spook_tracker.tracker.judge.usual import level_and_noise, outermost_two
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.visits import Visited, Visits, left_before, steadiness
 from spook_tracker.tracker.judge.vocabulary import State
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.shifts import Values
+    from spook_tracker.tracker.judge.shifts import Shift, Values
 
 WINDOW = 30  # nights that say what is usual
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
@@ -52,7 +53,6 @@ REACHED = 200  # nights of which that is remembered, whatever their level
 FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
 SIGMAS = 4.0
 SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
-NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CREEP = 5  # nights in each median that is compared for drift
 BACK = 4  # nights whose mean must have come halfway back from a shift
 
@@ -77,13 +77,14 @@ def judge_noisy(
     accepted: Sequence[bool] | None = None,
     tolerance: float = 0.0,
     absolute: float = 0.0,
+    ages: Sequence[int] | None = None,
 ) -> list[Noisy]:
     """A verdict for each value of one machine, oldest first. Values are positive; worse is larger.
 
     `tolerance` and `absolute`: the change, relative and in the unit of the values, up to which the series' definition
-    tells none, whatever its noise.
+    tells none, whatever its noise. `ages`: how many nights each value lies after the first, where some are left out.
     """
-    walk = _Walk(values, larger_is_better, tolerance, absolute)
+    walk = _Walk(values, larger_is_better, tolerance, absolute, ages or ())
     releases = releases or [False] * len(values)
     accepted = accepted or [False] * len(values)
     found = [walk.night(place, releases[place], accepted[place]) for place in range(len(values))]
@@ -99,6 +100,7 @@ class _Walk:
     larger_is_better: bool
     tolerance: float = 0.0
     absolute: float = 0.0
+    ages: Sequence[int] = ()
     usual: list[int] = field(default_factory=list)  # places of the last nights that hold
     level_since: list[int] = field(default_factory=list)  # the same, back to where the level began
     reached: list[float] = field(default_factory=list)  # deviations of nights that hold; worse is positive
@@ -123,6 +125,7 @@ class _Walk:
 
     def __post_init__(self) -> None:
         self.visits = Visits(self._size_of, self._noise)
+        self.ages = self.ages or range(len(self.values))
 
     def usual_now(self) -> Usual:
         """The level, and what stands clear of it for the worse."""
@@ -141,6 +144,8 @@ class _Walk:
         value = self.values[place]
         change = worse_by(level, value, self.larger_is_better)
         if not accepted and self._visits(place, change, threshold):
+            if (off := self._off_both_clusters(place)) is not None:
+                return off
             words = f"{change_in_words(change)}, at a level that was left again before"
             return Noisy(verdict=Verdict(word="same", sentence=words), state="green", against=self.usual[-1])
         if self.shifted is not None and not change > threshold:
@@ -304,7 +309,7 @@ class _Walk:
             self._leave(place)
         dismissed = [] if recovered else self.suspects  # what no second night confirmed is noise
         self.suspects, self.red_since = [], None
-        fast = -change > threshold and -change > self._clear(_outermost([-x for x in self.reached]))[1]
+        fast = -change > threshold and -change > self._clear(outermost_two([-x for x in self.reached]))[1]
         self.gains = [*self.gains, place] if fast else []
         if self.gains and recovered:
             self.usual, self.level_since = self.usual[-1:], self.usual[-1:]
@@ -347,7 +352,7 @@ class _Walk:
     def _outermost(self) -> list[float]:
         """The largest two deviations that nights which hold have reached."""
         if self._known_outermost is None or self._known_outermost[0] is not self.reached:
-            self._known_outermost = self.reached, _outermost(self.reached)
+            self._known_outermost = self.reached, outermost_two(self.reached)
         return self._known_outermost[1]
 
     def _shift(self, suspects: Sequence[int] = ()) -> Noisy | None:
@@ -361,9 +366,8 @@ class _Walk:
         near = self._nearby(level, suspects)
         if near < LEAST:
             return None  # most nights: nothing to count
-        nights = [i for i in (*self.level_since, *suspects) if math.isfinite(self._cost(self.values[i]))]
-        found = shift([self._cost(self.values[i]) for i in nights], clusters_only=near < deviation)
-        if found is None or found.change <= self._tolerates(level):
+        nights, found = self._looked_at((*self.level_since, *suspects), clusters_only=near < deviation)
+        if found is None:
             return None
         self.level_since, nights = nights[: -found.span], nights[-found.span :]
         self.usual = [i for i in self.usual if i not in nights] or self.level_since[-WINDOW:]
@@ -374,11 +378,38 @@ class _Walk:
             if known is not None or been is not None:
                 self.visits.begin(nights, been)
                 return None
-        self.red_since, self.shifted = nights[0], (nights[0], found.change)
+        return self._shifted(found, nights[0])
+
+    def _off_both_clusters(self, place: int) -> Noisy | None:
+        """Red if nights that seem to visit a level lie above both of two clusters, of which it is one."""
+        first, (level, _) = max(self.start, place - BASE - max(SPANS)), self._spread()
+        last = self.values[place - min(SPANS) + 1 : place + 1]
+        off = (worse_by(level, value, self.larger_is_better) for value in last)
+        if not sum(map(self.visits.above_the_nearest, off)) > 0.5 * LEAST * len(last):
+            return None  # most nights: at one of the levels
+        nights, found = self._looked_at(range(first, place + 1), clusters_only=True)
+        if found is None or not found.apart:
+            return None
+        nights = nights[-found.span :]
+        if not (usual := [i for i in self.usual if i not in nights]):
+            return None
+        self.usual, self.level_since = usual, [i for i in self.level_since if i not in nights]
+        self.visits.end()
+        return self._shifted(found, nights[0])
+
+    def _looked_at(self, places: Sequence[int], clusters_only: bool) -> tuple[list[int], Shift | None]:
+        """Those of the nights that have a value, and the shift of the last ones, if it is not tolerated."""
+        nights = [i for i in places if math.isfinite(self._cost(self.values[i]))]
+        age = self.ages[places[-1]] - self.ages[self.start]
+        found = shift([self._cost(self.values[i]) for i in nights], clusters_only, age)
+        told = found is not None and found.change > self._tolerates(self._spread()[0])
+        return nights, found if told else None
+
+    def _shifted(self, found: Shift, since: int) -> Noisy:
+        self.red_since, self.shifted = since, (since, found.change)
         words = f"{change_in_words(found.change)} over {found.span} nights, by chance once in {1.0 / found.probability:.0e}"
-        return self._red(
-            Verdict(word="regressed", sentence=words, name="slower", decades=math.log10(1.0 + found.change))
-        )
+        decades = math.log10(1.0 + found.change)
+        return self._red(Verdict(word="regressed", sentence=words, name="slower", decades=decades))
 
     def _nearby(self, level: float, suspects: Sequence[int]) -> float:
         """How far the last few nights of the level lie off, suspects among them."""
@@ -404,7 +435,7 @@ class _Walk:
         """The nights that are usual, their level and noise, and how many of them have a value."""
         if self._known_spread is None or self._known_spread[0] is not self.usual:
             values = [self.values[i] for i in self.usual]
-            self._known_spread = self.usual, _level_and_noise(values), sum(map(math.isfinite, values))
+            self._known_spread = self.usual, level_and_noise(values), sum(map(math.isfinite, values))
         return self._known_spread
 
     def _clear(self, outermost: Sequence[float]) -> Usual:
@@ -466,22 +497,3 @@ class _Walk:
         self.crept = max(self.crept, change)
         words = f"{change_in_words(change)}, little by little since the last release"
         return Verdict(word="regressed", sentence=words, name="drift")
-
-
-def _outermost(reached: Sequence[float]) -> list[float]:
-    """The largest two, the largest first."""
-    if len(reached) < 2:
-        return list(reached)
-    largest = max(reached)
-    rest = list(reached)
-    rest.remove(largest)
-    return [largest, max(rest)]
-
-
-def _level_and_noise(values: Sequence[float]) -> tuple[float, float]:
-    """The median, and the relative standard deviation that the median deviation from it tells."""
-    finite = values if all(map(math.isfinite, values)) else list(filter(math.isfinite, values))
-    level = median(finite) if finite else math.inf
-    if level in (0.0, math.inf):
-        return level, 0.0
-    return level, NORMAL * median([abs(value - level) for value in finite]) / abs(level)

@@ -386,7 +386,8 @@ def _judge_times(
     old = Verdict(word="same", sentence="too long ago to be judged again")
     for every in lanes_of(history, _clock):
         loud = {place: why for place in every if (why := unquiet(history[place]))}
-        again = [every[i] for i in looked_at_again(len(every), NOISY_NIGHTS)]
+        looked_at = looked_at_again(len(every), NOISY_NIGHTS)
+        again = [every[i] for i in looked_at]
         for place in (*sorted(set(every) - set(again)), *loud):
             own = standing(definition, history[place].sample)
             said = Verdict(word="not_comparable", sentence=loud[place]) if place in loud else old
@@ -405,6 +406,7 @@ def _judge_times(
             accepted=[level is not None for level in taken],
             tolerance=definition.relative_tolerance,
             absolute=definition.tolerance,
+            ages=[i for i in looked_at if every[i] not in loud],
         )
         for i, noisy in enumerate(verdicts):
             if noisy.state in ("detected", "suspected") and is_read_off(definition):

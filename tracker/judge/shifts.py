@@ -4,7 +4,8 @@ Under "nothing happened" every choice of m nights among all is as likely to be t
 the distribution: clusters, spikes and tails included (Pitman 1937). The share of choices whose sum is at least
 as large as that of the last m is counted exactly, by sums over choices of a fixed size on a grid. Nights that
 remember each other are not exchangeable: the shift must also stand clear of a t test whose standard error and
-degrees of freedom follow their autocorrelation.
+degrees of freedom follow their autocorrelation. Of nights that look independent and normal the fewest nights, and
+those off two clusters, need no permutation: Student's test decides (tracker/judge/normal_nights.py).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from spook_tracker.tracker.document.middle import median_of_sorted
+from spook_tracker.tracker.judge.normal_nights import MEMORY, chance, student
 from spook_tracker.tracker.judge.slower import LEAST
 
 if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
@@ -28,7 +30,7 @@ BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
 RAREST = 1e-5  # of what no second test has to confirm
-RARER = 4.265  # standard deviations, by the t test: one in a hundred thousand
+LEARNING = 60  # nights: of a longer history, less is spent on each night
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
 CLIP = 6.0  # noises: what lies further out counts as if it lay there
 GRID = 300  # steps between the smallest and the largest value
@@ -38,7 +40,6 @@ APART = (
     5.0  # standard deviations inside two clusters between their middles; noise of one hump cut in two shows 3
 )
 FEWEST_CLUSTER, SMALLEST_CLUSTER = 6, 0.1  # nights, and share of all, in the smaller cluster
-MEMORY = (1, 5)  # lags, nights, at which nights that remember each other are noticed
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +56,20 @@ class Shift:
     apart: bool = False
 
 
-def shift(values: Sequence[float], clusters_only: bool = False) -> Shift | None:
+def spent(age: float) -> float:
+    """How rare a shift of normal nights has to be, so many nights after a series began.
+
+    `RARE` while it is young, then falling as one over the nights to `RAREST`: what is learnt about level and noise
+    makes up for it, and a thousand nights cost what `RAREST` in each of two spans does.
+    """
+    return max(RAREST, RARE * min(1.0, LEARNING / max(age, 1.0)))
+
+
+def shift(values: Sequence[float], clusters_only: bool = False, age: float = math.inf) -> Shift | None:
     """The most probable shift for the worse of the last nights, None if there is none. Worse is larger.
 
     Values are positive, of one level until the shift, oldest first. `clusters_only`: the last nights lie inside the
-    spread of all, so that only the smaller noise inside clusters can tell.
+    spread of all, so that only the smaller noise inside clusters can tell. `age`: nights since the series began.
     """
     import numpy as np
 
@@ -69,8 +79,8 @@ def shift(values: Sequence[float], clusters_only: bool = False) -> Shift | None:
         if len(base) < FEWEST_BASE or min(last) <= min(base):
             continue
         old, new = np.array(base), np.array(last)
-        every = None if clusters_only else _tried(old, new)
-        for tried in (every, _apart_from_clusters(old, new)):
+        every = None if clusters_only else _tried(old, new, spent(age) if span == min(SPANS) else 0.0)
+        for tried in (every, _apart_from_clusters(old, new, spent(age))):
             if tried is not None and (found is None or _tells_more(tried, found)):
                 found = tried
     return found
@@ -81,7 +91,7 @@ def _tells_more(one: Shift, other: Shift) -> bool:
     return (one.apart, -one.probability) > (other.apart, -other.probability)
 
 
-def _apart_from_clusters(base: Values, last: Values) -> Shift | None:
+def _apart_from_clusters(base: Values, last: Values, rare: float = RAREST) -> Shift | None:
     """The same where the nights before lie in two clusters: of how far each night lies off the nearer of them.
 
     Which cluster a night falls into is chance and says nothing; a change moves both, and what is left is small noise.
@@ -93,7 +103,7 @@ def _apart_from_clusters(base: Values, last: Values) -> Shift | None:
         return None
     low, high = split
     near = [nights / np.where(nights - low < high - nights, low, high) for nights in (base, last)]
-    tried = _tried(near[0], near[1])
+    tried = _tried(near[0], near[1], rare)
     change = float(np.mean(last) / np.mean(base)) - 1.0
     if tried is None or change <= LEAST:
         return None
@@ -115,7 +125,8 @@ def clusters(base: Values) -> tuple[float, float] | None:
     return middles if middles[1] - middles[0] > APART * inside else None
 
 
-def _tried(base: Values, last: Values) -> Shift | None:
+def _tried(base: Values, last: Values, rare: float) -> Shift | None:
+    """`rare`: the probability at which normal nights need no permutation test; zero asks for one of all."""
     import numpy as np
 
     pooled = np.concatenate([base, last])
@@ -124,17 +135,25 @@ def _tried(base: Values, last: Values) -> Shift | None:
     if noise > 0.0:
         far = max(CLIP * noise, 2.0 * LEAST * middle)
         pooled = np.clip(pooled, middle - far, middle + far)
-        base, last = pooled[: len(base)], pooled[len(base) :]
-    level = float(np.mean(base))
-    rise = float(np.mean(last)) - level
+    near, off = pooled[: len(base)], pooled[len(base) :]
+    level = float(np.mean(near))
+    rise = float(np.mean(off)) - level
     if rise <= LEAST * level:
         return None
+    probability = _permuted(near, off, rise)
+    if probability is None and rare:
+        probability = by_chance if (by_chance := chance(base, last, rare)) < rare else None
+    return Shift(len(last), rise / level, probability) if probability is not None else None
+
+
+def _permuted(base: Values, last: Values, rise: float) -> float | None:
+    """The probability of such a rise whatever the noise is, None if it is not rare or nights remember each other."""
     at_random = not remembered(base) and clusters(base) is not None  # in two clusters: exchangeable indeed
     if not at_random and rise <= standard_error(base, len(last)):
         return None
     probability = permutation_probability(base, last)
     enough = RAREST if at_random else RARE
-    return Shift(len(last), rise / level, probability) if probability < enough else None
+    return probability if probability < enough else None
 
 
 def standard_error(base: Values, span: int) -> float:
@@ -170,18 +189,6 @@ def remembered(base: Values) -> float:
             found += (1.0 + 3.0 * found) / len(base)  # few nights show too little of it
             strongest = max(strongest, min(found, 1.0) ** (1.0 / lag))
     return min(strongest, 0.98)
-
-
-def student(freedom: float) -> float:
-    """The quantile of Student's t that is exceeded with one probability in 100 000 (Wallace 1959)."""
-    z = RARER * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0)
-    return math.sqrt(freedom * math.expm1(min(z * z / freedom, 700.0)))
-
-
-def exceeded(t: float, freedom: float) -> float:
-    """The probability that Student's t exceeds a value above zero: the inverse of `student` (Wallace 1959)."""
-    z = math.sqrt(freedom * math.log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)
-    return 0.5 * math.erfc(z / math.sqrt(2.0))
 
 
 def permutation_probability(base: Values, last: Values) -> float:

@@ -60,7 +60,7 @@ class Visits:
             if self.strayed < STRAYS:
                 self.staying.append(place)
                 return True, []
-            return False, self._end()
+            return False, self.end()
         if known is None or not stays:
             self.left(change)
             return False, []
@@ -68,16 +68,20 @@ class Visits:
         if len(self.staying) <= LONGER * known.longest:
             return True, []
         self.levels.remove(known)
-        return False, self._end()[:-1]
+        return False, self.end()[:-1]
 
     def left(self, change: float, counts: bool = True) -> None:
         """A visit that ended by itself, by a night so far off, tells more of its level where it counts."""
-        nights = self._end()
+        nights = self.end()
         known = self.known(self.size_of(nights), len(nights)) if nights else None
         if known is not None and counts and change < 0.5 * known.change:
             known.change += (self.size_of(nights) - known.change) / (known.times + 1)
             known.times += 1
             known.longest = max(known.longest, len(nights))
+
+    def above_the_nearest(self, change: float) -> float:
+        """How far a night that lies so far off is above the level it is nearest to, the usual one among them."""
+        return min((change - level for level in (0.0, *(known.change for known in self.levels))), key=abs)
 
     def add(self, change: float, nights: int) -> None:
         """A red stretch that ended by itself."""
@@ -93,7 +97,8 @@ class Visits:
         self.levels += [] if level is None else [level]
         self.staying = nights
 
-    def _end(self) -> list[int]:
+    def end(self) -> list[int]:
+        """The nights of a visit that is over, or was none."""
         nights, self.staying, self.strayed = self.staying, [], 0
         return nights
 

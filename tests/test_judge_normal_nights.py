@@ -1,0 +1,130 @@
+"""What independent normal nights do by chance, held to SciPy and to draws that no threshold was chosen by."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from spook_tracker.tracker.document.run_document import Point, Timing
+from spook_tracker.tracker.judge import normal_nights, series_history, shifts
+from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.normal_nights import chance, independent_and_normal
+from tests import noise_battery as battery
+from tests.synthetic_history import sample
+from tests.test_tracker_one_judge import night, seconds
+
+
+@pytest.mark.parametrize("count", [40, 61, 100])
+def test_the_scores_of_skewness_and_kurtosis_are_those_of_scipy(count: int) -> None:
+    for draws in (
+        np.random.default_rng(count).standard_normal(count),
+        np.random.default_rng(1).random(count) ** 4,
+    ):
+        skewed = normal_nights.skewness_score(float(stats.skew(draws)), count)
+        heavy = normal_nights.kurtosis_score(float(stats.kurtosis(draws, fisher=False)), count)
+
+        assert skewed == pytest.approx(stats.skewtest(draws).statistic)
+        assert heavy == pytest.approx(stats.kurtosistest(draws).statistic)
+
+
+def test_one_in_eight_of_independent_normal_histories_seems_another_and_most_others_do() -> None:
+    """A tenth by memory to the next night, fewer by that to the fifth beside it, a hundredth by each score."""
+    draws = np.random.default_rng(11)
+    normal = np.mean([independent_and_normal(draws.standard_normal(60)) for _ in range(1000)])
+
+    assert 0.9 * 0.9 * 0.98 - 0.04 < normal < 0.9 * 0.99 + 0.02
+    for name, most in (("only ever slower", 0.02), ("AR(1) .5, 2 %", 0.03), ("AR(1) .9, 5 %", 0.01), ("one night in five × 1.5", 0.05)):  # fmt: skip
+        seems = [independent_and_normal(battery.noise(name, 3000 + series, 100)) for series in range(100)]
+        assert np.mean(seems) <= most, name
+
+
+def test_chance_is_students_where_no_night_is_far_off_and_never_less() -> None:
+    base = np.random.default_rng(2).standard_normal(60)
+    assert independent_and_normal(base)
+    for rise in (1.0, 1.5, 2.0):
+        t = (rise - np.mean(base)) / (np.std(base, ddof=1) * math.sqrt(1 / 4 + 1 / 60))
+        assert chance(base, np.full(4, rise)) == pytest.approx(stats.t.sf(t, 59), rel=0.05)
+    assert chance(base, np.full(4, 3.5 * np.std(base) + 1.0)) == chance(base, np.full(4, 99.0))
+    assert chance(base, np.full(4, -1.0)) == 1.0
+    assert chance(base[:39], np.full(4, 2.0)) == 1.0  # too few to tell how they are distributed
+    assert chance(np.ones(60), np.full(4, 2.0)) == 1.0
+
+
+def test_of_nights_without_a_change_no_more_are_rare_than_their_probability_says() -> None:
+    draws = np.random.default_rng(12)
+    found = np.array([chance(draws.standard_normal(60), draws.standard_normal(4)) for _ in range(8000)])
+
+    for size in (0.02, 0.005):
+        assert np.mean(found < size) <= size + 3.0 * math.sqrt(size / len(found))
+
+
+def test_two_accidents_in_four_nights_are_no_shift_and_four_slow_nights_are() -> None:
+    """Two nights half as slow again, of which nothing was seen before, between two usual ones."""
+    for seed in range(20):
+        usual = list(map(float, 1.0 + 0.01 * np.random.default_rng(seed).standard_normal(60)))
+        assert shifts.shift([*usual, 1.0, 1.5, 1.0, 1.5], age=60) is None
+        assert shifts.shift([*usual, *[1.035] * 4], age=60) is not None
+
+
+def test_what_a_series_spends_falls_with_its_nights_and_a_thousand_cost_no_more_than_before() -> None:
+    """One in 100 000 of each of two spans is what was spent; their windows overlap, so three quarters of it."""
+    spent = [shifts.spent(age) for age in range(1, 1001)]
+
+    assert spent[:60] == [5e-5] * 60
+    assert all(after <= before for before, after in itertools.pairwise(spent))
+    assert spent[119] == pytest.approx(2.5e-5)
+    assert spent[299:] == [pytest.approx(1e-5)] * 701
+    assert sum(spent) <= 0.75 * 2 * 1000 * 1e-5
+    assert shifts.spent(0) == shifts.RARE
+
+
+def test_a_shift_is_told_by_a_young_series_that_an_old_one_takes_for_chance() -> None:
+    """The same nights, one in 30 000 by chance, after sixty and at the end of a thousand of which they are the last."""
+    base = np.random.default_rng(2).standard_normal(60)
+    rise = float(np.mean(base)) + stats.t.isf(1 / 30_000, 59) * np.std(base, ddof=1) * math.sqrt(
+        1 / 4 + 1 / 60
+    )
+    values = [float(1.0 + 0.01 * off) for off in [*base, rise - 0.2, rise + 0.2, rise - 0.2, rise + 0.2]]
+
+    young = judge_noisy(values)
+    old = judge_noisy(values, ages=[0, *range(937, 1000)])
+    assert young[-1].state == "detected"
+    assert young[-1].first_bad == 60
+    assert old[-1].state == "green"
+
+
+def test_nights_that_are_not_looked_at_again_make_a_series_no_younger(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    definition = seconds(1.0)[0][0]
+    found = sample(definition, 1.0, timing=Timing(seconds=(1.0, 1.0), runs_per_repeat=1))
+    points = [Point(night(n, [(definition, found)]), found, definition.test_version) for n in range(100)]
+    asked = []
+
+    def judged(values: Any, *, ages: Any, **options: Any) -> Any:
+        asked.append(list(ages))
+        return judge_noisy(values, ages=ages, **options)
+
+    monkeypatch.setattr(series_history, "NOISY_NIGHTS", 70)
+    monkeypatch.setattr(series_history, "judge_noisy", judged)
+    series_history.judge_history(definition.key, definition, points)
+
+    assert asked == [[0, *range(16, 100)]]  # where the last ones begin moves by sixteen
+
+
+def test_a_step_off_two_clusters_is_seen_though_one_of_them_is_visited() -> None:
+    """Where one cluster is usual and the other is visited, nights above both seemed a visit for as long as they came."""
+    found = silent = 0
+    for series in range(40):
+        values = list(map(float, battery.step("+10 % on clusters 8 % apart", 5000 + series, 60, 6)))
+        told = [night.state for night in judge_noisy(values)]
+        found += "detected" in told[60:]
+        silent += "detected" not in told[30:60]
+
+    assert found >= 37
+    assert silent == 40
