@@ -43,6 +43,15 @@ def test_one_in_eight_of_independent_normal_histories_seems_another_and_most_oth
         assert np.mean(seems) <= most, name
 
 
+def test_heavy_tails_on_both_sides_are_not_normal() -> None:
+    half = 0.1 + np.abs(np.random.default_rng(3).standard_t(2, 30))
+    both = np.random.default_rng(4).permutation([*half, *-half])
+
+    assert abs(stats.skew(both)) < 1e-9
+    assert stats.kurtosistest(both).statistic > 3.0
+    assert not independent_and_normal(both)
+
+
 def test_chance_is_students_where_no_night_is_far_off_and_never_less() -> None:
     base = np.random.default_rng(2).standard_normal(60)
     assert independent_and_normal(base)
@@ -93,6 +102,9 @@ def test_a_shift_is_told_by_a_young_series_that_an_old_one_takes_for_chance() ->
 
     young = judge_noisy(values)
     old = judge_noisy(values, ages=[0, *range(937, 1000)])
+    accepted = [night == 1 for night in range(65)]  # with it a series begins anew
+    anew = judge_noisy([0.3 * values[0], *values], ages=[0, *range(937, 1001)], accepted=accepted)
+    assert anew[-1].state == "detected"
     assert young[-1].state == "detected"
     assert young[-1].first_bad == 60
     assert old[-1].state == "green"
@@ -128,3 +140,11 @@ def test_a_step_off_two_clusters_is_seen_though_one_of_them_is_visited() -> None
 
     assert found >= 37
     assert silent == 40
+
+
+@pytest.mark.parametrize("series", [20148, 20180, 20381, 20398])
+def test_a_visit_hides_no_step(series: int) -> None:
+    """In these the step seemed a visit to the slower cluster from its second night on."""
+    values = list(map(float, battery.step("+10 % on clusters 8 % apart", series, 60, 6)))
+
+    assert "detected" in [night.state for night in judge_noisy(values)[60:]]
