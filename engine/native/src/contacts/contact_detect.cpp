@@ -22,6 +22,7 @@ bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); 
 constexpr std::size_t most_grown = 256;  // bodies looked for one by one: beyond, all anew is cheaper
 constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
 constexpr double vanishing = 1e-8;       // a direction so steep on the surface has no shadow
+constexpr double steep = 0.9;            // of normals: up to it another side, or an edge of one
 constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
 
 }  // namespace
@@ -74,6 +75,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     std::fill(event_time_.begin(), event_time_.end(), -1.0);
     std::fill(supported_.begin(), supported_.end(), 0);
     std::fill(depth_.begin(), depth_.end(), 0.0);
+    std::fill(sinking_.begin(), sinking_.end(), 0.0);
     correction_.clear();
     parting_.velocity.clear();
     points_.clear();
@@ -217,8 +219,8 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) c
     point.stretch[1] = across / point.material.friction;
 }
 
-/// The overlap at which a pair counts as met. Bodies sunk into a seamless support meet the sides of its next part as
-/// deep as they are sunk; round shapes and planes have no sides.
+/// The overlap at which a pair counts as met. Bodies sunk into a seamless support, or sinking while sweeps have not
+/// settled, meet the sides of its next part as deep as they are sunk; round shapes and planes have no sides.
 double ContactStage::slop(const OpenPair& open) const noexcept {
     const int a = open.first, b = open.second;
     const ShapeKind one = detection_.collider(open.pair.first).shape.kind;
@@ -226,7 +228,7 @@ double ContactStage::slop(const OpenPair& open) const noexcept {
     const bool balls = one == ShapeKind::sphere && two == ShapeKind::sphere;
     const bool sides = !balls && one != ShapeKind::plane && two != ShapeKind::plane;
     return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
-           (sides ? 2.0 * std::max(depth_[a], depth_[b]) : 0.0);
+           (sides ? 2.0 * std::max(depth_[a] + sinking_[a], depth_[b] + sinking_[b]) : 0.0);
 }
 
 /// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first

@@ -46,6 +46,18 @@ void ContactStage::hand_over() {
     }
 }
 
+/// How much deeper into what supports them bodies would go with the velocities so far.
+void ContactStage::note_sinking() {
+    std::fill(sinking_.begin(), sinking_.end(), 0.0);
+    for (const Point& point : points_) {
+        if (point.strike >= 0.0) continue;
+        const Contact& contact = point.contact;
+        const double closing = -relative(point, contact.point.normal, next_, false);
+        const double sinking = options_.time_step * closing - std::max(0.0, contact.point.gap);
+        for (const int b : {contact.first, contact.second}) sinking_[b] = std::max(sinking_[b], sinking);
+    }
+}
+
 /// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
 bool ContactStage::find_more() {
     const bool first = next_.empty();  // look of this step
@@ -57,6 +69,7 @@ bool ContactStage::find_more() {
         next_[b] = now;
     }
     if (outrun(next_)) find_open_again();
+    if (swings_) note_sinking();
     const std::size_t known = points_.size();
     const bool turned = find_turned(next_);
     const std::size_t taken = points_.size();

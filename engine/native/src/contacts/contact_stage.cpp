@@ -72,6 +72,7 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     jointed_.assign(bodies, 0);
     supported_.assign(bodies, 0);
     depth_.assign(bodies, 0.0);
+    sinking_.assign(bodies, 0.0);
     lead_.assign(bodies, 0.0);
     event_time_.assign(bodies, -1.0);
     ball_ = detection_.balls();

@@ -290,6 +290,7 @@ private:
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
     bool find_more();
+    void note_sinking();
     bool is_settled(MixedSystem& system);
     void hand_over();
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
@@ -351,6 +352,7 @@ private:
     std::vector<int> grown_;       // whom it was widened for
     std::vector<char> supported_;  // bodies with a closed contact
     std::vector<double> depth_;    // of a body's closed contacts, m
+    std::vector<double> sinking_;  // what sweeps that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
