@@ -24,6 +24,22 @@ FrictionReport sweep(const ContactOptions& o, FrictionModel model, MixedSystem& 
                : solve_hybrid(island, points, model, solver.pivot, o.iterations, o.residual_tolerance);
 }
 
+/// Whether an answer is one: an island on which next to nothing acts may have none to rounding.
+bool is_finite(const MixedSystem& system) {
+    const auto finite = [](double x) { return std::isfinite(x); };
+    for (const Vec6& v : system.velocity)
+        if (!std::all_of(v.begin(), v.end(), finite)) return false;
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) {
+            const bool good =
+                finite(block.right[i]) && finite(block.multiplier[i]) &&
+                std::all_of(block.first_jacobian[i].begin(), block.first_jacobian[i].end(), finite) &&
+                std::all_of(block.second_jacobian[i].begin(), block.second_jacobian[i].end(), finite);
+            if (!good) return false;
+        }
+    return true;
+}
+
 /// Sweeps; where they stop with few rows off by more than `enough`, as in the rough blow of an end whose pushing and
 /// rubbing turn it alike, more of them go in circles, and a direct solve costs little.
 FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, double enough,
@@ -35,7 +51,7 @@ FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, doub
     const double left = rows_residual(island, points, model).residual;
     if (!(left > enough)) return report;
     const FrictionReport direct = solve_friction_direct(start, fresh, model, solver);
-    if (direct.finite && rows_residual(start, fresh, model).residual < left) {
+    if (direct.finite && is_finite(start) && rows_residual(start, fresh, model).residual < left) {
         island = std::move(start), points = std::move(fresh);
         for (const FrictionPoint& point : points)  // what is left is the direct solver's own
             for (int i = point.row; i < point.row + point.size; ++i)
@@ -161,7 +177,7 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
         still_right(system, points, model))
         return {};
     // What a resting solve leaves, the next step sees; what a blow leaves stays.
-    const double enough = &islands == &impact_solver_ ? 0.0 : o.unsettled_residual;
+    const double enough = &islands == &impact_solver_ ? o.residual_tolerance : o.unsettled_residual;
     const FrictionReport report = islands.run(
         system, points,
         [&o, model, enough](MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
