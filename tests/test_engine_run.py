@@ -11,6 +11,7 @@ import pytest
 
 from spook_tracker.engine import (
     WORLD,
+    Ball,
     Box,
     ContactForce,
     Distance,
@@ -33,6 +34,7 @@ from spook_tracker.engine import (
     SceneError,
     SimulationFailed,
     Sphere,
+    Table,
     Trace,
     Velocity,
     compile,
@@ -269,6 +271,30 @@ def test_a_run_that_fails_says_so_and_can_go_back() -> None:
 
         assert run.result().completed
         assert run.steps == 11
+
+
+def test_what_a_failed_run_counts_is_the_work_of_its_steps_however_long_its_blocks_were() -> None:
+    """A block that ends unfit is taken back and taken step by step; how long it is follows the clock."""
+    ends = [
+        RigidBody(name=name, mass=1.0, position=(x, 0.0, 0.0), inertia=(1.0, 2.0, 3.0))
+        for name, x in (("a", 0.1), ("b", 1.0))
+    ]
+    jump = Table((0.0, 0.49, 0.5, 9.0), (0.0, 0.0, 1.0, 1.0))
+    scene = Scene(
+        bodies=tuple(ends),
+        constraints=(Ball(name="joint", between=("a", "b"), at=(0.5, 0.3, 0.1)),),
+        forces=(Load(name="blast", body="a", force=(1e300, 0.0, 0.0), factor=jump),),
+    )
+    whole = simulate(scene, time_step=0.01, steps=400)
+    with start(scene, time_step=0.01) as run, pytest.raises(SimulationFailed) as failed:
+        for _ in range(400):
+            run.step()
+    stepwise = failed.value.result
+
+    assert whole.status == stepwise.status == "diverged"
+    assert whole.steps == stepwise.steps == 50
+    for work in ("factorisations", "block_operations", "back_substitutions"):
+        assert whole.counters[work] == stepwise.counters[work] > 0, work
 
 
 def test_a_time_limit_takes_the_unfinished_block_back() -> None:

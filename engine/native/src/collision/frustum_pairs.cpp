@@ -19,8 +19,14 @@ Manifold meet(const Frustum& frustum, const Other& other, double radius, double 
     const double smallest = std::min(frustum.thickness, thickness), slop = overlay_slop * smallest;
     const double tie = prefer_flat * smallest;
     const auto lines_along = [&](const PartingAxis& axis) noexcept {
-        return lines(farthest_line(frustum, axis.normal, slop), line_of(axis, slop), axis.normal, axis.gap,
-                     radius, margin);
+        const Segment theirs = line_of(axis, slop);
+        Manifold met =
+            lines(farthest_line(frustum, axis.normal, slop), theirs, axis.normal, axis.gap, radius, margin);
+        // Of a needle rounding may choose the wrong end: the whole line then.
+        if (met.count == 0)
+            met = lines(farthest_line(frustum, axis.normal, HUGE_VAL), theirs, axis.normal, axis.gap, radius,
+                        margin);
+        return met;
     };
     if (axes.curved.gap <= axes.flat.gap + tie) {
         const PartingAxis& axis = axes.flat;

@@ -175,6 +175,7 @@ void RigidSystem::reset(StageClock* clock) {
     joints_.breaks.clear();
     clock_ = clock;
     rounds_ = sweeps_ = 0;
+    work_kept_ = work_taken_back_ = {};
     residual_ = 0.0;
     pivot_ = PivotSolver{};
     pivot_.floor = method_.floor;
@@ -331,6 +332,32 @@ std::vector<double> RigidSystem::final_state() {
     return out;
 }
 
+RigidSystem::Work RigidSystem::Work::operator+(const Work& more) const noexcept {
+    return {{factors.factorisations + more.factors.factorisations,
+             factors.block_operations + more.factors.block_operations,
+             factors.floored_pivots + more.factors.floored_pivots, factors.solves + more.factors.solves},
+            rounds + more.rounds,
+            sweeps + more.sweeps};
+}
+
+RigidSystem::Work RigidSystem::Work::operator-(const Work& less) const noexcept {
+    return {{factors.factorisations - less.factors.factorisations,
+             factors.block_operations - less.factors.block_operations,
+             factors.floored_pivots - less.factors.floored_pivots, factors.solves - less.factors.solves},
+            rounds - less.rounds,
+            sweeps - less.sweeps};
+}
+
+RigidSystem::Work RigidSystem::work_done() const noexcept {
+    const LockedTree::Counters locked = locked_.counters();
+    Work done{matrix_.counters(), rounds_, sweeps_};
+    done = done + Work{pivot_.counters()};
+    done = done + Work{{locked.factorisations, locked.block_operations, 0, locked.solves}};
+    const auto readings = static_cast<std::uint64_t>((1 + method_.refinements) * (1 + method_.corrections));
+    done = done + Work{{plane_solves_, plane_solves_ * plane_.blocks(), 0, plane_solves_ * readings}};
+    return contacts_ ? done + Work{contacts_->factor_counters()} : done;
+}
+
 void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     const std::int64_t substeps = steps * method_.substeps;
     for (const Break& at : joints_.breaks)
@@ -339,23 +366,8 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     report.counters["steps"] = steps;
     report.counters["substeps"] = substeps;
     report.counters["rows_assembled"] = static_cast<std::int64_t>(rows_) * substeps;
-    BlockLdlt::Counters work = matrix_.counters();
-    const auto add = [&work](const BlockLdlt::Counters& more) {
-        work.factorisations += more.factorisations;
-        work.block_operations += more.block_operations;
-        work.floored_pivots += more.floored_pivots;
-        work.solves += more.solves;
-    };
-    add(pivot_.counters());
-    const LockedTree::Counters locked = locked_.counters();
-    work.factorisations += plane_solves_;
-    work.block_operations += plane_solves_ * plane_.blocks();
-    work.solves +=
-        plane_solves_ * static_cast<std::uint64_t>((1 + method_.refinements) * (1 + method_.corrections));
-    work.factorisations += locked.factorisations;
-    work.block_operations += locked.block_operations;
-    work.solves += locked.solves;
-    if (contacts_) add(contacts_->factor_counters());
+    const Work done = work_done() - work_taken_back_;
+    const BlockLdlt::Counters& work = done.factors;
     const auto put = [&report](const char* name, std::uint64_t value) {
         report.counters[name] = static_cast<std::int64_t>(value);
     };
@@ -363,8 +375,8 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("block_operations", work.block_operations);
     put("floored_pivots", work.floored_pivots);
     put("back_substitutions", work.solves);
-    put("pivot_rounds", rounds_);
-    put("sweeps", sweeps_);
+    put("pivot_rounds", done.rounds);
+    put("sweeps", done.sweeps);
     if (composed_) {
         report.counters["newton_iterations"] = live_.newton_iterations;
         report.counters["halved_steps"] = live_.halved_steps;
@@ -393,7 +405,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("corrections", contact.corrections);
     put("friction_rounds", contact.friction_rounds);
     put("pivots", contact.pivots);
-    put("sweeps", sweeps_ + contact.sweeps);
+    put("sweeps", done.sweeps + contact.sweeps);
     put("unsettled_solves", contact.unsettled);
 }
 

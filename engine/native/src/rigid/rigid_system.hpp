@@ -52,9 +52,13 @@ public:
     void advance(std::int64_t steps);
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const;
-    void save() { keep(saved_); }
+    void save() {
+        keep(saved_);
+        work_kept_ = work_done();
+    }
     void restore() {
         go_back(saved_);
+        work_taken_back_ = work_taken_back_ + (work_done() - work_kept_);
         replaying_ = true;
         early_joints_.clear();
     }
@@ -438,6 +442,17 @@ private:
     static constexpr int MOST_HALVINGS = 12;
     LargeArray<BodyState> step_start_[MOST_HALVINGS];
     std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;
+
+    /// Work whose counters go_back() leaves alone, of solvers that are in no memory. How much of it blocks take back
+    /// depends on how long they are, and that on the clock: it is no work of the run.
+    struct Work {
+        BlockLdlt::Counters factors;
+        std::uint64_t rounds = 0, sweeps = 0;
+        Work operator+(const Work& more) const noexcept;
+        Work operator-(const Work& less) const noexcept;
+    };
+    Work work_done() const noexcept;
+    Work work_kept_, work_taken_back_;
     StageClock* clock_ = nullptr;
 };
 
