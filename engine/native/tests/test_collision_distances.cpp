@@ -191,9 +191,32 @@ void rims_are_nearest_in_any_quarter() {
         }
 }
 
+/// A wide disc, the base of a cylinder or a cone, that leans by 1e-2 to 1e-10 on a plane: its lowest place is in closed form.
+void discs_that_hardly_lean_are_met_at_their_lowest_place() {
+    Draw draw(5);
+    for (int round = 0; round < 4000; ++round) {
+        const Vec3 up = draw.direction(), side = any_normal_to(up);
+        const double lean = std::pow(10.0, -2.0 - 8.0 * draw.share()), radius = 806.0;
+        const Vec3 axis = (1.0 / std::sqrt(1.0 + lean * lean)) * (up + lean * side), x = any_normal_to(axis),
+                   y = cross(axis, x);
+        for (const bool cone : {false, true}) {
+            const Primitive disc = cone ? Primitive::cone(radius, 1.0) : Primitive::cylinder(radius, 1.0);
+            const Pose at{{}, {x.x, y.x, axis.x, x.y, y.y, axis.y, x.z, y.z, axis.z}};
+            const double low = cone ? -0.5 * disc.half_length : -disc.half_length;
+            const double lowest = low * dot(up, axis) - radius * norm(cross(up, axis));
+            const Manifold found = collide(disc, at, Primitive::plane(up), Pose{}, 100.0);
+            double deepest = HUGE_VAL;
+            for (int k = 0; k < found.count; ++k)
+                deepest = std::min(deepest, found.points[static_cast<std::size_t>(k)].gap);
+            EXPECT_NEAR(deepest, lowest, 2e-12 * radius);
+        }
+    }
+}
+
 }  // namespace
 
 int main() {
+    discs_that_hardly_lean_are_met_at_their_lowest_place();
     rims_are_nearest_in_any_quarter();
     nothing_touches_beyond_the_margin_and_what_is_apart_is_told_apart();
     nothing_that_is_apart_is_pushed_through_a_sheet();

@@ -12,6 +12,18 @@ inline double cylinder_reach(const Primitive& cylinder, Vec3 axis, Vec3 n) noexc
     return cylinder.half_length * std::abs(dot(n, axis)) + cylinder.radius * norm(cross(n, axis));
 }
 
+/// What lies across an axis but for rounding, as a unit vector that does; `otherwise` where only rounding is left.
+inline Vec3 unit_across(Vec3 v, Vec3 axis, Vec3 otherwise) noexcept {
+    const double length = norm(v);
+    if (!(length > 0.0)) return otherwise;
+    const Vec3 unit = (1.0 / length) * v;
+    if (std::abs(dot(unit, axis)) <= 1e-12) return unit;
+    const Vec3 again =
+        unit - dot(unit, axis) * axis;  // v is so short that rounding has a part along the axis
+    const double left = norm(again);
+    return left > 0.5 ? (1.0 / left) * again : otherwise;
+}
+
 /// The point of a cylinder nearest to `p`, both in its own axes; inside the height is negative.
 Nearest nearest_on_cylinder(const Primitive& cylinder, Vec3 p) noexcept;
 

@@ -13,8 +13,8 @@ Manifold cylinder_plane(const Primitive& cylinder, const Pose& at, const Primiti
                         const Pose& at_plane, double margin) noexcept {
     const Vec3 n = at_plane.rotation * plane.normal, axis = column(at.rotation, 2);
     const Vec3 level = -n + dot(n, axis) * axis;
-    const double lean = norm(level);
-    const Vec3 down = lean > 1e-12 ? (1.0 / lean) * level : column(at.rotation, 0);
+    const Vec3 flat = column(at.rotation, 0);
+    const Vec3 down = norm(level) > 1e-12 ? unit_across(level, axis, flat) : flat;
     const Vec3 aside = cross(axis, down);
     const Vec3 spokes[4] = {down, aside, -down, -aside};
     Manifold manifold;

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "collision/cylinder.hpp"
 #include "collision/segment.hpp"
 #include "collision/solid_pairs.hpp"
 #include "collision/triangle.hpp"
@@ -291,20 +292,11 @@ Frustum::Frustum(const Primitive& primitive, const Pose& at) noexcept
     thickness = std::min(rise, 2.0 * primitive.radius);
 }
 
-Vec3 Frustum::unit_across(Vec3 v) const noexcept {
-    const double length = norm(v);
-    if (!(length > 0.0)) return sideways;
-    const Vec3 unit = (1.0 / length) * v;
-    if (std::abs(dot(unit, axis)) <= 1e-12) return unit;
-    const Vec3 again = radial(unit);  // v is so short that rounding has a part along the axis
-    const double left = norm(again);
-    return left > 0.5 ? (1.0 / left) * again : sideways;
-}
+Vec3 Frustum::unit_across(Vec3 v) const noexcept { return spook::unit_across(v, axis, sideways); }
 
 Vec3 Frustum::outward(Vec3 n) const noexcept {
     const Vec3 across = radial(n);
-    const double long_enough = norm(across);
-    return long_enough > 1e-12 ? (1.0 / long_enough) * across : sideways;
+    return norm(across) > 1e-12 ? unit_across(across) : sideways;
 }
 
 Facets::Facets(const Primitive& primitive, const Pose& at) noexcept {
