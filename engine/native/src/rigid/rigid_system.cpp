@@ -353,7 +353,8 @@ RigidSystem::Work RigidSystem::work_done() const noexcept {
     Work done{matrix_.counters(), rounds_, sweeps_};
     done = done + Work{pivot_.counters()};
     done = done + Work{{locked.factorisations, locked.block_operations, 0, locked.solves}};
-    const auto readings = static_cast<std::uint64_t>((1 + method_.refinements) * (1 + method_.corrections));
+    const std::uint64_t readings = (1 + static_cast<std::uint64_t>(method_.refinements)) *
+                                   (1 + static_cast<std::uint64_t>(method_.corrections));
     done = done + Work{{plane_solves_, plane_solves_ * plane_.blocks(), 0, plane_solves_ * readings}};
     return contacts_ ? done + Work{contacts_->factor_counters()} : done;
 }
