@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 from sqlalchemy import make_url
 from sqlalchemy.orm import Session
 
+from spook_tracker.tracker.cli.console import PIPE_WIDTH
 from spook_tracker.tracker.store.database import open_database
 from tests import postgresql
 from tests.browser import MISSING, browser, programs
@@ -20,6 +22,9 @@ from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  #
 # A shell starts what runs behind it deaf to the keyboard; what tests start is to hear it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# As wide as a pipe, wherever the tests run: pytest's workers say 80 of themselves.
+os.environ["COLUMNS"] = str(PIPE_WIDTH)
 
 # Minutes of work in few tests: they start first, so that all workers end at about the same time.
 LONG = ("tracker_publish", "scalar_tests_limits", "scalar_tests_answers", "tracker_durability", "tracker_history_machine",

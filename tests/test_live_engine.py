@@ -9,6 +9,7 @@ import base64
 import itertools
 import json
 import math
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -231,3 +232,14 @@ def test_the_order_a_reader_sees_is_that_of_the_method(answers):
     assert plain == pytest.approx(1.0, abs=0.05)
     assert round(first_seen) == 1
     assert fourth == pytest.approx(4.0, abs=0.05)
+
+
+def test_the_page_has_a_word_for_every_outcome():
+    """By number: a word too few, and a reader sees "undefined after 240 steps"."""
+    named = (ROOT / "engine" / "native" / "src" / "run" / "report.hpp").read_text()
+    outcomes = re.search(r"SPOOK_NAMED_ENUM\(Status, ([^)]*)\)", named)[1].split(", ")
+    page = (ROOT / "site" / "static" / "live-engine.js").read_text()
+
+    words = json.loads(re.search(r"const STATUS = (\[.*\]);", page)[1])
+
+    assert words == [outcome.replace("_", " ") for outcome in outcomes]

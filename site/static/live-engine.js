@@ -4,7 +4,7 @@
 
 const SOLVERS = ["direct", "iterative", "hybrid"];
 const FRICTIONS = ["cone", "box", "scaled_box"];
-const STATUS = ["completed", "diverged", "not finite", "took too long"];
+const STATUS = ["completed", "diverged", "not finite", "timed out", "unsettled"];
 const METHODS = {  // of particle scenes: what the step is asked for
   plain: {}, curved: { corrections: 1 }, "curved twice": { corrections: 2 },
   "order 4": { composition: 4 }, "order 6": { composition: 6 }, "order 8": { composition: 8 },

@@ -91,7 +91,7 @@ class LivePage {
     const drift = movie.energy.reduce((most, e) => Math.max(most, Math.abs(e - movie.energy[0])), 0);
     const largest = movie.violation ? movie.violation.reduce((most, g) => Math.max(most, Math.abs(g) || 0), 0) : null;
     const lines = [
-      ["outcome", movie.status === "completed" ? "completed" : `${movie.status} after ${movie.steps} steps`],
+      ["outcome", ["completed", "unsettled"].includes(movie.status) ? movie.status : `${movie.status} after ${movie.steps} steps`],
       ["steps", `${movie.steps} of h = ${figureOf(movie.timeStep)} s`],
       ["run time", `${figureOf(perStep * 1e6, 3)} µs a step, ${figureOf(movie.seconds * 1e3, 3)} ms in all`],
       ["largest change of energy", `${figureOf(drift)} J`],
