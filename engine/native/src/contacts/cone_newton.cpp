@@ -14,22 +14,18 @@ namespace {
 constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
 constexpr double known = 1e-13;                     // of a start that is an answer already
 constexpr double refined = 1e-16;                   // of the square of what Newton's direction is to answer
-constexpr double roughly = 1e-6;     // the same along the path, which only leads to the next point
-constexpr double start_blur = 0.07;  // of the largest natural map
-constexpr double nearest = 1.0;      // of the blur: how far units may be from the path, in the mean
-constexpr double narrow = 0.03;      // a step so short has lost the path
+constexpr double roughly = 1e-6;    // the same along the path, which only leads to the next point
+constexpr double start_blur = 0.2;  // of the largest natural map
+constexpr double nearest = 1.0;     // of the blur: how far units may be from the path, in the mean
+constexpr double narrow = 0.03;     // a step so short has lost the path
 // Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
 // however redundant the points; with the tightest, what holding leaves is rounding soon after.
 constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
-constexpr double behind = 10.0, slow = 0.1;  // of the blur, and of itself: what holding back leaves
-// Near the end, where steps leave little of what they found, what holding leaves is all there is: it is held less.
-constexpr double end = 1e-6, little = 0.1;  // a residual, of the speeds, and of itself
-constexpr double end_hold = 3e-6;
+constexpr double behind = 10.0, slow = 0.1;      // of the blur, and of itself: what holding back leaves
 constexpr double far = 1e-3;                     // a residual, of the speeds, from which the path may crawl
 constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
 constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
-constexpr int max_jumps = 3;                     // without half the least they met,
-constexpr double wild = 1e4;                     //   or one to so much more than that
+constexpr int max_jumps = 3;                     // without half the least they met
 constexpr int max_losses = 3;                    // of the path, sought again,
 constexpr double back = 10.0;                    //   so many blurs away
 constexpr double nearer = 0.1;                   //   and kept so much nearer to
@@ -362,8 +358,6 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         // Far behind the blur: what is held back is all that is left.
         if (left.map > behind * found.blur && left.map > slow * before.map)
             hold_ = std::max(0.1 * hold_, tightest_hold);
-        if (jumps < 0 && left.speed < end * speed_ && left.speed < little * before.speed)
-            hold_ = std::min(hold_, end_hold);
         before = left;
         if (found.along > 0.0) {
             met = found.blur;
@@ -382,7 +376,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         if (jumps >= 0) {
             jumps = left.speed < 0.5 * least ? 0 : jumps + 1;
             least = std::min(least, left.speed);
-            if (jumps < max_jumps && left.speed < wild * least) continue;
+            if (jumps < max_jumps) continue;
         }
         if (best.speed <= near_enough * speed_) break;
         // Begin anew, further from the end and more carefully.
