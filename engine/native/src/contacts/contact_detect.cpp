@@ -79,7 +79,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     correction_.clear();
     parting_.velocity.clear();
     points_.clear();
-    impact_needed_ = false;
+    impact_needed_ = plastic_first_ = false;
     impact_rounds_ = 0;
 
     for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
@@ -251,7 +251,7 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
 }
 
 /// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
-/// for an impact: if they need one, it is the next step's.
+/// for an impact: if they need one, late_blow_ tells so, see blows_come_first().
 int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     const double h = options_.time_step;
     int found = 0;
@@ -303,7 +303,8 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
         Point& point = points_.back();
         const double closing = -relative(point, contact.point.normal, velocity, false);
         const double push = relative(point, contact.point.normal, kick_, false);
-        if (late && point.material.restitution > 0.0 && closing > 4.0 * std::abs(push)) {
+        if (late && !plastic_first_ && point.material.restitution > 0.0 && closing > 4.0 * std::abs(push)) {
+            late_blow_ = true;
             points_.pop_back();
             continue;
         }
@@ -465,15 +466,34 @@ void ContactStage::measure_points() {
         point.bounce = -1.0;
         if (is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
-        } else if (speed > 0.0 && psi > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
-            const double left =
-                psi * psi - (1.0 - psi * psi) * 2.0 * (-point.push / h) * gap / (speed * speed);
+        } else if (plastic_first_ && point.impact > 0.0) {  // a blow of this step has brought them together
+            point.bounce = 0.0;
+        } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
+            const double ahead = 2.0 * (-point.push / h) * gap / (speed * speed);
+            const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
+            else if (plastic_first_) point.bounce = 0.0;
         }
         const double kick = norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second]));
         point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
-        if (point.bounce > 0.0 && speed > point.rounding) impact_needed_ = true;
+        impact_needed_ = impact_needed_ || is_blow(point);
     }
+}
+
+/// Whether a point is approached so that the impact is to answer it.
+bool ContactStage::is_blow(const Point& point) const noexcept {
+    const bool answered = point.bounce > 0.0 || (plastic_first_ && point.bounce == 0.0);
+    return answered && point.approach < -point.rounding;
+}
+
+/// Whether the bodies that a plastic blow sets in motion meet others with restitution in this very step. The resting rows
+/// that answer such blows know of no bounce: plastic ones, too, are then met before, so that these are found in time.
+bool ContactStage::blows_come_first() {
+    if (!late_blow_ || plastic_first_) return false;
+    plastic_first_ = true;
+    order_points();
+    measure_points();
+    return impact_needed_;
 }
 
 }  // namespace spook

@@ -234,8 +234,7 @@ void ContactStage::after_impact(const MixedSystem& system) {
     if (!successive) {  // who was hit already is not hit again
         impact_needed_ = false;
         for (const Point& point : points_)
-            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.strike >= 0.0 &&
-                                                point.bounce > 0.0 && point.approach < -point.rounding);
+            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.strike >= 0.0 && is_blow(point));
         if (impact_rounds_ >= simultaneous_rounds) impact_needed_ = false;
     } else {
         for (const Point& point : points_)

@@ -113,6 +113,7 @@ bool ContactStage::is_settled(MixedSystem& system) {
 bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     sweeps_.start(system, options_.friction);
     next_.clear();
+    late_blow_ = false;
     handed_over_ = 0;
     hand_over();
     FrictionReport report;
@@ -126,6 +127,16 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
         counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
         if (!report.finite || is_settled(system) || report.converged) break;
         if (turn + 1 >= joint_turns && joint_is_worst_) break;
+    }
+    if (report.finite && late_blow_) {  // by velocities on the way, it may be
+        late_blow_ = false;
+        for (std::size_t b = 0; b < unknown_.size(); ++b)
+            if (unknown_[b] >= 0) next_[b] = sweeps_.velocity(unknown_[b]);
+        changed_.assign(unknown_.size(), 1);
+        const std::size_t known = points_.size();
+        if (find_strikes(next_, true) > 0) take_back_strikes(known, next_);
+        if (blows_come_first()) return true;
+        points_.resize(known);
     }
     counters_.unsettled += !report.converged;
 

@@ -307,8 +307,11 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         if (outrun(next)) find_open_again();
         const bool turned = find_turned(next);
         const std::size_t taken = points_.size();
-        if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
-        else if (!turned) break;
+        late_blow_ = false;
+        const bool struck = find_strikes(next, true) > 0;
+        if (struck) take_back_strikes(taken, next);
+        if (blows_come_first()) return true;
+        if (!struck && !turned) break;
         counters_.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
             read_back(system.rows[joints + k], points_[k]);

@@ -10,7 +10,8 @@
 //                    −g/h                     for an open one: it may close, no more;
 //                  then pairs that touch only because of these impulses, or of what joints alone make of forces, are
 //                  looked for, and all is solved again
-//                  (the iterative solver looks between its sweeps, and gives them rows in the same solve);
+//                  (the iterative solver looks between its sweeps, and gives them rows in the same solve). If one of
+//                  these is to rebound, 2 comes again, with the plastic blows that set it in motion, then 3;
 //   4. parting     where the step ends, a displacement that parts overlapping bodies and leaves no trace in v.
 //
 // What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
@@ -251,6 +252,8 @@ private:
     void orient(Point& point, const Pose& first, const Pose& second) const;
     void find_open();
     void find_open_again();
+    bool is_blow(const Point& point) const noexcept;
+    bool blows_come_first();
     void look_at(const std::vector<IndexPair>& near);
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
@@ -364,6 +367,8 @@ private:
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
+    bool late_blow_ = false;      // a strike found after the solve needs an impact
+    bool plastic_first_ = false;  // plastic blows are met in the impact as well
     int impact_rounds_ = 0;
     double residual_ = 0.0, unsettled_by_ = 0.0;
     bool sunk_ = false;

@@ -407,17 +407,19 @@ void RigidSystem::impact() {
 void RigidSystem::solve_mixed(bool touching) {
     mixed_values_ = true;
     const auto blocks = joints_.blocks();
-    mixed_.rows.resize(blocks.size());
     fill_masses();
     if (touching) lead_events();
-    while (touching && stages_.runs(Stage::impact) && contacts_->impact_needed()) impact();
-    fill_momenta(true);
-    fill_rows();
-    if (clock_) clock_->mark(Stage::assemble_rows);
-
+    const auto blow = [&] { return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(); };
     bool finite = true;
+    do {
+        mixed_.rows.resize(blocks.size());
+        while (blow()) impact();
+        fill_momenta(true);
+        fill_rows();
+        if (clock_) clock_->mark(Stage::assemble_rows);
+        if (touching) finite = contacts_->solve(mixed_, velocities_);
+    } while (finite && blow());  // the solve may find some that is to come first
     if (touching) {
-        finite = contacts_->solve(mixed_, velocities_);
         judge_contacts();
     } else if (solver_ == RigidSolver::iterative) {
         std::vector<FrictionPoint> none;
