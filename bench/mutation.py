@@ -72,6 +72,7 @@ MUTANTS = (
     mutant("old-series-spend-as-young", "shifts", "RARE * min(1.0, LEARNING / max(age, 1.0))", "RARE"),
     mutant("normal-nights-need-a-permutation", "shifts", "if (by_chance := chance(base, last, rare)) < rare else None", "if (by_chance := 1.0) < rare else None"),
     mutant("a-visit-hides-a-step", "noise", "if found is None or not found.apart:", "if True:"),
+    mutant("red-nights-stay-usual", "noise", "self.usual, self.level_since = usual, [i for", "self.level_since = [i for"),
     mutant("all-nights-are-of-one-age", "noise", "self.ages[places[-1]] - self.ages[self.start]", "0"),
     mutant("bounded-is-growing", "verdict", '"bounded": 1, "growing": 2', '"bounded": 1, "growing": 1'),
     mutant("unknown-cell-is-best", "verdict", "CELL_RANK.get(cell, len(CELL_RANK))", "CELL_RANK.get(cell, 0)"),

@@ -148,3 +148,17 @@ def test_a_visit_hides_no_step(series: int) -> None:
     values = list(map(float, battery.step("+10 % on clusters 8 % apart", series, 60, 6)))
 
     assert "detected" in [night.state for night in judge_noisy(values)[60:]]
+
+
+@pytest.mark.parametrize("series", [20115, 20148, 20180, 20381, 20398])
+def test_no_night_of_a_step_off_two_clusters_is_the_last_good_one(series: int) -> None:
+    """In these its first nights were green at first, as usual or as a visit: red with the rest, they blame no later one."""
+    values = list(map(float, battery.step("+10 % on clusters 8 % apart", series, 60, 6)))
+
+    red = [night for night in judge_noisy(values) if night.state == "detected"]
+
+    assert red
+    for told in red:
+        assert told.last_good is not None and told.first_bad is not None
+        assert told.last_good < told.first_bad
+        assert told.against == told.last_good
