@@ -393,6 +393,37 @@ def test_boxes_that_fall_on_each_other_and_hardly_rebound_do_not_overlap(places:
     assert np.diff(run["energy"]).max() <= 1e-9 * run["energy"][0]
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("restitution", [0.0, 0.1, 0.9])
+def test_what_lies_on_a_body_that_the_floor_stops_does_not_fall_into_it(
+    restitution: float, solver: str
+) -> None:
+    """Both are 1 nm above what bears them and get g h in the same step, the upper one without approaching the lower
+    one before the floor stops that: it went on for g h^2 = 2.7 mm, and for twice that in the next step."""
+    made_of = Material(restitution=restitution)
+    boxes = [
+        RigidBody(
+            name=name,
+            mass=1.0,
+            shape=Box((0.2, 0.2, 0.2)),
+            position=(0.0, 0.0, height),
+            material=made_of,
+        )
+        for name, height in (("lower", 0.1 + 1e-9), ("upper", 0.3 + 2e-9))
+    ]
+    run = simulate(
+        Scene(bodies=(floor(made_of), *boxes), gravity=GRAVITY),
+        time_step=H,
+        steps=10,
+        method=Method(solver=solver),
+        observe={"deep": Maximum(quantity=Penetration()), "v": Trace(quantity=Velocity("upper"))},
+    )
+
+    assert run.completed
+    assert float(run["deep"]) < 1e-8
+    assert np.abs(run["v"]).max() < 1e-6
+
+
 @pytest.mark.parametrize("gap", [0.0, 0.01])
 def test_a_blow_runs_through_a_row_of_balls(gap: float) -> None:
     """Successive impacts, or gaps: the last ball leaves with the speed of the first. Touching and simultaneous,

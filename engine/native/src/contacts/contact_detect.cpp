@@ -302,8 +302,11 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
         add_point(contact, first, second, time);
         Point& point = points_.back();
         const double closing = -relative(point, contact.point.normal, velocity, false);
-        const double push = relative(point, contact.point.normal, kick_, false);
-        if (late && !plastic_first_ && point.material.restitution > 0.0 && closing > 4.0 * std::abs(push)) {
+        // What forces give to one of them in this step is no blow, though both got it before one was held.
+        const double push = std::max({std::abs(relative(point, contact.point.normal, kick_, false)),
+                                      std::abs(dot(contact.point.normal, linear(kick_[contact.first]))),
+                                      std::abs(dot(contact.point.normal, linear(kick_[contact.second])))});
+        if (late && !plastic_first_ && point.material.restitution > 0.0 && closing > 4.0 * push) {
             late_blow_ = true;
             points_.pop_back();
             continue;
@@ -487,13 +490,23 @@ bool ContactStage::is_blow(const Point& point) const noexcept {
 }
 
 /// Whether the bodies that a plastic blow sets in motion meet others with restitution in this very step. The resting rows
-/// that answer such blows know of no bounce: plastic ones, too, are then met before, so that these are found in time.
+/// that answer such blows know of no bounce: plastic ones, too, are then met before, so that these are found in time. If
+/// there are none, what has been found late is no longer left out: it is met as if it did not rebound.
 bool ContactStage::blows_come_first() {
     if (!late_blow_ || plastic_first_) return false;
     plastic_first_ = true;
-    order_points();
     measure_points();
+    if (impact_needed_) order_points();
     return impact_needed_;
+}
+
+/// Gives points to the strikes that were left out for a blow that does not come.
+bool ContactStage::find_left_out(const std::vector<Vec6>& velocity) {
+    late_blow_ = false;
+    const std::size_t taken = points_.size();
+    if (find_strikes(velocity, true) == 0) return false;
+    take_back_strikes(taken, velocity);
+    return true;
 }
 
 }  // namespace spook

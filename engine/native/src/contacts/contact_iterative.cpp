@@ -75,6 +75,12 @@ bool ContactStage::find_more() {
     const std::size_t taken = points_.size();
     if (find_strikes(next_, true) > 0) take_back_strikes(taken, next_);
     else if (!turned) return false;
+    take_in(known);
+    return true;
+}
+
+/// Hands the points found since `known` to the sweeps, with what they did in the step before.
+void ContactStage::take_in(std::size_t known) {
     counters_.contacts += points_.size() - known;
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];
@@ -88,7 +94,6 @@ bool ContactStage::find_more() {
         std::copy_n(old->tangent, 2, point.tangent_before);
     }
     hand_over();
-    return true;
 }
 
 /// Whether the sweeps have come as near to their law as the method asks for; if not, notes who is furthest off.
@@ -121,22 +126,26 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
     sunk_ = false;
-    for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
-        report = sweeps_.run(options_.iterations, options_.residual_tolerance,
-                             focus * options_.unsettled_residual, [this] { return find_more(); });
-        counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-        if (!report.finite || is_settled(system) || report.converged) break;
-        if (turn + 1 >= joint_turns && joint_is_worst_) break;
-    }
-    if (report.finite && late_blow_) {  // by velocities on the way, it may be
-        late_blow_ = false;
+    for (bool again = true; again;) {
+        again = false;
+        for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
+            report = sweeps_.run(options_.iterations, options_.residual_tolerance,
+                                 focus * options_.unsettled_residual, [this] { return find_more(); });
+            counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
+            if (!report.finite || is_settled(system) || report.converged) break;
+            if (turn + 1 >= joint_turns && joint_is_worst_) break;
+        }
+        if (!report.finite || !late_blow_) break;
+        late_blow_ = false;  // it was one by velocities on the way
         for (std::size_t b = 0; b < unknown_.size(); ++b)
             if (unknown_[b] >= 0) next_[b] = sweeps_.velocity(unknown_[b]);
         changed_.assign(unknown_.size(), 1);
         const std::size_t known = points_.size();
         if (find_strikes(next_, true) > 0) take_back_strikes(known, next_);
         if (blows_come_first()) return true;
-        points_.resize(known);
+        if (late_blow_) find_left_out(next_);
+        again = points_.size() > known;
+        if (again) take_in(known);
     }
     counters_.unsettled += !report.converged;
 

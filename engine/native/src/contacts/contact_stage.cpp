@@ -308,9 +308,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         const bool turned = find_turned(next);
         const std::size_t taken = points_.size();
         late_blow_ = false;
-        const bool struck = find_strikes(next, true) > 0;
+        bool struck = find_strikes(next, true) > 0;
         if (struck) take_back_strikes(taken, next);
         if (blows_come_first()) return true;
+        if (late_blow_) struck = find_left_out(next) || struck;
         if (!struck && !turned) break;
         counters_.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)

@@ -254,6 +254,7 @@ private:
     void find_open_again();
     bool is_blow(const Point& point) const noexcept;
     bool blows_come_first();
+    bool find_left_out(const std::vector<Vec6>& velocity);
     void look_at(const std::vector<IndexPair>& near);
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
@@ -293,6 +294,7 @@ private:
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
     bool find_more();
+    void take_in(std::size_t known);
     void note_sinking();
     bool is_settled(MixedSystem& system);
     void hand_over();
