@@ -26,6 +26,7 @@ from spook_tracker.engine import (
     Scene,
     Sphere,
     Trace,
+    Velocity,
     simulate,
     start,
 )
@@ -220,3 +221,31 @@ def test_a_blow_that_goes_through_a_row_of_balls_in_one_step_keeps_the_momentum(
 
     assert np.abs(result["p"][:, 0] - 30.0).max() <= 1e-12 * 30.0
     assert float(result["deep"]) < 1e-9 or solver == "iterative"
+
+
+def test_a_blow_goes_through_as_many_balls_as_it_reaches() -> None:
+    """n = 120 balls in a row at gaps g, the first pushed so that the last moves on at half of d = g/h and meets no other.
+
+    Each pair that meets is just closed at the end of the step, v_k − v_k+1 = d, so v_k = d (n − k + ½), and momentum is
+    kept. Solves that find one pair each were given up after 64.
+    """
+    count, gap = 120, 0.02 * TIME_STEP
+    apart = gap / TIME_STEP  # d, m/s
+    expected = np.array([apart * (count - k - 0.5) if k < count else 0.0 for k in range(count + 20)])
+    balls = (
+        RigidBody(
+            name=f"b{k}",
+            mass=1.0,
+            shape=Sphere(0.1),
+            position=((0.2 + gap) * k, 0, 0),
+            velocity=(expected.sum() * (k == 0), 0, 0),
+            material=Material(friction=0.0),
+        )
+        for k in range(len(expected))
+    )
+    result = simulate(
+        Scene(bodies=tuple(balls)), time_step=TIME_STEP, steps=1, observe={"v": Final(quantity=Velocity())}
+    )
+
+    assert result.completed
+    assert np.abs(result["v"][:, 0] - expected).max() <= 1e-12 * expected.sum()

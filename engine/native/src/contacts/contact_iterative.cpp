@@ -12,6 +12,11 @@ namespace {
 constexpr int most_turns = 16;  // times `iterations` sweeps' work, where a step would be unsettled otherwise
 constexpr int joint_turns = 4;  // the same where a joint is furthest off: all of them are swept each time
 constexpr double focus = 0.5;   // of the residual allowed: contacts that change less are left alone then
+// Before points found late are solved for:
+constexpr int foreseeing = 100;         // sweeps at most
+constexpr double foreseen = 1e-6;       // of the speeds: what changes less is
+constexpr std::size_t few_again = 100;  // points of an island: so many are solved for again at less cost
+constexpr int many_rounds = 8;          //   unless that has been done so often
 
 }  // namespace
 
@@ -34,8 +39,10 @@ void ContactStage::hand_over() {
         row.slip_softness = material.slip_compliance / h;
         row.friction = material.friction;
         row.normal_before = point.before;
-        row.impulse[0] = std::max(0.0, point.before);
-        for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangent_before[i] / point.stretch[i];
+        row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
+        for (int i = 0; i < 2; ++i)
+            row.impulse[i + 1] =
+                (point.solved ? point.tangents[i] : point.tangent_before[i]) / point.stretch[i];
         if (conveys_ || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, row.across};
             for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
@@ -113,6 +120,57 @@ bool ContactStage::is_settled(MixedSystem& system) {
         blame(joint.residual, std::max(block.first, block.second));
     }
     return unsettled_body_ < 0;
+}
+
+/// The islands of the points, and which of them have points from `known` on: no solve has answered those yet.
+ContactStage::Unanswered ContactStage::find_unanswered(std::size_t bodies, std::size_t known) const {
+    std::vector<Islands::Tie> ties;
+    ties.reserve(points_.size());
+    for (const Point& point : points_)
+        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
+    const Islands islands = find_islands(static_cast<int>(bodies), ties);
+    Unanswered found;
+    found.open.assign(islands.count, 0);
+    std::vector<std::size_t> points(islands.count, 0);
+    for (std::size_t k = 0; k < ties.size(); ++k) {
+        found.island.push_back(islands.of_body[std::max(ties[k].first, ties[k].second)]);
+        ++points[found.island[k]];
+        if (k >= known) found.open[found.island[k]] = 1;
+    }
+    for (int k = 0; k < islands.count; ++k)
+        if (found.open[k]) found.largest = std::max(found.largest, points[k]);
+    return found;
+}
+
+/// Where a solve sets many bodies in motion towards others, each solve would find a few pairs more that meet. Sweeps find
+/// nearly all of them at a fraction of the cost, and the next solve starts from where they end. Islands that an earlier
+/// solve has answered, and no new point ties to others, stay as they are to the last bit.
+void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
+    if (resists_turning_) return;  // sweeps over contacts know no such friction
+    if (points_.size() <= few_again && round < many_rounds) return;
+    if (find_unanswered(system.mass.size(), known).largest <= few_again && round < many_rounds) return;
+    double speed = 0.0;
+    for (const Vec6& v : system.velocity) speed = std::max(speed, norm(linear(v)));
+    system.rows.clear();
+    sweeps_.start(system, options_.friction);
+    next_.clear();
+    handed_over_ = 0;
+    hand_over();
+    const double enough = foreseen * speed;
+    const FrictionReport report = sweeps_.run(foreseeing, enough, enough, [this] { return find_more(); });
+    counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
+    late_blow_ = false;  // by velocities on the way: the solve will tell
+    std::fill(sinking_.begin(), sinking_.end(), 0.0);
+    if (!report.finite) return;
+    const Unanswered islands = find_unanswered(system.mass.size(), known);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        if (!islands.open[islands.island[k]]) continue;
+        Point& point = points_[k];
+        const double* impulse = sweeps_.impulse(static_cast<int>(k));
+        point.solved = true;
+        point.normal = impulse[0];
+        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * point.stretch[i];
+    }
 }
 
 bool ContactStage::solve_by_sweeps(MixedSystem& system) {

@@ -286,7 +286,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         answered.assign(joints, 1);
         for (Point& point : points_) {
             system.rows.push_back(resting_row(point));
-            answered.push_back(point.solved);
+            answered.push_back(point.answered);
             if (system.rows.back().size > 1)
                 add_friction(point, static_cast<int>(system.rows.size()) - 1, friction);
         }
@@ -316,6 +316,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         counters_.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
             read_back(system.rows[joints + k], points_[k]);
+        if (joints == 0 && options_.solver == SolverKind::direct) foresee(system, known, round);
         order_points();
     }
     mark_held(system);  // the last round may have brought rows to bodies that had none
@@ -350,7 +351,7 @@ Vec3 ContactStage::read_back(const RowBlock& block, Point& point) const {
     }
     const Vec3 n = point.contact.point.normal, t = point.tangent;
     const double scale = 1.0 / size(point.contact);
-    point.solved = true;
+    point.solved = point.answered = true;
     point.normal = block.multiplier[0];
     point.tangents[0] = dot(along, t);
     point.tangents[1] = dot(along, cross(n, t));

@@ -236,7 +236,8 @@ private:
         double before = -1.0;            // normal impulse of the step before, −1 if the point is new
         double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
         double parting_before = 0.0, pressed_before = 0.0;
-        bool solved = false;  // in an earlier round of this step: these start the next
+        bool solved = false;    // in an earlier round of this step: these start the next
+        bool answered = false;  // the same, by a solve and not by foresee()
         double normal = 0.0, tangents[2] = {0.0, 0.0}, turning[3] = {0.0, 0.0, 0.0};
         double impact = 0.0;
         Vec3 impact_impulse;
@@ -293,6 +294,13 @@ private:
     Vec3 read_back(const RowBlock& block, Point& point) const;
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system);
+    void foresee(MixedSystem& system, std::size_t known, int round);
+    struct Unanswered {
+        std::vector<int> island;  // of each point
+        std::vector<char> open;   // islands to be solved
+        std::size_t largest = 0;  // points of one of those
+    };
+    Unanswered find_unanswered(std::size_t bodies, std::size_t known) const;
     bool find_more();
     void take_in(std::size_t known);
     void note_sinking();
