@@ -39,7 +39,8 @@ class Method:
                        unsettled_residual, sweeps go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: all that touch take part in one blow (a ball on four gives −.6 and four times .4);
-                       a pair is struck once in a step, and stops without rebound where it approaches again;
+                       a pair, or a joint's stop, is struck once in a step, and stops without rebound where it approaches
+                       again;
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1)
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its

@@ -58,7 +58,7 @@ public:
                 lead[k] = stage.lead(static_cast<int>(k));
                 for (int i = 0; i < 3; ++i) velocity[k][i] += lead[k] * h * gravity[i];
             }
-        while (touching && stage.impact_needed()) {
+        while (touching && stage.impact_needed(system)) {
             momenta(velocity);
             stage.impact(system);
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)

@@ -279,8 +279,9 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     return found;
 }
 
-bool ContactStage::meets(const std::vector<Vec6>& next) {
-    changed_ = jointed_;  // others have been swept with what they fly with
+bool ContactStage::meets(const std::vector<Vec6>& next, bool stopped) {
+    plastic_first_ = stopped;  // blows that a stop's rebound leads to are found again after it
+    changed_ = jointed_;       // others have been swept with what they fly with
     if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
     if (find_strikes(next, true) > 0) take_back_strikes(closed_points, next);
@@ -487,26 +488,6 @@ void ContactStage::measure_points() {
 bool ContactStage::is_blow(const Point& point) const noexcept {
     const bool answered = point.bounce > 0.0 || (plastic_first_ && point.bounce == 0.0);
     return answered && point.approach < -point.rounding;
-}
-
-/// Whether the bodies that a plastic blow sets in motion meet others with restitution in this very step. The resting rows
-/// that answer such blows know of no bounce: plastic ones, too, are then met before, so that these are found in time. If
-/// there are none, what has been found late is no longer left out: it is met as if it did not rebound.
-bool ContactStage::blows_come_first() {
-    if (!late_blow_ || plastic_first_) return false;
-    plastic_first_ = true;
-    measure_points();
-    if (impact_needed_) order_points();
-    return impact_needed_;
-}
-
-/// Gives points to the strikes that were left out for a blow that does not come.
-bool ContactStage::find_left_out(const std::vector<Vec6>& velocity) {
-    late_blow_ = false;
-    const std::size_t taken = points_.size();
-    if (find_strikes(velocity, true) == 0) return false;
-    take_back_strikes(taken, velocity);
-    return true;
 }
 
 }  // namespace spook

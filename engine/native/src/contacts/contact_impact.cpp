@@ -20,6 +20,14 @@ constexpr int most_again = 8;   // solves until the give is gone: each leaves ab
 constexpr double left = 1e-16;  // of the fastest row: a give that is rounding
 constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 
+/// Of successive blows in one step.
+int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }
+
+bool is_hit(const RowBlock& block) noexcept { return block.stop.rebound != 0.0; }
+bool any_hit(const MixedSystem& system) noexcept {
+    return std::any_of(system.rows.begin(), system.rows.end(), is_hit);
+}
+
 /// Of each island's bodies, J.
 std::vector<double> kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity,
                                    const Islands& islands) {
@@ -125,34 +133,120 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
     if (report.finite && !settled) judge_blow(hit, friction, model);
 }
 
+/// Whether the bodies that a plastic blow sets in motion meet others with restitution in this very step. The resting rows
+/// that answer such blows know of no bounce: plastic ones, too, are then met before, so that these are found in time. If
+/// there are none, what has been found late is no longer left out: it is met as if it did not rebound.
+bool ContactStage::blows_come_first() {
+    if (!late_blow_ || plastic_first_) return false;
+    plastic_first_ = true;
+    measure_points();
+    if (impact_needed_) order_points();
+    return impact_needed_;
+}
+
+/// Gives points to the strikes that were left out for a blow that does not come.
+bool ContactStage::find_left_out(const std::vector<Vec6>& velocity) {
+    late_blow_ = false;
+    const std::size_t taken = points_.size();
+    if (find_strikes(velocity, true) == 0) return false;
+    take_back_strikes(taken, velocity);
+    return true;
+}
+
+/// What hangs together by rows of joints, of which `system` has so many, and by the step's points.
+Islands ContactStage::hanging(const MixedSystem& system, std::size_t joints) const {
+    std::vector<Islands::Tie> ties;
+    for (std::size_t k = 0; k < joints; ++k) add_ties(system.rows[k], ties);
+    for (const Point& point : points_)
+        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
+    return find_islands(static_cast<int>(system.mass.size()), ties);
+}
+
+int ContactStage::island_of(const Islands& islands, const Point& point) const noexcept {
+    return islands.of_body[std::max(unknown_[point.contact.first], unknown_[point.contact.second])];
+}
+
+/// Whether some stop sends back what hits it where contacts are to hear of it: what it sets in motion may push them, and
+/// Newton's law for it and resting rows for them would raise the energy. A stop alone is left to the resting stage.
+bool ContactStage::stop_is_hit(const MixedSystem& system) const {
+    if (points_.empty() || !any_hit(system)) return false;
+    if (impact_rounds_ > most_rounds(points_.size())) return false;
+    const Islands islands = hanging(system, system.rows.size());
+    std::vector<char> touched(islands.count, 0);
+    for (const Point& point : points_) touched[island_of(islands, point)] = 1;
+    return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
+        return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
+    });
+}
+
+/// Whether bodies that a stop sends back with `next` meet others that no row knew of: `known` is how many points there
+/// were. Such blows come after the stop's.
+bool ContactStage::stop_comes_first(const MixedSystem& system, std::size_t known,
+                                    const std::vector<Vec6>& next) {
+    if (!any_hit(system)) return false;
+    if (late_blow_) {
+        plastic_first_ = true;  // keeps them
+        find_left_out(next);
+    }
+    if (points_.size() == known || !stop_is_hit(system)) return false;
+    order_points();
+    measure_points();
+    return true;
+}
+
+/// The rows of joints as a blow sees them, of those that hang together with a point that is struck, or that have a stop
+/// which is hit beside a point: what is far from any does not know of it.
+void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& who,
+                             std::vector<RowBlock>& rows) const {
+    if (system.rows.empty()) return;
+    const Islands islands = hanging(system, system.rows.size());
+    const auto island = [&](const RowBlock& block) {
+        return islands.of_body[std::max(block.first, block.second)];
+    };
+    std::vector<char> touched(islands.count, 0), struck(islands.count, 0);
+    for (const Point& point : points_) touched[island_of(islands, point)] = 1;
+    for (const std::size_t k : who) struck[island_of(islands, points_[k])] = 1;
+    for (const RowBlock& block : system.rows)
+        if (is_hit(block) && touched[island(block)]) struck[island(block)] = 1;
+    for (RowBlock& given : system.rows) {
+        if (!struck[island(given)]) continue;
+        given.stop.answered = is_hit(given);
+        RowBlock& block = rows.emplace_back(given);
+        for (int i = 0; i < block.size; ++i) {
+            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
+            block.multiplier[i] = 0.0;
+            if (below && above) block.right[i] = 0.0;
+            else if (i == block.stop.row && (block.stop.touching || block.stop.answered))
+                block.right[i] = block.stop.rebound;
+            else if (i == block.stop.row) block.lower[i] = block.upper[i] = 0.0;
+            else if (above && block.lower[i] == 0.0) block.right[i] = std::min(block.right[i], 0.0);
+            else if (below && block.upper[i] == 0.0) block.right[i] = std::max(block.right[i], 0.0);
+            else block.lower[i] = block.upper[i] = 0.0;
+        }
+    }
+}
+
 void ContactStage::impact(MixedSystem& system) {
     ++counters_.impacts;
     ++impact_rounds_;
     residual_ = unsettled_by_ = 0.0;
     unsettled_body_ = -1;
     sunk_ = false;
-    const bool successive = options_.impacts == ImpactOrder::successive &&
-                            impact_rounds_ <= 100 + 20 * static_cast<int>(points_.size());
+    const bool successive =
+        options_.impacts == ImpactOrder::successive && impact_rounds_ <= most_rounds(points_.size());
+    std::vector<std::size_t> who;
+    for (std::size_t k = 0; k < points_.size(); ++k)
+        if (points_[k].bounce >= 0.0 && (!successive || points_[k].approach < -points_[k].rounding))
+            who.push_back(k);
     MixedSystem hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
-    hit.rows = system.rows;
-    for (RowBlock& block : hit.rows)
-        for (int i = 0; i < block.size; ++i) {
-            const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
-            block.multiplier[i] = 0.0;
-            if (below && above) block.right[i] = 0.0;
-            else if (above && block.lower[i] == 0.0) block.right[i] = std::min(block.right[i], 0.0);
-            else if (below && block.upper[i] == 0.0) block.right[i] = std::max(block.right[i], 0.0);
-            else block.lower[i] = block.upper[i] = 0.0;
-        }
-    const std::size_t joints = system.rows.size();
-    std::vector<std::size_t> who;
+    take_part(system, who, hit.rows);
+    const std::size_t joints = hit.rows.size();
     std::vector<FrictionPoint> friction;
     std::vector<std::size_t> pushed;  // rows against what moves as it is told, or along itself
-    for (std::size_t k = 0; k < points_.size(); ++k) {
+    for (const std::size_t k : who) {
         const Point& point = points_[k];
-        if (point.bounce < 0.0 || (successive && !(point.approach < -point.rounding))) continue;
         RowBlock block = row_block(point, point.material.friction > 0.0 ? 3 : 1);
         if (std::any_of(block.right.begin(), block.right.begin() + block.size,
                         [](double r) { return r != 0.0; }))
@@ -164,7 +258,6 @@ void ContactStage::impact(MixedSystem& system) {
             friction.back().stretched = point.is_stretched();
         }
         hit.rows.push_back(block);
-        who.push_back(k);
     }
     std::vector<Vec6> before = hit.momentum;
     for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
@@ -190,6 +283,8 @@ void ContactStage::impact(MixedSystem& system) {
     if (std::find(rises.begin(), rises.end(), 1) != rises.end()) {
         plastic = start;
         std::vector<FrictionPoint> plastic_friction = fresh;
+        for (std::size_t k = 0; k < joints; ++k)
+            if (RowBlock& block = plastic.rows[k]; block.stop.row >= 0) block.right[block.stop.row] = 0.0;
         for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
         hit_exactly(plastic, joints, plastic_friction, model);
         blend(hit, plastic, islands, limit, rises, share);
@@ -239,7 +334,7 @@ void ContactStage::after_impact(const MixedSystem& system) {
     } else {
         for (const Point& point : points_)
             impact_needed_ = impact_needed_ || (point.bounce >= 0.0 && point.approach < -point.rounding);
-        if (impact_rounds_ > 100 + 20 * static_cast<int>(points_.size())) impact_needed_ = false;
+        if (impact_rounds_ > most_rounds(points_.size())) impact_needed_ = false;
     }
 }
 

@@ -179,6 +179,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     late_blow_ = false;
     handed_over_ = 0;
     hand_over();
+    const std::size_t begun = points_.size();
     FrictionReport report;
     residual_ = 0.0;
     unsettled_body_ = -1;
@@ -193,14 +194,18 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
             if (!report.finite || is_settled(system) || report.converged) break;
             if (turn + 1 >= joint_turns && joint_is_worst_) break;
         }
-        if (!report.finite || !late_blow_) break;
+        if (!report.finite) break;
+        if (!late_blow_) {
+            if (stop_comes_first(system, begun, next_)) return true;
+            break;
+        }
         late_blow_ = false;  // it was one by velocities on the way
         for (std::size_t b = 0; b < unknown_.size(); ++b)
             if (unknown_[b] >= 0) next_[b] = sweeps_.velocity(unknown_[b]);
         changed_.assign(unknown_.size(), 1);
         const std::size_t known = points_.size();
         if (find_strikes(next_, true) > 0) take_back_strikes(known, next_);
-        if (blows_come_first()) return true;
+        if (blows_come_first() || stop_comes_first(system, begun, next_)) return true;
         if (late_blow_) find_left_out(next_);
         again = points_.size() > known;
         if (again) take_in(known);

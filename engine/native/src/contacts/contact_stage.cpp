@@ -305,14 +305,13 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         const std::size_t known = points_.size();
         changed_.assign(next.size(), 1);
         if (outrun(next)) find_open_again();
-        const bool turned = find_turned(next);
+        find_turned(next);
         const std::size_t taken = points_.size();
         late_blow_ = false;
-        bool struck = find_strikes(next, true) > 0;
-        if (struck) take_back_strikes(taken, next);
-        if (blows_come_first()) return true;
-        if (late_blow_) struck = find_left_out(next) || struck;
-        if (!struck && !turned) break;
+        if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
+        if (blows_come_first() || stop_comes_first(system, known, next)) return true;
+        if (late_blow_) find_left_out(next);
+        if (points_.size() == known) break;
         counters_.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
             read_back(system.rows[joints + k], points_[k]);

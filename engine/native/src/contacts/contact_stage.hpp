@@ -103,24 +103,29 @@ public:
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return detection_.possible(); }
 
+    /// Strikes of this body are met at the start of the step, like the stops of its joints, never at their own time.
+    void leave_at_start(int body) noexcept { ball_[body] = 0; }
+
     /// Finds this step's contacts. `velocity` is v and `free_velocity` v + h M⁻¹ f, one per body of the scene.
     /// False if there is none: nothing else need be called in this step, but meets() where there are joints.
     bool detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                 const std::vector<Vec6>& free_velocity);
 
     /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per
-    /// body of the scene. Then it is a step with contacts.
-    bool meets(const std::vector<Vec6>& next);
+    /// body of the scene. Then it is a step with contacts. `stopped`: some stop among the joints has been hit.
+    bool meets(const std::vector<Vec6>& next, bool stopped);
 
-    /// Whether a contact with restitution is approached faster than rounding; asked anew after each impact.
-    bool impact_needed() const noexcept { return impact_needed_; }
+    /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
+    /// `system` is hit that hangs together with bodies in contact; asked anew after each impact.
+    bool impact_needed(const MixedSystem& system) const { return impact_needed_ || stop_is_hit(system); }
 
     /// The part of the step's forces that acts on `body` before the impact.
     double lead(int body) const noexcept { return lead_[body]; }
 
     /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
-    /// solve(); their right sides are not used: bilateral rows keep G v₊ + Sig lambda = 0, limits do not close,
-    /// motors let go. Fills system.velocity with v after the impact. It never raises the kinetic energy (with
+    /// solve(), of which those take part that hang together with a point. Bilateral ones keep G v₊ + Sig lambda = 0,
+    /// limits that touch do not close, those that are hit rebound, others, and motors, let go: right sides are not used.
+    /// Fills system.velocity with v after the impact. It never raises the kinetic energy (with
     /// moving kinematic bodies: that of the rest).
     void impact(MixedSystem& system);
 
@@ -277,6 +282,12 @@ private:
                     bool only_prescribed) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
                        FrictionModel model, const std::vector<char>* answered = nullptr);
+    Islands hanging(const MixedSystem& system, std::size_t joints) const;
+    int island_of(const Islands& islands, const Point& point) const noexcept;
+    bool stop_is_hit(const MixedSystem& system) const;
+    bool stop_comes_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
+    void take_part(MixedSystem& system, const std::vector<std::size_t>& who,
+                   std::vector<RowBlock>& rows) const;
     void share_blow(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& who) const;
     void hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                      FrictionModel model);

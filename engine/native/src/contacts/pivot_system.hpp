@@ -28,6 +28,14 @@ struct Beyond {
     Vec6 jacobian{};
 };
 
+/// The row of a block that is a joint's stop or a wire, and what a blow is to leave there.
+struct StopRow {
+    int row = -1;           // of the block; −1: it has none
+    bool touching = false;  // as the step begins
+    double rebound = 0.0;   // where it is hit, the rate it sends back, m/s or rad/s; else 0
+    bool answered = false;  // by a blow
+};
+
 /// Up to six rows between two moving bodies (or one: `second` or `first` is −1), or one row over any number.
 struct RowBlock {
     int first = -1, second = -1;  // indices into MixedSystem::mass; −1 does not move
@@ -39,6 +47,7 @@ struct RowBlock {
     Vec6 upper{unbounded, unbounded, unbounded, unbounded, unbounded, unbounded};
     Vec6 multiplier{};  // z: the start of an iteration, then the result
     std::array<RowState, 6> state{};
+    StopRow stop;
     std::span<const Beyond> beyond;  // whoever fills the rows keeps what it shows
 };
 

@@ -155,7 +155,9 @@ void JointSet::assemble_general(const Joint& joint, State& state, std::span<cons
         return;
     }
     if (general.one_sided) {
-        right.right[0] = one_sided(-1.0, row.violation, row.rate, general.row, general.restitution, state);
+        right.stop.row = 0;
+        right.right[0] = one_sided(-1.0, row.violation, row.rate, general.row, general.restitution, unbounded,
+                                   state, right.stop);
         right.upper[0] = 0.0;
         return;
     }

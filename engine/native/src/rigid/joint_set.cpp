@@ -95,6 +95,12 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         joints_.push_back(joint);
     }
     states.resize(joints_.size());
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+        const Joint& joint = joints_[j];
+        const bool limit = joint.axial >= 0 && axials_[joint.axial].has_limit,
+                   wire = joint.general >= 0 && generals_[joint.general].one_sided;
+        if (limit || wire) stops_.push_back(static_cast<int>(j));
+    }
     for (const General& general : generals_)
         for (const RelationTerm& term : general.terms) track(term.joint);
 }
@@ -149,9 +155,11 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         right.upper[motor] = axial.impulse;
     }
     if (axial.has_limit) {
-        // Only the nearer end can be reached within a step. An open gap may close but no more: then it meets no
-        // row at all, and a bounce off the limit would depend on the phase of the step.
-        const bool low = axial.lower == axial.upper || state.angle - axial.lower <= axial.upper - state.angle;
+        // The end that is ahead, if it is reached within the step, or else the nearer one. An open gap may close but
+        // no more: then it meets no row at all, and a bounce off the limit would depend on the phase of the step.
+        const double down = state.angle - axial.lower, up = axial.upper - state.angle;
+        const double way = time_step_ * row.rate;
+        const bool low = down == -up || (way > up ? -way > down : -way > down || down <= up);
         const double violation = state.angle - (low ? axial.lower : axial.upper);
         const Regularisation& r = axial.limit;
         const double held = r.upsilon * row.rate - r.violation_gain * violation;
@@ -159,7 +167,9 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
             next(held);
         } else {
             const double inwards = low ? 1.0 : -1.0;
-            const double value = one_sided(inwards, violation, row.rate, r, axial.restitution, state);
+            right.stop.row = k;
+            const double value = one_sided(inwards, violation, row.rate, r, axial.restitution,
+                                           low ? up : down, state, right.stop);
             (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
@@ -182,20 +192,23 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
 }
 
 /// The right side of a row that only pushes `inwards`. What the scene began with beyond the limit is no violation: it
-/// would come back as a speed, at a tiny step as megajoules. The bodies are led back instead (given_back()).
+/// would come back as a speed, at a tiny step as megajoules. The bodies are led back instead (given_back()). A rebound goes
+/// no further within the step than its `room`, to the other end.
 double JointSet::one_sided(double inwards, double violation, double rate, const Regularisation& row,
-                           double restitution, State& state) noexcept {
+                           double restitution, double room, State& state, StopRow& stop) noexcept {
     const double beyond = std::max(0.0, -inwards * violation);
     state.given = state.given < 0.0 ? beyond : std::min(state.given, beyond);
     if (state.given > 0.0) some_given_ = true, violation += inwards * state.given;
     const double gap = inwards * violation, approach = -inwards * rate;
-    const bool open = gap > 0.0, hit = approach > 0.0 && !state.at_limit;
+    const bool open = gap > 0.0, hit = approach > 0.0 && state.at_limit * inwards <= 0.0;
     double value = open ? -violation / time_step_ : row.upsilon * rate - row.violation_gain * violation;
-    if (restitution > 0.0 && (open ? time_step_ * approach > gap : hit))
-        value = inwards * restitution * approach;
+    stop.touching = !open;
+    stop.rebound = 0.0;
+    if (restitution > 0.0 && approach > state.rebounds && (open ? time_step_ * approach > gap : hit))
+        value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
     else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
         value = -row.violation_gain * violation;
-    state.at_limit = !open;
+    state.closed = open ? 0 : inwards > 0.0 ? 1 : -1;
     return value;
 }
 

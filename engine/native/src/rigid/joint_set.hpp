@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "contacts/pivot_system.hpp"
 #include "linear/large_array.hpp"
 #include "linear/regularisation.hpp"
 #include "rigid/joint_rows.hpp"
@@ -29,6 +30,7 @@ struct JointBlock {
 struct BlockRight {
     std::array<double, 6> right, lower, upper;
     const double* softness = nullptr;  // of rows whose softness changes from step to step
+    StopRow stop;
 };
 
 /// A row that rubs: the wire's, its own and those of the eyes before it, by block; tanh ½µφ.
@@ -64,7 +66,10 @@ public:
         Vec3 first_reach,
             second_reach;  // from the centres to the point where forces are read, at the last step
         bool broken = false;
-        bool at_limit = false;  // the free coordinate's limit was closed in the last step
+        signed char at_limit = 0;  // 1 or −1: the lower or upper limit was closed in the last step,
+        signed char closed = 0;    // and is in this one
+        double rebounds =
+            0.0;  // only what arrives faster than this, m/s or rad/s: a blow of the step has answered it
         double given =
             -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
         double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
@@ -120,6 +125,12 @@ public:
         const bool one_sided = joint.general >= 0 && generals_[joint.general].one_sided;
         return !block.axial && !one_sided && !gives_way(joint.constants.kind) && !states[block.joint].broken;
     }
+    /// Whether a block has a row that only pushes one way.
+    bool may_stop(const JointBlock& block) const noexcept {
+        const Joint& joint = joints_[block.joint];
+        return (block.axial && axials_[joint.axial].has_limit) ||
+               (joint.general >= 0 && generals_[joint.general].one_sided);
+    }
     bool has_spring(const JointBlock& block) const noexcept {
         return block.axial && axials_[joints_[block.joint].axial].has_spring;
     }
@@ -136,6 +147,13 @@ public:
             std::find(followed_.begin(), followed_.end(), joint) == followed_.end())
             followed_.push_back(joint);
         joints_[joint].tracked = true;
+    }
+    /// A new step: whose stops were closed in the one before is known from then on, however often rows are assembled.
+    void begin_step() noexcept {
+        for (const int joint : stops_) {
+            states[joint].at_limit = states[joint].closed;
+            states[joint].rebounds = 0.0;
+        }
     }
     /// Counts the turns of tracked hinges that no drive follows anyway; after every step.
     void follow(std::span<const BodyState> bodies) noexcept {
@@ -233,7 +251,7 @@ private:
     void assemble_tyre(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                        double* second, BlockRight& right) noexcept;
     double one_sided(double inwards, double violation, double rate, const Regularisation& row,
-                     double restitution, State& state) noexcept;
+                     double restitution, double room, State& state, StopRow& stop) noexcept;
     double unwrapped(const Joint& joint, double angle, double near) const noexcept;
     void assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                         double* second, BlockRight& right) noexcept;
@@ -250,6 +268,7 @@ private:
     std::vector<BearingRow> bearings_;
     std::vector<double> gradient_;  // of one general row: six per body
     std::vector<int> followed_;
+    std::vector<int> stops_;  // joints with a row that only pushes one way
     LargeArray<JointBlock> blocks_;
 };
 

@@ -310,6 +310,7 @@ void RigidSystem::fill_rows() {
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;
+        rows.stop = numbers.stop;
         if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
     }
 }
@@ -393,29 +394,20 @@ void RigidSystem::judge_contacts() {
         note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(), contacts_->unsettled_sunk());
 }
 
-void RigidSystem::impact() {
-    fill_momenta(false);
-    fill_rows();
-    contacts_->impact(mixed_);
-    judge_contacts();
-    take_velocities(true, [this](int k) { return !contacts_->held(k); });
-    for (std::size_t k = 0; k < tied_.size(); ++k)
-        if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
-    if (clock_) clock_->mark(Stage::impact);
-}
-
 void RigidSystem::solve_mixed(bool touching) {
     mixed_values_ = true;
     const auto blocks = joints_.blocks();
     fill_masses();
     if (touching) lead_events();
-    const auto blow = [&] { return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(); };
+    const auto blow = [&] {
+        return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
+    };
     bool finite = true;
     do {
         mixed_.rows.resize(blocks.size());
+        fill_rows();
         while (blow()) impact();
         fill_momenta(true);
-        fill_rows();
         if (clock_) clock_->mark(Stage::assemble_rows);
         if (touching) finite = contacts_->solve(mixed_, velocities_);
     } while (finite && blow());  // the solve may find some that is to come first

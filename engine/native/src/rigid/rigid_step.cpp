@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t looking_from =
     16;  // bodies: steps of fewer that cannot touch are too short for a look at the clock in each
+constexpr double again = 1e-9;  // of a stop's rebound: slower than this it is not hit again in the step
 
 }  // namespace
 
@@ -69,6 +70,7 @@ void RigidSystem::velocity_stage() {
             live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
     if (!force_.empty()) apply_forces();
+    joints_.begin_step();
     kick_free_bodies();
     if (contacts_ && find_contacts()) {
         solve_mixed(true);
@@ -128,10 +130,29 @@ bool RigidSystem::find_contacts() {
 /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, next_:
 /// swept with their own they do not. Then the step is to be solved with contacts.
 bool RigidSystem::meet_late() {
-    if (!contacts_->meets(next_)) return false;
+    const bool stopped =
+        mixed_values_ && std::any_of(mixed_.rows.begin(), mixed_.rows.end(),
+                                     [](const RowBlock& block) { return block.stop.rebound != 0.0; });
+    if (!contacts_->meets(next_, stopped)) return false;
     touching_ = true;
     note_begin();
     return true;
+}
+
+/// Rows are those of the velocities before, and after it of those it leaves.
+void RigidSystem::impact() {
+    fill_momenta(false);
+    contacts_->impact(mixed_);
+    judge_contacts();
+    take_velocities(true, [this](int k) { return !contacts_->held(k); });
+    for (std::size_t k = 0; k < tied_.size(); ++k)
+        if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
+    for (std::size_t k = 0; k < mixed_.rows.size(); ++k)
+        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered)
+            joints_.states[joints_.blocks()[k].joint].rebounds =
+                method_.impacts == ImpactOrder::simultaneous ? unbounded : again * std::abs(stop.rebound);
+    fill_rows();
+    if (clock_) clock_->mark(Stage::impact);
 }
 
 void RigidSystem::integrate_body(int i) {

@@ -89,6 +89,12 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
                            method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
             joint_pairs, yielding);
+        for (const JointBlock& block : joints_.blocks())
+            for (const int body : {block.first, block.second})
+                if (body >= 0 && joints_.may_stop(block)) fresh_contacts_->leave_at_start(body);
+        for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+            for (const int body : joints_.others(k))
+                if (joints_.may_stop(joints_.blocks()[k])) fresh_contacts_->leave_at_start(body);
     }
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;

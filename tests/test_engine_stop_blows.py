@@ -1,0 +1,121 @@
+"""Stops of joints that are hit while bodies touch, here and elsewhere: each its own restitution, and no energy is gained."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    AngularVelocity,
+    Box,
+    Final,
+    Hinge,
+    KineticEnergy,
+    Limit,
+    Material,
+    Maximum,
+    Method,
+    Penetration,
+    Plane,
+    Position,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+
+STEPS = [1 / 60, 1 / 240, 1e-3]
+SOLVERS = ["direct", "iterative", "hybrid"]
+
+
+def floor(material: Material) -> RigidBody:
+    return RigidBody(name="floor", motion="static", shape=Plane(), position=(0, 0, 0), material=material)
+
+
+def ball(
+    name: str, position: tuple[float, float, float], velocity: tuple[float, float, float], **fields: object
+) -> RigidBody:
+    given = {"mass": 1.0, "shape": Sphere(0.1)} | fields
+    return RigidBody(name=name, position=position, velocity=velocity, **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("kind", [Hinge, Prismatic])
+@pytest.mark.parametrize("phase", [-0.5, 0.0, 0.5])
+def test_a_stop_knows_of_no_blow_far_away(kind: type, phase: float, solver: str, h: float) -> None:
+    """A ball that rebounds 50 m away in the very step took all of the stop's rebound: rows were assembled again after it,
+    and the stop seemed closed long since; in the blow it took part as one without restitution."""
+    turns, speed, elastic = kind is Hinge, 2.0, Material(restitution=1.0)
+    body = RigidBody(
+        name="body",
+        mass=1.0,
+        shape=Box((1.0, 0.1, 0.1)),
+        position=(0.0, 0.0, 5.0),
+        velocity=(0.0, 0.0 if turns else speed, 0.0),
+        angular_velocity=(0.0, 0.0, speed if turns else 0.0),
+    )
+    joint = kind(
+        name="joint",
+        between=(WORLD, "body"),
+        at=(0.0, 0.0, 5.0),
+        axis=(0.0, 0.0, 1.0) if turns else (0.0, 1.0, 0.0),
+        compliance=0.0,
+        limit=Limit(lower=-9.0, upper=0.5, compliance=0.0, restitution=0.5),
+    )
+    far = ball("far", (50.0, 0.0, 0.6 + phase * speed * h), (0.0, 0.0, -speed), material=elastic)
+    result = simulate(
+        Scene(bodies=(body, floor(elastic), far), constraints=(joint,)),
+        time_step=h,
+        duration=0.4,
+        method=Method(solver=solver),
+        observe={"v": Final(quantity=Velocity()), "w": Final(quantity=AngularVelocity("body"))},
+    )
+
+    assert (result["w"][2] if turns else result["v"][0, 1]) == pytest.approx(-0.5 * speed, rel=1e-9)
+    assert result["v"][2, 2] == pytest.approx(speed, rel=1e-9)
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("shape", [Sphere(0.1), Box((0.2, 0.2, 0.2))], ids=["balls", "boxes"])
+@pytest.mark.parametrize("gap", [1e-4, 0.003, 0.1])
+@pytest.mark.parametrize(("psi", "after"), [(1.0, (1.0, 3.0)), (0.0, (1.0, 1.0))])
+def test_who_comes_back_from_a_stop_meets_what_follows(
+    psi: float, after: tuple[float, float], gap: float, shape: Sphere | Box, solver: str, h: float
+) -> None:
+    """A slider at 3 m/s comes back from its stop and meets its like, which follows at 1 m/s. psi = 1: they exchange -1 and
+    3, and the stop sends the slider back once more, in one step if impacts are successive; psi = 0: both go on with 1. The
+    rebound was asked of the stop however hard the other pressed: at psi = 0 both left with up to 1.997."""
+    bounces = Material(restitution=psi)
+    slider = ball("slider", (0.0, 0.0, 0.0), (-3.0, 0.0, 0.0), shape=shape, material=bounces)
+    follower = ball("follower", (0.2 + gap, 0.0, 0.0), (-1.0, 0.0, 0.0), shape=shape, material=bounces)
+    guide = Prismatic(
+        name="guide",
+        between=(WORLD, "slider"),
+        axis=(1.0, 0.0, 0.0),
+        compliance=0.0,
+        limit=Limit(lower=-0.06, upper=9.0, compliance=0.0, restitution=1.0),
+    )
+    result = simulate(
+        Scene(bodies=(slider, follower), constraints=(guide,)),
+        time_step=h,
+        duration=0.5,
+        method=Method(solver=solver, impacts="successive" if psi > 0.0 else "simultaneous"),
+        observe={
+            "v": Final(quantity=Velocity()),
+            "x": Trace(quantity=Position("slider")),
+            "deep": Maximum(quantity=Penetration()),
+            "energy": Trace(quantity=KineticEnergy()),
+        },
+    )
+
+    assert result.completed
+    assert result["v"][:, 0] == pytest.approx(after, rel=1e-9)
+    assert np.diff(result["energy"]).max() <= 1e-12 * result["energy"][0]
+    assert result["x"][:, 0].min() >= -0.06 - 1e-9
+    assert float(result["deep"]) < 1e-9
