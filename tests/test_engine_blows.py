@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    WORLD,
     AngularMomentum,
     AngularVelocity,
     Box,
@@ -20,9 +19,7 @@ from spook_tracker.engine import (
     ContactForce,
     Energy,
     Final,
-    Hinge,
     KineticEnergy,
-    Limit,
     Material,
     Maximum,
     Method,
@@ -329,7 +326,7 @@ def test_sweeps_see_no_step_where_tiles_go_on(seed: int) -> None:
     assert np.abs(result["v"] - speed).max() < 1e-6
 
 
-# Rows of balls, stops -----------------------------------------------------------------------------------------
+# Blows that follow from blows -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shape", [Sphere(0.1), Box((0.2, 0.2, 0.2))], ids=["balls", "boxes"])
@@ -422,64 +419,6 @@ def test_what_lies_on_a_body_that_the_floor_stops_does_not_fall_into_it(
     assert run.completed
     assert float(run["deep"]) < 1e-8
     assert np.abs(run["v"]).max() < 1e-6
-
-
-@pytest.mark.parametrize("gap", [0.0, 0.01])
-def test_a_blow_runs_through_a_row_of_balls(gap: float) -> None:
-    """Successive impacts, or gaps: the last ball leaves with the speed of the first. Touching and simultaneous,
-    Newton's law for all at once gives −.6 and .4 for the rest."""
-    elastic = Material(restitution=1.0)
-    row = [ball(f"b{k}", (k * (0.2 + gap), 0, 0), (0, 0, 0), material=elastic) for k in range(1, 5)]
-    bodies = (ball("b0", (-0.3, 0, 0), (1, 0, 0), material=elastic), *row)
-    for impacts, after in (
-        ("successive", [0, 0, 0, 0, 1]),
-        ("simultaneous", [0, 0, 0, 0, 1] if gap else [-0.6, 0.4, 0.4, 0.4, 0.4]),
-    ):
-        result = simulate(
-            Scene(bodies=bodies),
-            time_step=H,
-            steps=60,
-            method=Method(impacts=impacts),  # type: ignore[arg-type]
-            observe={"v": Final(quantity=Velocity())},
-        )
-        np.testing.assert_allclose(result["v"][:, 0], after, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("h", STEPS)
-@pytest.mark.parametrize("psi", [0.0, 0.5, 1.0])
-def test_a_stop_returns_its_own_restitution(h: float, psi: float) -> None:
-    """A bar turning freely at 2 rad/s meets the stop of its hinge at .5 rad."""
-    bar = RigidBody(
-        name="bar",
-        mass=1.0,
-        shape=Box((1.0, 0.1, 0.1)),
-        position=(0.5, 0, 0),
-        velocity=(0, 1.0, 0),
-        angular_velocity=(0, 0, 2.0),
-    )
-    hinge = Hinge(
-        name="hinge",
-        between=(WORLD, "bar"),
-        at=(0, 0, 0),
-        axis=(0, 0, 1),
-        compliance=0.0,
-        limit=Limit(lower=-9.0, upper=0.5, compliance=0.0, restitution=psi),
-    )
-    result = simulate(
-        Scene(bodies=(bar,), constraints=(hinge,)),
-        time_step=h,
-        duration=0.5,
-        observe={"w": Trace(quantity=AngularVelocity("bar"))},
-    )
-
-    speed = result["w"][:, 2]
-    hit = int(np.argmax(speed < 0.5 * speed[0]))
-    met = speed[hit - 1]
-
-    if psi > 0.0:
-        assert speed[hit] == pytest.approx(-psi * met, abs=1e-6)
-    # Without restitution the gap may close within the step: what is left of the speed then ends in the next.
-    assert np.abs(speed[hit + 2 :] + psi * met).max() < (0.02 if psi > 0.0 else 1e-6)
 
 
 # Answers that were not found ----------------------------------------------------------------------------------

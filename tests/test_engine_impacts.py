@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     Hinge,
     KineticEnergy,
     Material,
+    Method,
     Momentum,
     Plane,
     RigidBody,
@@ -141,3 +142,23 @@ def test_impacts_among_many_bodies_keep_momentum_and_gain_no_energy(psi: float) 
     assert np.abs(result["p"] - result["p"][0]).max() < 1e-11 * 9.0
     assert np.abs(result["l"] - result["l"][0]).max() < (1e-11 if psi > 0.0 else 0.01)
     assert np.diff(result["e"]).max() < 1e-6 * result["e"][0]
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_a_blow_runs_through_a_row_of_balls(gap: float) -> None:
+    """Successive impacts, or gaps: the last ball leaves with the speed of the first. Touching and simultaneous,
+    Newton's law for all at once gives −.6 and .4 for the rest."""
+    row = [ball(f"b{k}", k * (0.2 + gap), 0.0, 1.0, 1.0) for k in range(1, 5)]
+    bodies = (ball("b0", -0.3, 1.0, 1.0, 1.0), *row)
+    for impacts, after in (
+        ("successive", [0, 0, 0, 0, 1]),
+        ("simultaneous", [0, 0, 0, 0, 1] if gap else [-0.6, 0.4, 0.4, 0.4, 0.4]),
+    ):
+        result = simulate(
+            Scene(bodies=bodies),
+            time_step=H,
+            steps=60,
+            method=Method(impacts=impacts),  # type: ignore[arg-type]
+            observe={"v": Final(quantity=Velocity())},
+        )
+        np.testing.assert_allclose(result["v"][:, 0], after, rtol=0, atol=1e-12)
