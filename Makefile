@@ -80,7 +80,7 @@ docs: develop
 	$(BIN)/python .ci/manual_pages.py build/man "$$($(BIN)/python -m spook_tracker --version | cut -d, -f1 | cut -d" " -f2)"
 
 crashes: develop
-	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_crashes.py
+	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q -n 2 --timeout 7200 tests/test_tracker_crashes.py  # a database each
 
 # Every picture in docs/: of the website of $(DB), and of a red night that is measured once and kept in build/.
 RED := build/red-night
