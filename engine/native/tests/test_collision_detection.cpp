@@ -223,6 +223,8 @@ void what_turns_in_a_plane_meets_no_side_of_it() {
         EXPECT(first_touch({box, own, flat, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
         EXPECT(first_touch({roller, own, lying, {5, 0, 0}, {0, 100, 0}}, still, h, 1e-10) < 0.0);
         EXPECT(first_touch({roller, own, lying, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
+        // Nor what lifts its rear by turning about its front edge.
+        EXPECT(first_touch({box, own, flat, {5, 0, 0.05e-3}, {0, 1e-3, 0}}, still, h, 1e-10) < 0.0);
     }
     // One that tips is met, and so is one that stands a little lower.
     EXPECT(first_touch({box, own, flat, {5, 0, 0}, {0, 4, 0}}, still, 0.1, 1e-10) >= 0.0);
