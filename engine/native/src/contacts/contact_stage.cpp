@@ -418,7 +418,8 @@ void ContactStage::correct_events(const MixedSystem& system) {
         const int u = unknown_[b];
         if (u < 0 || event_time_[b] < 0.0 || !held_[u]) continue;
         if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
-        for (int i = 0; i < 3; ++i)
+        // What a joint holds turns as it goes, or the joint would answer the difference with a speed.
+        for (int i = 0; i < (jointed_[b] ? 6 : 3); ++i)
             correction_[u][i] +=
                 event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
     }
