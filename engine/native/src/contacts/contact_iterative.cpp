@@ -162,6 +162,7 @@ void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
     late_blow_ = false;  // by velocities on the way: the solve will tell
     std::fill(sinking_.begin(), sinking_.end(), 0.0);
     if (!report.finite) return;
+    foreseen_ = true;
     const Unanswered islands = find_unanswered(system.mass.size(), known);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         if (!islands.open[islands.island[k]]) continue;

@@ -178,9 +178,12 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
         return {};
     // What a resting solve leaves, the next step sees; what a blow leaves stays.
     const double enough = &islands == &impact_solver_ ? o.residual_tolerance : o.unsettled_residual;
+    const bool foreseen = foreseen_ && &islands == &resting_solver_;
     const FrictionReport report = islands.run(
         system, points,
-        [&o, model, enough](MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
+        [&o, model, enough, foreseen](MixedSystem& island, std::vector<FrictionPoint>& own,
+                                      DirectSolver& solver) {
+            solver.foreseen = foreseen;
             if (o.solver == SolverKind::direct) return solve_friction_direct(island, own, model, solver);
             if (island.rows.size() > few_rows) return sweep(o, model, island, own, solver);
             return sweep_or_solve(o, model, enough, island, own, solver);
@@ -275,6 +278,7 @@ RowBlock ContactStage::resting_row(Point& point) const {
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
+    foreseen_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) return solve_by_sweeps(system);
     std::vector<FrictionPoint> friction;
     std::vector<Vec6> next;

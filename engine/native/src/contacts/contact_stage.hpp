@@ -388,6 +388,7 @@ private:
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
+    bool foreseen_ = false;       // the step's next solve starts from foresee()
     bool late_blow_ = false;      // a strike found after the solve needs an impact
     bool plastic_first_ = false;  // plastic blows are met in the impact as well
     int impact_rounds_ = 0;
