@@ -9,7 +9,7 @@ namespace spook {
 
 namespace {
 
-constexpr int feature_bits = 16, collider_bits = 24;
+constexpr std::size_t most_grown = 256;  // bodies looked for one by one: beyond, all anew is cheaper
 
 std::uint64_t pair_key(int i, int j) noexcept {
     return (static_cast<std::uint64_t>(std::min(i, j)) << 32) | static_cast<std::uint64_t>(std::max(i, j));
@@ -76,8 +76,7 @@ void Detection::add(IndexPair pair, const Manifold& manifold, std::vector<Contac
     const auto [i, j] = pair;
     for (int k = 0; k < manifold.count; ++k) {
         const ContactPoint& point = manifold.points[k];
-        const std::uint64_t key = (static_cast<std::uint64_t>(i) << (collider_bits + feature_bits)) |
-                                  (static_cast<std::uint64_t>(j) << feature_bits) | point.feature;
+        const std::uint64_t key = (pair_of(pair) << feature_bits) | point.feature;
         out.push_back({colliders_[i].body, colliders_[j].body, point, key});
     }
 }
@@ -137,6 +136,7 @@ const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
 bool Detection::near_again(const std::vector<int>& grown, const std::vector<double>& margin,
                            std::vector<IndexPair>& out) {
     out.clear();
+    if (grown.size() > most_grown) return false;
     const auto add = [&](int i, int j) {
         if (may_touch(i, j)) out.emplace_back(std::min(i, j), std::max(i, j));
     };

@@ -18,6 +18,14 @@ struct Collider {
     Pose part;  // in body axes
 };
 
+constexpr int feature_bits = 16,
+              collider_bits = 24;  // of a contact's key: the pair's colliders, then the feature
+
+inline std::uint64_t pair_of(IndexPair pair) noexcept {
+    return (static_cast<std::uint64_t>(pair.first) << collider_bits) |
+           static_cast<std::uint64_t>(pair.second);
+}
+
 /// One contact point between two bodies; the normal points from second to first.
 struct Contact {
     int first = 0, second = 0;  // body indices, first < second

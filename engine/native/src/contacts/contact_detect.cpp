@@ -12,14 +12,9 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;   // gaps up to this part of the larger body's radius count as closed
-constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
-std::uint64_t pair_of(IndexPair pair) noexcept {
-    return (static_cast<std::uint64_t>(pair.first) << 24) | static_cast<std::uint64_t>(pair.second);
-}
+constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
-constexpr std::size_t most_grown = 256;  // bodies looked for one by one: beyond, all anew is cheaper
 constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
 constexpr double vanishing = 1e-8;       // a direction so steep on the surface has no shadow
 constexpr double steep = 0.9;            // of normals: up to it another side, or an edge of one
@@ -118,7 +113,7 @@ void ContactStage::find_open() {
 
 /// The same where the search has been widened for some bodies since: what is new is theirs.
 void ContactStage::find_open_again() {
-    if (grown_.size() > most_grown || !detection_.near_again(grown_, search_, near_)) {
+    if (!detection_.near_again(grown_, search_, near_)) {
         changed_.assign(unknown_.size(), 1);
         return find_open();
     }

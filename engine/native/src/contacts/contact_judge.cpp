@@ -28,8 +28,7 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
 
 namespace {
 
-constexpr double sunk = 0.02;     // of the smaller body's radius: an overlap that a solve has left
-constexpr int feature_bits = 16;  // of a contact's key; the rest is the pair
+constexpr double sunk = 0.02;  // of the smaller body's radius: an overlap that a solve has left
 
 /// About G M⁻¹ Gᵀ of one row: off-diagonal inertia left out, since every step asks.
 double nearly_own(const MixedSystem& system, const RowBlock& block, int i) {

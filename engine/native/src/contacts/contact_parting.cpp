@@ -15,8 +15,9 @@ constexpr double contact_give =
 constexpr double joint_give = 1e-6;     // and a joint, of its row's own inertia
 constexpr double joint_share = 1e-3;    // and of what the contacts do
 constexpr double least_give = 1e-12;    // of its row's own inertia: repeated joints share a load by it
+constexpr int rings = 4;                // of neighbours that parting sees
 constexpr double around = 4.0;          // of the deepest overlap: gaps that parting may close
-constexpr int feature_bits = 16;        // of a contact's key; the rest is the pair
+constexpr double aside = 2e-3;          // of the smaller body's radius: who parts by less pushes nobody else
 constexpr unsigned pairs_a_look = 256;  // between two looks at the clock
 
 }  // namespace
@@ -106,12 +107,69 @@ void ContactStage::note_given() {
     given_ = std::move(left);
 }
 
+/// Pairs without points, near enough to what parts, or to who that pushes, to be pushed into each other: one neighbour
+/// after the other, `rings` of them.
+void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
+                               const std::function<double(int)>& moved) {
+    beside_.clear();
+    std::vector<char> reached(unknown_.size(), 0);
+    const auto reach = [&](int b) {
+        if (reached[b] || unknown_[b] < 0) return;
+        reached[b] = 1;
+        grown_.push_back(b);
+        search_[b] = std::max(search_[b], margin + moved(b));
+    };
+    grown_.clear();
+    for (const Point& lap : laps_)
+        if (lap.push > aside * moving_size(lap.contact)) reach(lap.contact.first), reach(lap.contact.second);
+    for (int ring = 0; ring < rings && !grown_.empty(); ++ring) {
+        std::sort(grown_.begin(), grown_.end());
+        if (!detection_.near_again(grown_, search_, near_)) near_ = detection_.near(poses_, search_);
+        const std::vector<char> inside = reached;
+        grown_.clear();
+        for (const Touch& touch : touches_) {
+            const int a = touch.contact.first, b = touch.contact.second;
+            if (inside[a]) reach(b);
+            if (inside[b]) reach(a);
+        }
+        for (const IndexPair& pair : near_) {
+            const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
+            if (!inside[a] && !inside[b]) continue;
+            const std::uint64_t key = pair_of(pair);
+            const auto touch = std::lower_bound(
+                touches_.begin(), touches_.end(), key,
+                [](const Touch& t, std::uint64_t k) { return t.contact.key >> feature_bits < k; });
+            if (touch != touches_.end() && touch->contact.key >> feature_bits == key) continue;
+            scratch_.clear();
+            detection_.touch(pair, poses[a], poses[b], margin, scratch_);
+            if (scratch_.empty()) continue;
+            beside_.push_back(pair);
+            reach(a);
+            reach(b);
+        }
+    }
+    std::sort(beside_.begin(), beside_.end());
+    beside_.erase(std::unique(beside_.begin(), beside_.end()), beside_.end());
+}
+
+ContactStage::Point& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses,
+                                           double excess) {
+    Point& lap = laps_.emplace_back();
+    lap.contact = contact;
+    lap.material = combined(materials_[contact.first], materials_[contact.second]);
+    lap.first_arm = contact.point.position - poses[contact.first].position;
+    lap.second_arm = contact.point.position - poses[contact.second].position;
+    lap.tangent = world_tangent(contact.point.normal);
+    lap.push = excess;
+    return lap;
+}
+
 /// Points of the step's pairs, up to gaps of `margin`, with the bodies at `poses`, into laps_; their largest overlap that
 /// nothing explains. With no margin, pairs that have not moved against each other are left out.
 double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin, bool again) {
     laps_.clear();
     const std::vector<double>& radius = detection_.radius();
-    const auto moved = [&](int b) {
+    const std::function<double(int)> moved = [&](int b) {
         double turned = 0.0;
         for (int i = 0; i < 9; ++i)
             turned = std::max(turned, std::abs(poses[b].rotation.m[i] - poses_[b].rotation.m[i]));
@@ -135,8 +193,8 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
         detection_.touch(pair, poses[a], poses[b], margin, scratch_);
         for (const Contact& contact : scratch_) {
-            const SurfaceMaterial material = combined(materials_[a], materials_[b]);
-            double pressed = material.compliance > 0.0 ? most_pressed : 0.0, before = 0.0;
+            double pressed = 0.0, before = 0.0;
+            if (combined(materials_[a], materials_[b]).compliance > 0.0) pressed = most_pressed;
             for (std::size_t k = from; k < end; ++k)
                 if (touches_[k].contact.key == contact.key)
                     pressed = touches_[k].pressed, before = touches_[k].parting;
@@ -144,16 +202,19 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             if (again && excess > 0.0 && given_.contains(key))
                 excess = std::max(0.0, excess - given_.at(key));
             deepest = std::max(deepest, excess);
-            if (margin == 0.0) continue;
-            Point& lap = laps_.emplace_back();
-            lap.contact = contact;
-            lap.material = material;
-            lap.first_arm = contact.point.position - poses[a].position;
-            lap.second_arm = contact.point.position - poses[b].position;
-            lap.tangent = world_tangent(contact.point.normal);
-            lap.parting_before = before;
-            lap.push = excess;
+            if (margin > 0.0) add_lap(contact, poses, excess).parting_before = before;
         }
+    }
+    if (margin == 0.0) return deepest;
+    if (!again) find_beside(poses, margin, moved);
+    for (const IndexPair& pair : beside_) {
+        if (++seen % pairs_a_look == 0) Watch::look();
+        scratch_.clear();
+        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
+        detection_.touch(pair, poses[a], poses[b], margin, scratch_);
+        for (const Contact& contact : scratch_)  // what overlaps without points was let in as a seam
+            if (const double open = contact.point.gap + slack(contact); open > 0.0)
+                add_lap(contact, poses, -open);
     }
     return deepest;
 }

@@ -327,6 +327,8 @@ private:
     // contact_parting.cpp
     void find_given();
     void note_given();
+    void find_beside(const std::vector<Pose>& poses, double margin, const std::function<double(int)>& moved);
+    Point& add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
     double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
     double parting_speed(const Point& lap, bool again) const;
     bool part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
@@ -372,11 +374,12 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     LargeArray<OpenPair> open_;
-    std::vector<IndexPair> near_;  // where the search was widened
-    std::vector<int> grown_;       // whom it was widened for
-    std::vector<char> supported_;  // bodies with a closed contact
-    std::vector<double> depth_;    // of a body's closed contacts, m
-    std::vector<double> sinking_;  // what sweeps that have not settled would add to it in this step, m
+    std::vector<IndexPair> beside_;  // pairs without points, where others part
+    std::vector<IndexPair> near_;    // where the search was widened
+    std::vector<int> grown_;         // whom it was widened for
+    std::vector<char> supported_;    // bodies with a closed contact
+    std::vector<double> depth_;      // of a body's closed contacts, m
+    std::vector<double> sinking_;    // what sweeps that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;

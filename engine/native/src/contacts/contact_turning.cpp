@@ -15,7 +15,6 @@ namespace spook {
 
 namespace {
 
-constexpr int feature_bits = 16;
 constexpr std::uint64_t swung_in = 1u << 15;  // marks a point whose feature has one in the manifold already
 constexpr double deep = 2e-3;                 // of the larger body's radius: what curved paths may overlap
 constexpr double same_place = 0.1;            // of it: points of one feature
