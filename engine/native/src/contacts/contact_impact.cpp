@@ -14,10 +14,11 @@ namespace {
 constexpr int simultaneous_rounds = 20;  // of blows that follow from blows in one step
 constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
 constexpr double blow_give =
-    1e-3;                       // of a point's own inverse inertia: what it gives way while a blow is shared
-constexpr int determined = 3;   // points of a pair whose normal impulses its motion fixes
-constexpr int most_again = 8;   // solves until the give is gone: each leaves about blow_give of it
-constexpr double left = 1e-16;  // of the fastest row: a give that is rounding
+    1e-3;                        // of a point's own inverse inertia: what it gives way while a blow is shared
+constexpr int determined = 3;    // points of a pair whose normal impulses its motion fixes
+constexpr int most_again = 8;    // solves until the give is gone: each leaves about blow_give of it
+constexpr double left = 1e-16;   // of the fastest row: a give that is rounding
+constexpr double broken = 1e-6;  // of the fastest row: what a row may be short of
 constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 
 /// Of successive blows in one step.
@@ -70,6 +71,19 @@ void blend(MixedSystem& newton, const MixedSystem& plastic, const Islands& islan
         if (rises[k]) share[k] = low[k];
 }
 
+/// Whether some contact is approached after a solve: where many rows of a few bodies say the same, elimination may find
+/// pivots that are rounding, and impulses with it.
+bool is_broken(const MixedSystem& system, std::size_t joints) {
+    double short_of = 0.0, fastest = 0.0;
+    for (std::size_t k = joints; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        const double speed = row_velocity(block, 0, system.velocity);
+        fastest = std::max({fastest, std::abs(speed), std::abs(block.right[0])});
+        if (block.softness[0] == 0.0) short_of = std::max(short_of, block.right[0] - speed);
+    }
+    return short_of > broken * fastest;
+}
+
 Vec3 impulse_of(const RowBlock& block) {
     Vec3 impulse;  // the solver may have turned the tangents: read them from the rows
     for (int i = 0; i < block.size; ++i)
@@ -102,7 +116,18 @@ void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
 /// (the proximal point algorithm, Rockafellar 1976). Rows that contradict each other keep some: the solve is unsettled.
 void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                                FrictionModel model) {
+    const std::vector<FrictionPoint> fresh = friction;
     FrictionReport report = run(hit, friction, impact_solver_, model);
+    if (report.converged && is_broken(hit, joints)) {
+        for (std::size_t k = joints; k < hit.rows.size(); ++k) {
+            RowBlock& block = hit.rows[k];
+            block.multiplier.fill(0.0);
+            block.state[0] = block.right[0] > 0.0 ? RowState::free : RowState::at_lower;
+            block.softness[0] = blow_give * own_inertia(hit, block, 0);
+        }
+        friction = fresh;
+        report = run(hit, friction, impact_solver_, model);
+    }
     bool settled = report.converged;
     std::vector<double> asked;
     std::vector<char> answered(hit.rows.size(), 1);
