@@ -12,13 +12,14 @@ namespace {
 
 constexpr double contact_give =
     1e-3;  // what a contact of jointed bodies yields, of 1/m of all that moves with them
-constexpr double joint_give = 1e-6;     // and a joint, of its row's own inertia
-constexpr double joint_share = 1e-3;    // and of what the contacts do
-constexpr double least_give = 1e-12;    // of its row's own inertia: repeated joints share a load by it
-constexpr int rings = 4;                // of neighbours that parting sees
-constexpr double around = 4.0;          // of the deepest overlap: gaps that parting may close
-constexpr double aside = 2e-3;          // of the smaller body's radius: who parts by less pushes nobody else
-constexpr unsigned pairs_a_look = 256;  // between two looks at the clock
+constexpr double joint_give = 1e-6;      // and a joint, of its row's own inertia
+constexpr double joint_share = 1e-3;     // and of what the contacts do
+constexpr double least_give = 1e-12;     // of its row's own inertia: repeated joints share a load by it
+constexpr std::size_t most_beside = 32;  // bodies of a ring: where more part at once, the next step will tell
+constexpr int rings = 4;                 // of neighbours that parting sees
+constexpr double around = 4.0;           // of the deepest overlap: gaps that parting may close
+constexpr double aside = 2e-3;           // of the smaller body's radius: who parts by less pushes nobody else
+constexpr unsigned pairs_a_look = 256;   // between two looks at the clock
 
 }  // namespace
 
@@ -122,7 +123,7 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
     grown_.clear();
     for (const Point& lap : laps_)
         if (lap.push > aside * moving_size(lap.contact)) reach(lap.contact.first), reach(lap.contact.second);
-    for (int ring = 0; ring < rings && !grown_.empty(); ++ring) {
+    for (int ring = 0; ring < rings && !grown_.empty() && grown_.size() <= most_beside; ++ring) {
         std::sort(grown_.begin(), grown_.end());
         if (!detection_.near_again(grown_, search_, near_)) near_ = detection_.near(poses_, search_);
         const std::vector<char> inside = reached;
