@@ -207,7 +207,8 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
         }
     }
     if (margin == 0.0) return deepest;
-    if (!again) find_beside(poses, margin, moved);
+    // Sweeps part once, nearly: with more rows they come less far, and the next step sees who was pushed aside.
+    if (!again && !parts_by_sweeps()) find_beside(poses, margin, moved);
     for (const IndexPair& pair : beside_) {
         if (++seen % pairs_a_look == 0) Watch::look();
         scratch_.clear();
