@@ -113,10 +113,11 @@ void ContactStage::note_given() {
 void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
                                const std::function<double(int)>& moved) {
     beside_.clear();
-    std::vector<char> reached(unknown_.size(), 0);
+    std::vector<char> reached(unknown_.size(), 0);  // in which round, from one on
+    char round = 1;
     const auto reach = [&](int b) {
         if (reached[b] || unknown_[b] < 0) return;
-        reached[b] = 1;
+        reached[b] = round;
         grown_.push_back(b);
         search_[b] = std::max(search_[b], margin + moved(b));
     };
@@ -126,16 +127,17 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
     for (int ring = 0; ring < rings && !grown_.empty() && grown_.size() <= most_beside; ++ring) {
         std::sort(grown_.begin(), grown_.end());
         if (!detection_.near_again(grown_, search_, near_)) near_ = detection_.near(poses_, search_);
-        const std::vector<char> inside = reached;
+        const auto inside = [&](int b) { return reached[b] != 0 && reached[b] < round; };
+        ++round;
         grown_.clear();
         for (const Touch& touch : touches_) {
             const int a = touch.contact.first, b = touch.contact.second;
-            if (inside[a]) reach(b);
-            if (inside[b]) reach(a);
+            if (inside(a)) reach(b);
+            if (inside(b)) reach(a);
         }
         for (const IndexPair& pair : near_) {
             const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-            if (!inside[a] && !inside[b]) continue;
+            if (!inside(a) && !inside(b)) continue;
             const std::uint64_t key = pair_of(pair);
             const auto touch = std::lower_bound(
                 touches_.begin(), touches_.end(), key,
