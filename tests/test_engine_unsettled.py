@@ -55,7 +55,7 @@ def test_what_is_reported_is_what_is_judged(scene: Scene, sweeps: int) -> None:
     assert f"off by up to {low.residual:.3g} m/s" in low.failure
 
 
-@pytest.mark.parametrize(("sweeps", "sunk"), [(5, False), (10, True), (50, True), (200, True)])
+@pytest.mark.parametrize(("sweeps", "sunk"), [(5, False), (10, False), (50, True), (200, True)])
 def test_a_hundred_boxes_on_sweeps_are_no_answer(sweeps: int, sunk: bool) -> None:
     """It names the first step and the body: a row is off by more than allowed, or boxes sank step after step, and which."""
     size, deep = 1.0, Maximum(quantity=Penetration())

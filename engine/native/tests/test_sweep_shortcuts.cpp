@@ -311,8 +311,9 @@ void work_is_what_was_swept() {
     EXPECT_NEAR(heap.sweeps.work(), 3.0 + 1.0 / 16.0, 1e-12);
     SweepContact wall = between(20, -1, {0, 1, 0}, 0.0);
     heap.add(wall);
-    heap.sweeps.run(1, 1e-9, 0.5, nothing_more);  // the wall's contact
-    EXPECT_NEAR(heap.sweeps.work() * (bodies + 1), (3.0 + 1.0 / 16.0) * bodies + 1.0 + bodies / 16.0, 1e-9);
+    heap.sweeps.run(1, 1e-9, 0.5, nothing_more);  // body 20 stands on one, carries one, and meets the wall
+    EXPECT_NEAR(heap.sweeps.work() * (bodies + 1), (3.0 + 1.0 / 16.0) * bodies + 3.0 + (bodies - 2) / 16.0,
+                1e-9);
     const double before = heap.sweeps.work();
     heap.sweeps.worst(0.5);
     EXPECT_NEAR(heap.sweeps.work(), before + 0.5, 1e-12);
@@ -399,78 +400,6 @@ void the_worst_contact_is_found_where_it_is() {
         }
 }
 
-/// What was measured is measured again where a body has moved since, and whoever has moved is named: turn by turn, with
-/// contacts that come late, as if all were looked at anew.
-void what_has_moved_is_measured_again() {
-    int named = 0, turns = 0;
-    for (unsigned seed = 0; seed < 40; ++seed) {
-        Random random(seed);
-        const int bodies = 60;
-        MixedSystem system = resting(bodies);
-        for (Vec6& p : system.momentum)
-            for (double& x : p) x = uniform(random, -1.0, 1.0);
-        Heap heap(system);
-        for (int k = 0; k < 70; ++k) heap.add(any_contact(random, bodies, 0.0));
-        std::vector<Vec6> before(bodies);
-        for (int turn = 0; turn < 30; ++turn) {
-            heap.sweeps.run(1 + turn % 3, 1e-13, 0.02, nothing_more);
-            if (turn % 4 == 1) heap.add(any_contact(random, bodies, 0.0));
-            const std::vector<int>& moved = heap.sweeps.moved();
-            for (int b = 0; b < bodies; ++b)
-                if (heap.sweeps.velocity(b) != before[b])
-                    EXPECT(heap.sweeps.all_moved() ||
-                           std::find(moved.begin(), moved.end(), b) != moved.end());
-            if (!heap.sweeps.all_moved()) named += static_cast<int>(moved.size()), ++turns;
-            for (int b = 0; b < bodies; ++b) before[b] = heap.sweeps.velocity(b);
-            heap.sweeps.forget_moves();
-            EXPECT(heap.sweeps.moved().empty());
-            const RowsResidual found = heap.sweeps.worst(0.02);
-            EXPECT_NEAR(found.residual, heap.worst(), 1e-12);
-            EXPECT_NEAR(heap.off(static_cast<std::size_t>(found.row)), heap.worst(), 1e-12);
-        }
-    }
-    EXPECT(turns > 100 && named > 0 &&
-           named < turns * 30);  // half of the bodies: few are, or nothing is saved
-}
-
-/// Items come in their order, those called meanwhile if their turn is to come, and again in the round after.
-void items_are_due_in_order() {
-    DueItems items;
-    items.start(4);
-    for (int item = 0; item < 200; ++item) items.add(item % 3, item % 2 == 0 ? 3 : 4);  // 4 is nobody
-    const auto taken = [&](int caller, int called) {
-        std::vector<int> all;
-        items.round([&](int item, int next) {
-            EXPECT(next == -1 || next > item);
-            all.push_back(item);
-            if (item == caller) items.call_twice(called);
-        });
-        return all;
-    };
-    EXPECT(taken(-1, 0).empty());
-    items.call_item(130);
-    items.call_item(7);
-    EXPECT((taken(-1, 0) == std::vector<int>{7, 130}));
-    items.call(1);
-    std::vector<int> wanted;
-    for (int item = 1; item < 200; item += 3) wanted.push_back(item);
-    EXPECT(taken(-1, 0) == wanted);
-    items.call_item(100);
-    wanted = {100};
-    for (int item = 101; item < 200; ++item)
-        if (item % 3 == 2) wanted.push_back(item);
-    EXPECT(taken(100, 2) == wanted);
-    wanted.clear();
-    for (int item = 2; item < 200; item += 3) wanted.push_back(item);
-    EXPECT(taken(-1, 0) == wanted);
-    EXPECT(taken(-1, 0).empty());
-    items.call(3);
-    EXPECT(taken(-1, 0).size() == 100);
-    items.call(3);
-    items.dismiss();
-    EXPECT(taken(-1, 0).empty());
-}
-
 }  // namespace
 
 int main() {
@@ -484,7 +413,5 @@ int main() {
     a_spent_island_stays_spent_in_another();
     a_step_knows_nothing_of_the_one_before();
     the_worst_contact_is_found_where_it_is();
-    what_has_moved_is_measured_again();
-    items_are_due_in_order();
     return report();
 }

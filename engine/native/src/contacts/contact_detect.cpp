@@ -108,18 +108,16 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
 /// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
 void ContactStage::find_open() {
     open_.clear();
-    open_items_.start(0);
     look_at(detection_.near(poses_, search_));
 }
 
 /// The same where the search has been widened for some bodies since: what is new is theirs.
 void ContactStage::find_open_again() {
     if (!detection_.near_again(grown_, search_, near_)) {
-        all_change();
+        changed_.assign(unknown_.size(), 1);
         return find_open();
     }
-    for (const int body : grown_)
-        if (changed_[body] == 0) changed_[body] = 1, movers_.push_back(body);
+    for (const int body : grown_) changed_[body] = 1;
     const auto in_order = [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; };
     std::erase_if(near_, [&](const IndexPair& pair) {
         const auto at = std::lower_bound(open_.begin(), open_.end(), pair,
@@ -129,7 +127,6 @@ void ContactStage::find_open_again() {
     const auto old = static_cast<std::ptrdiff_t>(open_.size());
     look_at(near_);
     std::inplace_merge(open_.begin(), open_.begin() + old, open_.end(), in_order);
-    open_items_.start(0);
 }
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
@@ -217,10 +214,69 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) c
     point.stretch[1] = across / point.material.friction;
 }
 
+/// The overlap at which a pair counts as met. Bodies sunk into a seamless support, or sinking while sweeps have not
+/// settled, meet the sides of its next part as deep as they are sunk; round shapes and planes have no sides.
+double ContactStage::slop(const OpenPair& open) const noexcept {
+    const int a = open.first, b = open.second;
+    const ShapeKind one = detection_.collider(open.pair.first).shape.kind;
+    const ShapeKind two = detection_.collider(open.pair.second).shape.kind;
+    const bool balls = one == ShapeKind::sphere && two == ShapeKind::sphere;
+    const bool sides = !balls && one != ShapeKind::plane && two != ShapeKind::plane;
+    return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
+           (sides ? 2.0 * std::max(depth_[a] + sinking_[a], depth_[b] + sinking_[b]) : 0.0);
+}
+
+/// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first
+/// round of first_touch(), without what that needs before.
+bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocity) const {
+    const int a = open.first, b = open.second;
+    if (event_time_[a] >= 0.0 || event_time_[b] >= 0.0) return false;
+    const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
+    double turning = 0.0;
+    if (open.first_arm != 0.0 || open.second_arm != 0.0) {
+        const double first = norm(cross(angular(velocity[a]), open.apart.normal)),
+                     second = norm(cross(angular(velocity[b]), open.apart.normal));
+        if ((open.first_arm < 0.0 && first > 0.0) || (open.second_arm < 0.0 && second > 0.0)) return false;
+        turning = first * open.first_arm + second * open.second_arm;
+    }
+    const double speed = std::max(0.0, closing) + turning;
+    if (!(speed * options_.time_step > open.apart.gap)) return open.apart.gap > 0.0;
+    const double slop = this->slop(open);
+    return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
+}
+
+/// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
+/// for an impact: if they need one, late_blow_ tells so, see blows_come_first().
+int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
+    const double h = options_.time_step;
+    int found = 0;
+    auto moved = [&](int b) {  // an event's bodies have gone part of their way with another velocity
+        Pose pose = poses_[b];
+        if (event_time_[b] >= 0.0)
+            pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
+        return pose;
+    };
+    std::erase_if(open_, [&](const OpenPair& open) {
+        if (late && !changed_[open.first] && !changed_[open.second]) return false;
+        if (passes(open, velocity)) return false;
+        const IndexPair pair = open.pair;
+        const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
+        const int a = one.body, b = two.body;
+        const Pose at_a = moved(a), at_b = moved(b);
+        const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
+        const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
+        const double time = first_touch(first, second, h, slop(open));
+        if (time < 0.0) return false;
+        const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
+        found += met;
+        return met;
+    });
+    return found;
+}
+
 bool ContactStage::meets(const std::vector<Vec6>& next, bool stopped) {
     plastic_first_ = stopped;  // blows that a stop's rebound leads to are found again after it
-    all_change();
-    changed_ = jointed_;  // others have been swept with what they fly with
+    changed_ = jointed_;       // others have been swept with what they fly with
     if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
     if (find_strikes(next, true) > 0) take_back_strikes(closed_points, next);
@@ -228,6 +284,79 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stopped) {
     counters_.contacts += points_.size();
     order_points();
     return true;
+}
+
+/// The points of a pair that meets at `time`, with the bodies where they will be then.
+bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
+                              const std::vector<Vec6>& velocity, bool late) {
+    const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
+    const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
+    scratch_.clear();
+    detection_.touch(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius), scratch_);
+    bool met = false;
+    for (const Contact& contact : scratch_) {
+        add_point(contact, first, second, time);
+        Point& point = points_.back();
+        const double closing = -relative(point, contact.point.normal, velocity, false);
+        // What forces give to one of them in this step is no blow, though both got it before one was held.
+        const double push = std::max({std::abs(relative(point, contact.point.normal, kick_, false)),
+                                      std::abs(dot(contact.point.normal, linear(kick_[contact.first]))),
+                                      std::abs(dot(contact.point.normal, linear(kick_[contact.second])))});
+        if (late && !plastic_first_ && point.material.restitution > 0.0 && closing > 4.0 * push) {
+            late_blow_ = true;
+            points_.pop_back();
+            continue;
+        }
+        point.meeting_gap = contact.point.gap;
+        point.contact.point.gap = std::max(0.0, contact.point.gap + time * closing);
+        met = true;
+    }
+    return met;
+}
+
+/// A strike that is no event acts with the bodies at the start of the step, or the angular momentum of both would
+/// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
+/// taken back half-way between both bodies.
+void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity) {
+    const double h = options_.time_step;
+    strikes_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
+    points_.resize(from);
+    for (std::size_t k = 0; k < strikes_.size();) {
+        const Contact meeting = strikes_[k].contact;
+        const double strike = strikes_[k].strike;
+        std::size_t end = k;
+        while (end < strikes_.size() &&
+               (strikes_[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
+            ++end;
+        if (strike < 0.0 || strikes_[k].event) {
+            for (; k < end; ++k) points_.push_back(strikes_[k]);
+            continue;
+        }
+        const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
+                             static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
+        scratch_.clear();
+        detection_.touch(pair, search_[meeting.first] + search_[meeting.second], scratch_);
+        const std::size_t old = points_.size();
+        bool stops = false;
+        for (const Contact& contact : scratch_) {
+            add_point(contact, poses_[contact.first], poses_[contact.second], strike);
+            stops =
+                stops ||
+                contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
+        }
+        if (stops) {
+            k = end;
+            continue;
+        }
+        points_.resize(old);
+        for (; k < end; ++k) {
+            Point& p = points_.emplace_back(strikes_[k]);
+            const Vec3 way = linear(velocity[p.contact.first]) + linear(velocity[p.contact.second]);
+            p.contact.point.position -= 0.5 * p.strike * way;
+            p.first_arm = p.contact.point.position - poses_[p.contact.first].position;
+            p.second_arm = p.contact.point.position - poses_[p.contact.second].position;
+        }
+    }
 }
 
 /// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
@@ -305,24 +434,11 @@ void ContactStage::find_events() {
     }
 }
 
-/// The keys of all points in order, each with the point's place; of equal ones the first comes first.
-const std::vector<std::pair<std::uint64_t, std::size_t>>& ContactStage::points_by_key() {
-    by_key_.clear();
-    for (const Point& point : points_) by_key_.emplace_back(point.contact.key, by_key_.size());
-    const auto late = std::is_sorted_until(by_key_.begin(), by_key_.end());
-    std::sort(late, by_key_.end());
-    std::inplace_merge(by_key_.begin(), late, by_key_.end());
-    return by_key_;
-}
-
 /// Sorts the points by key and finds each one's predecessor in the step before.
 void ContactStage::order_points() {
     const auto in_order = [](const Point& a, const Point& b) { return by_key(a.contact, b.contact); };
-    if (!std::is_sorted(points_.begin(), points_.end(), in_order)) {  // closed ones come so
-        strikes_.clear();
-        for (const auto& [key, k] : points_by_key()) strikes_.push_back(points_[k]);
-        points_.swap(strikes_);
-    }
+    if (!std::is_sorted(points_.begin(), points_.end(), in_order))  // closed ones come so
+        std::stable_sort(points_.begin(), points_.end(), in_order);
     std::size_t old = 0;
     for (Point& point : points_) {
         while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;

@@ -340,7 +340,7 @@ void ContactStage::after_impact(const MixedSystem& system) {
     std::vector<Vec6> next = velocity_;
     for (std::size_t b = 0; b < next.size(); ++b)
         if (unknown_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], kick_[b]);
-    all_change();
+    changed_.assign(next.size(), 1);
     if (outrun(next)) find_open_again();
     const std::size_t known = points_.size();
     const bool found = find_strikes(next, false) > 0;

@@ -65,36 +65,16 @@ void ContactStage::note_sinking() {
     }
 }
 
-/// Takes down the velocities so far, and who has another than at the look before.
-void ContactStage::note_movers() {
+/// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
+bool ContactStage::find_more() {
     const bool first = next_.empty();  // look of this step
-    const auto look = [&](std::size_t b) {
+    next_.resize(unknown_.size());
+    changed_.resize(unknown_.size());
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
         const Vec6& now = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
         changed_[b] = first || next_[b] != now;
         next_[b] = now;
-    };
-    next_.resize(unknown_.size());
-    if (first || sweeps_.all_moved()) {
-        all_change();
-        for (std::size_t b = 0; b < unknown_.size(); ++b) look(b);
-    } else {
-        if (all_changed_) changed_.assign(unknown_.size(), 0);
-        else
-            for (const int body : movers_) changed_[body] = 0;
-        all_changed_ = false;
-        movers_.clear();
-        for (const int unknown : sweeps_.moved()) {
-            const int body = body_of_[unknown];
-            look(static_cast<std::size_t>(body));
-            if (changed_[body] != 0) movers_.push_back(body);
-        }
     }
-    sweeps_.forget_moves();
-}
-
-/// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
-bool ContactStage::find_more() {
-    note_movers();
     if (outrun(next_)) find_open_again();
     if (swings_) note_sinking();
     const std::size_t known = points_.size();
@@ -127,7 +107,7 @@ void ContactStage::take_in(std::size_t known) {
 bool ContactStage::is_settled(MixedSystem& system) {
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
-    if (!system.rows.empty()) sweeps_.write(system);
+    sweeps_.write(system);
     const RowsResidual contact = sweeps_.worst(focus * options_.unsettled_residual),
                        joint = rows_residual(system, {}, options_.friction);
     residual_ = std::max(contact.residual, joint.residual);
@@ -208,18 +188,13 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     sunk_ = false;
     for (bool again = true; again;) {
         again = false;
-        bool look = true;  // for more; while some are far off they are led on first, but joints may stay off
         for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
             report = sweeps_.run(options_.iterations, options_.residual_tolerance,
-                                 focus * options_.unsettled_residual, [&] { return look && find_more(); });
+                                 focus * options_.unsettled_residual, [this] { return find_more(); });
             counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-            if (!report.finite) break;
-            const bool settled = is_settled(system) || report.converged;
-            if (settled && look) break;
-            look = settled || !system.rows.empty();
+            if (!report.finite || is_settled(system) || report.converged) break;
             if (turn + 1 >= joint_turns && joint_is_worst_) break;
         }
-        sweeps_.write(system);
         if (!report.finite) break;
         if (!late_blow_) {
             if (stop_comes_first(system, begun, next_)) return true;
@@ -228,7 +203,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
         late_blow_ = false;  // it was one by velocities on the way
         for (std::size_t b = 0; b < unknown_.size(); ++b)
             if (unknown_[b] >= 0) next_[b] = sweeps_.velocity(unknown_[b]);
-        all_change();
+        changed_.assign(unknown_.size(), 1);
         const std::size_t known = points_.size();
         if (find_strikes(next_, true) > 0) take_back_strikes(known, next_);
         if (blows_come_first() || stop_comes_first(system, begun, next_)) return true;
@@ -247,7 +222,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0 && event_time_[b] >= 0.0) held_[unknown_[b]] = 1;
     touches_.clear();
-    for (const auto& [key, k] : points_by_key()) {
+    for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         double impulse[3];
         std::copy_n(sweeps_.impulse(static_cast<int>(k)), 3, impulse);
@@ -262,6 +237,8 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;
     }
     if (report.finite) correct_events(system);
+    std::stable_sort(touches_.begin(), touches_.end(),
+                     [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; });
     return report.finite;
 }
 

@@ -96,12 +96,6 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     for (const auto& [a, b] : joints_)
         for (const int body : {a, b})
             if (body >= 0) jointed_[body] = 1;
-    for (std::size_t b = 0; b < bodies; ++b)
-        if (unknown_[b] >= 0) {
-            if (static_cast<std::size_t>(unknown_[b]) >= body_of_.size())
-                body_of_.resize(unknown_[b] + 1, -1);
-            body_of_[unknown_[b]] = static_cast<int>(b);
-        }
 }
 
 double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
@@ -313,7 +307,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();
-        all_change();
+        changed_.assign(next.size(), 1);
         if (outrun(next)) find_open_again();
         find_turned(next);
         const std::size_t taken = points_.size();
@@ -409,16 +403,12 @@ void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
 /// Whether some body goes further than the search for pairs allowed for; if so, the search is widened.
 bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
     bool faster = false;
-    const auto look = [&](std::size_t b) {
+    for (std::size_t b = 0; b < margin_.size(); ++b) {
+        if (!changed_[b]) continue;
         const double margin = margin_of(b, velocity, velocity);
         faster = faster || margin > search_[b] * (1.0 + 1e-9);
         margin_[b] = std::max(margin_[b], margin);
-    };
-    if (!all_changed_)
-        for (const int body : movers_) look(static_cast<std::size_t>(body));
-    else
-        for (std::size_t b = 0; b < margin_.size(); ++b)
-            if (changed_[b] != 0) look(b);
+    }
     if (!faster) return false;
     grown_.clear();
     for (std::size_t b = 0; b < margin_.size(); ++b)

@@ -52,7 +52,6 @@
 
 #include <cstdint>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -254,7 +253,6 @@ private:
         int first, second;  // bodies
         Separation apart;
         double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
-        bool met = false;                          // since; it has points
     };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void orient(Point& point, const Pose& first, const Pose& second) const;
@@ -265,9 +263,6 @@ private:
     bool find_left_out(const std::vector<Vec6>& velocity);
     void look_at(const std::vector<IndexPair>& near);
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
-    int find_strikes_of_movers(const std::vector<Vec6>& velocity);
-    bool strikes(const OpenPair& open, const std::vector<Vec6>& velocity, bool late);
-    void all_change();
     bool find_turned(const std::vector<Vec6>& velocity);
     bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
     bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
@@ -275,7 +270,6 @@ private:
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
     void order_points();
-    const std::vector<std::pair<std::uint64_t, std::size_t>>& points_by_key();
     void measure_points();
     double margin_of(std::size_t body, const std::vector<Vec6>& velocity,
                      const std::vector<Vec6>& other) const;
@@ -320,7 +314,6 @@ private:
     Unanswered find_unanswered(std::size_t bodies, std::size_t known) const;
     bool find_more();
     void take_in(std::size_t known);
-    void note_movers();
     void note_sinking();
     bool is_settled(MixedSystem& system);
     void hand_over();
@@ -376,16 +369,11 @@ private:
     bool begun_ = false;                     // whether it is known
     std::vector<Vec6> next_;                 // velocities between sweeps, per body of the scene
     std::vector<char> changed_;  // who has another than at the look before: the rest was judged then
-    bool all_changed_ = true;    // else those are named,
-    std::vector<int> movers_;    // here
-    std::vector<int> body_of_;   // of the scene, by unknown
-    std::vector<std::pair<std::uint64_t, std::size_t>> by_key_;  // see points_by_key()
-    std::size_t handed_over_ = 0, ordered_ = 0;                  // points the sweeps have; points in order
+    std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     LargeArray<OpenPair> open_;
-    DueItems open_items_;            // the same, to find those of a few bodies; none until that is asked
     std::vector<IndexPair> beside_;  // pairs without points, where others part
     std::vector<IndexPair> near_;    // where the search was widened
     std::vector<int> grown_;         // whom it was widened for

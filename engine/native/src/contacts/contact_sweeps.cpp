@@ -12,19 +12,11 @@ namespace spook {
 
 namespace {
 
-constexpr int late_rounds = 3;  // of sweeps for contacts found after the last one
-constexpr int cold = -2;        // before every sweep
-// Shares of a sweep of a contact, counted as work so that turns which sweep little come to an end, too.
-constexpr double measuring = 0.5;                    // to see how far off it is
-constexpr double glance = 1.0 / 16.0;                // to leave it alone
+constexpr int late_rounds = 3;         // of sweeps for contacts found after the last one
+constexpr int cold = -2;               // before every sweep
+constexpr double glance = 1.0 / 16.0;  // of what sweeping a contact costs: to see that it is cold
+constexpr double measuring = 0.5;      // the same: to see how far off it is
 constexpr int bodies_ahead = 2, contacts_ahead = 4;  // asked for while others are swept
-
-/// Asks the memory for what will be read.
-template <class What> void ask(const What& what) noexcept {
-    constexpr std::size_t line = 64;
-    const char* const at = reinterpret_cast<const char*>(&what);
-    for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
-}
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
@@ -75,7 +67,6 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     std::iota(parent_.begin(), parent_.end(), 0);
     head_.assign(bodies_ + 1, -1);
     tail_.assign(bodies_ + 1, -1);
-    size_.assign(bodies_ + 1, 0);
     active_.assign(bodies_ + 1, 0);
     spent_.assign(bodies_ + 1, 0);
     left_.assign(bodies_ + 1, 0.0);
@@ -86,20 +77,9 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     stamp_ = 0;
     done_ = 0.0;
     hot_.assign(bodies_ + 1, cold);
-    last_hot_ = warm_at_ = cold;
-    due_.start(0);
-    worst_of_.assign(bodies_ + 1, 0.0);
-    moved_.clear();
-    moves_.assign(bodies_ + 1, 0);
-    all_moved_ = true;
-    moved_at_.assign(bodies_ + 1, cold);
-    off_.clear();
-    all_moved_at_ = measured_at_ = cold;
-    wide_ = false;
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
         int anchor = std::max(rows.first, rows.second);
-        wide_ = wide_ || !rows.beyond.empty();
         for (const Beyond& other : rows.beyond) {
             if (anchor < 0) anchor = other.body;
             else if (other.body >= 0) join(anchor, other.body);
@@ -152,9 +132,8 @@ int ContactSweeps::add(const SweepContact& given) {
     if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
         push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * c.across);
-    note_moved(c.first), note_moved(c.second);
+    heat({c.first, c.second});
     const int index = static_cast<int>(contacts_.size()) - 1;
-    if (stamp_ > 0) warm(joint_count_ + index);
     link(joint_count_ + index, given.first, given.second);
     return index;
 }
@@ -190,7 +169,6 @@ void ContactSweeps::join(int first, int second) {
     }
     tail_[a] = tail_[b];
     head_[b] = -1;
-    size_[a] += size_[b];
 }
 
 void ContactSweeps::chain(int item) {
@@ -204,7 +182,6 @@ void ContactSweeps::chain(int item) {
         next_[tail_[island]] = item;
     }
     tail_[island] = item;
-    ++size_[island];
     active_[island] = 1;
 }
 
@@ -262,26 +239,22 @@ double ContactSweeps::update(Contact& c) noexcept {
     return change;
 }
 
-/// Asks for what an item will read: in large heaps it comes from far away.
-void ContactSweeps::ask_for_bodies(int item) const noexcept {
-    for (const int body : {bodies_of_[item].first, bodies_of_[item].second}) {
-        ask(joints_.velocity()[body]);
-        ask(inertia_[body]);
-    }
-}
-
-/// The same for those behind this one.
+/// Asks for what the items behind this one will read: in large heaps bodies come from far away.
 void ContactSweeps::fetch(int item) const noexcept {
+    const auto ask = [](const auto& what) {
+        constexpr std::size_t line = 64;
+        const char* const at = reinterpret_cast<const char*>(&what);
+        for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
+    };
     // Items follow each other, but where islands grew together: a guess that costs nothing where it is wrong.
     const int items = static_cast<int>(bodies_of_.size());
-    if (const int soon = item + bodies_ahead; soon >= joint_count_ && soon < items) ask_for_bodies(soon);
+    if (const int soon = item + bodies_ahead; soon >= joint_count_ && soon < items)
+        for (const int body : {bodies_of_[soon].first, bodies_of_[soon].second}) {
+            ask(joints_.velocity()[body]);
+            ask(inertia_[body]);
+        }
     if (const int later = item + contacts_ahead; later >= joint_count_ && later < items)
         ask(contacts_[later - joint_count_]);
-}
-
-double ContactSweeps::sweep_item(int item) noexcept {
-    return item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
-                               : update(contacts_[item - joint_count_]);
 }
 
 double ContactSweeps::sweep_island(int island) noexcept {
@@ -289,74 +262,35 @@ double ContactSweeps::sweep_island(int island) noexcept {
     int swept = 0;
     for (int item = head_[island]; item >= 0; item = next_[item], ++swept) {
         fetch(item);
-        change = larger(change, sweep_item(item));
+        const double own = item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
+                                               : update(contacts_[item - joint_count_]);
+        change = larger(change, own);
     }
     done_ += swept;
-    all_moved_ = true;
-    all_moved_at_ = stamp_;
     return change;
 }
 
-/// Between two sweeps: in the next one the item is due.
-void ContactSweeps::warm(int item) {
-    if (warm_at_ != stamp_) warm_.clear();
-    warm_at_ = stamp_;
-    warm_.push_back(item);
+void ContactSweeps::heat(Both bodies) noexcept {
+    if (bodies.first < bodies_) hot_[bodies.first] = stamp_;
+    if (bodies.second < bodies_) hot_[bodies.second] = stamp_;
 }
 
-void ContactSweeps::note_moved(int body) {
-    if (body == bodies_) return;
-    moved_at_[body] = stamp_;
-    if (all_moved_ || moves_[body] != 0) return;
-    moves_[body] = 1;
-    moved_.push_back(body);
-}
-
-void ContactSweeps::forget_moves() {
-    for (const int body : moved_) moves_[body] = 0;
-    moved_.clear();
-    all_moved_ = false;
-}
-
-/// A contact's change is shared by its bodies, the lighter one takes more. Another contact of a body is put off by that
-/// part, and as much may come from its other end.
-void ContactSweeps::heat(int item, double change, double focus) noexcept {
-    if (change <= focus) return;
-    const auto [first, second] = bodies_of_[item];
-    const double one = inertia_[first].inverse_mass, two = inertia_[second].inverse_mass;
-    const double enough = item < joint_count_ ? 0.0 : 0.5 * focus * (one + two);
-    const auto call = [&](int body, double part) {
-        if (part <= enough || body == bodies_ || hot_[body] == stamp_) return;
-        hot_[body] = stamp_;
-        due_.call_twice(body);
-    };
-    call(first, change * one);
-    call(second, change * two);
-}
-
-/// Of spent islands the joints, the contacts of hot bodies, and what is warm.
-void ContactSweeps::sweep_hot(double focus) {
-    if (due_.items() == 0) due_.start(bodies_);
-    for (std::size_t item = due_.items(); item < bodies_of_.size(); ++item)
-        due_.add(bodies_of_[item].first, bodies_of_[item].second);
-    if (last_hot_ != stamp_ - 1) due_.dismiss();
-    last_hot_ = stamp_;
-    if (warm_at_ == stamp_ - 1)
-        for (const int item : warm_) due_.call_item(item);
-    for (int joint = 0; joint < joint_count_; ++joint) due_.call_item(joint);
-    if (wide_) all_moved_ = true, all_moved_at_ = stamp_;
-    due_.round([&](int item, int next) {
-        const auto [first, second] = bodies_of_[item];
-        if (std::min(first, second) == bodies_) return;
-        const int island = root(std::min(first, second));
-        if (!active_[island] || !spent_[island]) return;
-        if (next >= joint_count_) ask_for_bodies(next), ask(contacts_[next - joint_count_]);
-        const double change = sweep_item(item);
-        done_ += 1.0 - glance;
-        note_moved(first), note_moved(second);
-        worst_of_[island] = larger(worst_of_[island], change);
-        heat(item, change, focus);
-    });
+/// As sweep_island(), but of the contacts only those of hot bodies.
+double ContactSweeps::sweep_hot(int island, double focus) noexcept {
+    double change = 0.0;
+    int seen = 0, swept = 0;
+    for (int item = head_[island]; item >= 0; item = next_[item], ++seen) {
+        const Both bodies = bodies_of_[item];
+        const bool joint = item < joint_count_;
+        if (!joint && hot_[bodies.first] < stamp_ - 1 && hot_[bodies.second] < stamp_ - 1) continue;
+        ++swept;
+        const double own = joint ? joints_.update_joint(static_cast<std::size_t>(item))
+                                 : update(contacts_[item - joint_count_]);
+        change = larger(change, own);
+        if (!(own <= focus)) heat(bodies);
+    }
+    done_ += swept + glance * (seen - swept);
+    return change;
 }
 
 FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus,
@@ -371,30 +305,19 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
     for (int sweep = 1, until = iterations;; ++sweep) {
         Watch::look();
         ++stamp_;
-        bool any = false, hot = false, whole = false;
-        for (const int island : roots_) {
+        bool any = false;
+        for (std::size_t k = 0; k < roots_.size(); ++k) {
+            const int island = roots_[k];
             if (!active_[island]) continue;
+            const bool spent = spent_[island] != 0;
+            const double change = spent ? sweep_hot(island, focus) : sweep_island(island);
+            left_[island] = spent ? larger(left_[island], change) : change;
             ++report.sweeps;
-            if (spent_[island]) {
-                hot = true;
-                done_ += glance * size_[island];
-                worst_of_[island] = 0.0;
-                continue;
-            }
-            whole = true;
-            left_[island] = sweep_island(island);
-            active_[island] = !(left_[island] <= tolerance);
-            any = any || active_[island];
-        }
-        if (hot) sweep_hot(focus);
-        for (const int island : roots_) {
-            if (!hot || !active_[island] || !spent_[island]) continue;
-            left_[island] = larger(left_[island], worst_of_[island]);
-            active_[island] = !(worst_of_[island] <= focus);
+            active_[island] = !(change <= (spent ? focus : tolerance));
             any = any || active_[island];
         }
         const bool over = !any || sweep >= until;
-        if (!over && (sweep < look || !whole)) continue;
+        if (!over && sweep < look) continue;
         look = 2 * sweep;
         if (sweep >= until)
             for (const int island : roots_) spent_[island] = spent_[island] || active_[island];
@@ -419,45 +342,35 @@ void ContactSweeps::write(MixedSystem& system) const {
     else system.velocity.assign(joints_.velocity().begin(), joints_.velocity().end() - 1);
 }
 
-/// How far a contact is from its law, m/s.
-double ContactSweeps::residual(const Contact& c) const noexcept {
-    const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
-                   add_turn(joints_.velocity()[c.second], c.second_arm);
-    const double w = dot(c.normal, u) + c.softness * c.impulse[0] - c.right[0];
-    const double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
-    if (!(c.friction > 0.0)) return residual;
-    const double b1 = c.impulse[1], b2 = c.impulse[2];
-    const double s1 = dot(c.tangent, u) + c.slip_softness * b1 - c.right[1];
-    const double s2 = dot(c.across, u) + c.slip_softness * b2 - c.right[2];
-    const double bound = c.friction * (model_ == FrictionModel::box ? c.normal_before : c.impulse[0]);
-    double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
-    bool sticks = true;
-    if (model_ == FrictionModel::cone) {
-        const double reach = length(z1, z2);
-        sticks = reach <= bound;
-        if (!sticks) z1 *= bound / reach, z2 *= bound / reach;
-    } else {
-        sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
-        z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
-    }
-    return std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
-}
-
 RowsResidual ContactSweeps::worst(double focus) {
     RowsResidual worst{0.0, -1};
-    const bool all = all_moved_at_ >= measured_at_;
-    const std::size_t known = off_.size();
-    off_.resize(contacts_.size());
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const auto [first, second] = bodies_of_[joint_count_ + k];
-        if (all || k >= known || moved_at_[first] >= measured_at_ || moved_at_[second] >= measured_at_)
-            off_[k] = residual(contacts_[k]);
-        if (!(off_[k] <= focus)) warm(joint_count_ + static_cast<int>(k));
-        const bool worse = !(off_[k] <= worst.residual) && !std::isnan(worst.residual);
-        if (worse) worst = {off_[k], static_cast<int>(k)};
-    }
-    measured_at_ = stamp_;
     done_ += measuring * static_cast<double>(next_.size());
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& c = contacts_[k];
+        const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
+                       add_turn(joints_.velocity()[c.second], c.second_arm);
+        const double w = dot(c.normal, u) + c.softness * c.impulse[0] - c.right[0];
+        double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+        const double b1 = c.impulse[1], b2 = c.impulse[2];
+        const double s1 = dot(c.tangent, u) + c.slip_softness * b1 - c.right[1];
+        const double s2 = dot(c.across, u) + c.slip_softness * b2 - c.right[2];
+        const double bound = c.friction * (model_ == FrictionModel::box ? c.normal_before : c.impulse[0]);
+        double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
+        bool sticks = true;
+        if (model_ == FrictionModel::cone) {
+            const double reach = length(z1, z2);
+            sticks = reach <= bound;
+            if (!sticks) z1 *= bound / reach, z2 *= bound / reach;
+        } else {
+            sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
+            z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
+        }
+        if (c.friction > 0.0)
+            residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
+        if (!(residual <= focus)) heat({c.first, c.second});
+        const bool worse = !(residual <= worst.residual) && !std::isnan(worst.residual);
+        if (worse) worst = {residual, static_cast<int>(k)};
+    }
     return worst;
 }
 

@@ -4,7 +4,6 @@
 #include <functional>
 #include <vector>
 
-#include "contacts/due_items.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/sweep_rows.hpp"
 #include "linear/large_array.hpp"
@@ -42,11 +41,10 @@ public:
     int add(const SweepContact& contact);
 
     /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
-    /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep, while some island is not spent, and when
-    /// all is done: it may add contacts and says whether it did; those that come after the last sweep get `iterations`
-    /// more, three times at most. May be called again, to go on. What is spent is swept only where a contact is new, was
-    /// found by worst(), or where a body was just changed by more than half of `focus` [m/s]: in a large heap something
-    /// somewhere always asks.
+    /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep and when all is done: it may add
+    /// contacts and says whether it did; those that come after the last sweep get `iterations` more, three times at
+    /// most. May be called again, to go on. What is spent is swept only where a body is new to its contacts, was
+    /// found by worst(), or was just changed by more than `focus` [m/s]: in a large heap something somewhere always asks.
     FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool()>& more);
 
     /// What has been done since start(), in sweeps over everything there is now; looking for the worst is work, too.
@@ -56,11 +54,6 @@ public:
     const double* impulse(int contact) const noexcept { return contacts_[contact].impulse; }
     /// Multipliers of joints, and all velocities.
     void write(MixedSystem& system) const;
-    /// Whose velocity the sweeps may have changed since forget_moves(): everybody's, or that of moved() at most.
-    bool all_moved() const noexcept { return all_moved_; }
-    const std::vector<int>& moved() const noexcept { return moved_; }
-    void forget_moves();
-
     /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index. Those
     /// further off than `focus` [m/s] are where the next run goes on.
     RowsResidual worst(double focus);
@@ -96,15 +89,10 @@ private:
     void link(int item, int first, int second);
     void join(int first, int second);
     void chain(int item);
-    void ask_for_bodies(int item) const noexcept;
     void fetch(int item) const noexcept;
-    void warm(int item);
-    void heat(int item, double change, double focus) noexcept;
-    void note_moved(int body);
-    double sweep_item(int item) noexcept;
+    void heat(Both bodies) noexcept;
     double sweep_island(int root) noexcept;
-    void sweep_hot(double focus);
-    double residual(const Contact& contact) const noexcept;
+    double sweep_hot(int root, double focus) noexcept;
 
     FrictionModel model_ = FrictionModel::cone;
     Sweeper joints_;
@@ -113,26 +101,15 @@ private:
     LargeArray<Contact> contacts_;
     LargeArray<Slip> slips_;  // of each
     // Islands: bodies joined by union-find; the items of one, joints first, are a chain in the order they came.
-    std::vector<int> parent_, head_, tail_, size_, next_;
+    std::vector<int> parent_, head_, tail_, next_;
     std::vector<Both> bodies_of_;
     std::vector<int> roots_;
     std::vector<char> active_, spent_;
     std::vector<double> left_;  // the last sweep's change, by root; the largest since it is spent
-    std::vector<int> hot_;      // the last sweep that changed a body much
-    DueItems due_;              // the items of hot bodies, from the first sweep on that leaves others alone
-    std::vector<int> warm_;     // items that are to be swept because of what was found between two sweeps
-    int warm_at_ = 0;           // after this one
-    std::vector<double> worst_of_;         // a spent island's change in this sweep, by root
-    int stamp_ = 0, last_hot_ = 0;         // counts sweeps; the last that left out what is not hot
-    double done_ = 0.0;                    // items swept, and looked at for less
-    bool chained_ = false, wide_ = false;  // rows of more than two bodies
-    bool all_moved_ = true;
-    std::vector<int> moved_;
-    std::vector<char> moves_;  // who is in it
-    // How far each contact was off when it was last measured; since then, whose bodies have moved, in which sweep.
-    std::vector<double> off_;
-    std::vector<int> moved_at_;
-    int all_moved_at_ = 0, measured_at_ = 0;
+    std::vector<int> hot_;      // the last sweep that changed a body's rows much
+    int stamp_ = 0;             // counts sweeps
+    double done_ = 0.0;         // items swept, and looked at for less
+    bool chained_ = false;
 };
 
 }  // namespace spook
