@@ -207,24 +207,11 @@ def test_balls_held_by_joints_go_on_after_a_blow_as_it_left_them(h: float, solve
 
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
-@pytest.mark.parametrize("seed", [20, 1, 2])
+@pytest.mark.parametrize("seed", [3, 21, 39])
 def test_momentum_is_kept_where_successive_blows_come_to_no_end(seed: int, solver: str) -> None:
     """Eight balls of .01 to 100 kg in a row: after hundreds of blows in one step the rest is one blow of fifteen pairs,
-    of which seven are enough. Impulses of 1e17 N s changed the momentum by 245 %, in a run that was completed."""
+    of which seven are enough. Elimination met pivots that were rounding: momentum changed by up to 154 %, told completed."""
     masses = 10.0 ** np.random.default_rng(seed).uniform(-2.0, 2.0, 8)
-    if seed == 20:
-        masses = np.array(
-            [
-                0.0306816542,
-                1.23149714,
-                0.433185225,
-                0.0193445303,
-                0.0248809354,
-                88.1360242,
-                5.97408681,
-                0.623381402,
-            ]
-        )
     places = [0.0, 0.2, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6]
     balls = tuple(
         ball(f"ball {k}", x, 12.43932973 if k < 2 else 0.0, float(masses[k]), 1.0)

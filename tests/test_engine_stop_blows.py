@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Maximum,
     Method,
     Penetration,
-    Plane,
     Position,
     Prismatic,
     RigidBody,
@@ -27,20 +26,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
-
-STEPS = [1 / 60, 1 / 240, 1e-3]
-SOLVERS = ["direct", "iterative", "hybrid"]
-
-
-def floor(material: Material) -> RigidBody:
-    return RigidBody(name="floor", motion="static", shape=Plane(), position=(0, 0, 0), material=material)
-
-
-def ball(
-    name: str, position: tuple[float, float, float], velocity: tuple[float, float, float], **fields: object
-) -> RigidBody:
-    given = {"mass": 1.0, "shape": Sphere(0.1)} | fields
-    return RigidBody(name=name, position=position, velocity=velocity, **given)  # type: ignore[arg-type]
+from tests.test_engine_blows import SOLVERS, STEPS, ball, floor
 
 
 @pytest.mark.parametrize("h", STEPS)
