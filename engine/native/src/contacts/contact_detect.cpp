@@ -274,12 +274,19 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     return found;
 }
 
-bool ContactStage::meets(const std::vector<Vec6>& next, bool stopped) {
-    plastic_first_ = stopped;  // blows that a stop's rebound leads to are found again after it
-    changed_ = jointed_;       // others have been swept with what they fly with
+bool ContactStage::meets(const std::vector<Vec6>& next, bool struck, bool rebounds) {
+    plastic_first_ = rebounds;  // blows that a stop's rebound leads to are found again after it
+    late_blow_ = false;
+    changed_ = jointed_;  // others have been swept with what they fly with
     if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
-    if (find_strikes(next, true) > 0) take_back_strikes(closed_points, next);
+    int found = find_strikes(next, true);
+    if (late_blow_ && struck &&
+        !plastic_first_) {  // so are those to whom it leaves a body that it only stops
+        plastic_first_ = true;
+        found += find_strikes(next, true);
+    }
+    if (found > 0) take_back_strikes(closed_points, next);
     if (points_.empty()) return false;
     counters_.contacts += points_.size();
     order_points();

@@ -24,11 +24,6 @@ constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not 
 /// Of successive blows in one step.
 int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }
 
-bool is_hit(const RowBlock& block) noexcept { return block.stop.rebound != 0.0; }
-bool any_hit(const MixedSystem& system) noexcept {
-    return std::any_of(system.rows.begin(), system.rows.end(), is_hit);
-}
-
 /// Of each island's bodies, J.
 std::vector<double> kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity,
                                    const Islands& islands) {
@@ -191,10 +186,17 @@ int ContactStage::island_of(const Islands& islands, const Point& point) const no
     return islands.of_body[std::max(unknown_[point.contact.first], unknown_[point.contact.second])];
 }
 
-/// Whether some stop sends back what hits it where contacts are to hear of it: what it sets in motion may push them, and
+/// Whether a joint's stop takes part in blows: it sends back what hits it, or plastic blows are met as well.
+bool ContactStage::is_hit(const RowBlock& block) const noexcept {
+    return block.stop.rebound != 0.0 || (plastic_first_ && block.stop.struck);
+}
+
+/// Whether some stop is hit where contacts are to hear of it: what it sets in motion may push them, and
 /// Newton's law for it and resting rows for them would raise the energy. A stop alone is left to the resting stage.
 bool ContactStage::stop_is_hit(const MixedSystem& system) const {
-    if (points_.empty() || !any_hit(system)) return false;
+    if (points_.empty()) return false;
+    const auto hit = [this](const RowBlock& block) { return is_hit(block); };
+    if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
     if (impact_rounds_ > most_rounds(points_.size())) return false;
     const Islands islands = hanging(system, system.rows.size());
     std::vector<char> touched(islands.count, 0);
@@ -208,7 +210,8 @@ bool ContactStage::stop_is_hit(const MixedSystem& system) const {
 /// were. Such blows come after the stop's.
 bool ContactStage::stop_comes_first(const MixedSystem& system, std::size_t known,
                                     const std::vector<Vec6>& next) {
-    if (!any_hit(system)) return false;
+    const auto hit = [this](const RowBlock& block) { return is_hit(block); };
+    if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
     if (late_blow_) {
         plastic_first_ = true;  // keeps them
         find_left_out(next);
@@ -217,6 +220,13 @@ bool ContactStage::stop_comes_first(const MixedSystem& system, std::size_t known
     order_points();
     measure_points();
     return true;
+}
+
+/// Whether what was found leads past the far end of some stop: it needs a row before this step can be solved.
+bool ContactStage::pass_other_ends(const MixedSystem& system, std::size_t joints) {
+    for (std::size_t k = 0; k < joints; ++k)
+        ends_passed_ = ends_passed_ || passes_other_end(system.rows[k], system.velocity, options_.time_step);
+    return ends_passed_;
 }
 
 /// The rows of joints as a blow sees them, of those that hang together with a point that is struck, or that have a stop

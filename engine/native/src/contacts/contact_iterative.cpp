@@ -211,6 +211,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
         again = points_.size() > known;
         if (again) take_in(known);
     }
+    if (report.finite && pass_other_ends(system, system.rows.size())) return true;
     counters_.unsettled += !report.converged;
 
     std::vector<double> share;

@@ -278,7 +278,7 @@ RowBlock ContactStage::resting_row(Point& point) const {
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
-    foreseen_ = false;
+    foreseen_ = ends_passed_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) return solve_by_sweeps(system);
     std::vector<FrictionPoint> friction;
     std::vector<Vec6> next;
@@ -315,7 +315,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
         if (blows_come_first() || stop_comes_first(system, known, next)) return true;
         if (late_blow_) find_left_out(next);
-        if (points_.size() == known) break;
+        if (points_.size() == known) {
+            if (pass_other_ends(system, joints)) return true;
+            break;
+        }
         counters_.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
             read_back(system.rows[joints + k], points_[k]);

@@ -112,8 +112,9 @@ public:
                 const std::vector<Vec6>& free_velocity);
 
     /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per
-    /// body of the scene. Then it is a step with contacts. `stopped`: some stop among the joints has been hit.
-    bool meets(const std::vector<Vec6>& next, bool stopped);
+    /// body of the scene. Then it is a step with contacts. Whether some stop among the joints is `struck`, and whether one
+    /// `rebounds`.
+    bool meets(const std::vector<Vec6>& next, bool struck, bool rebounds);
 
     /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
     /// `system` is hit that hangs together with bodies in contact; asked anew after each impact.
@@ -131,8 +132,12 @@ public:
 
     /// The resting stage. `system` holds mass, momentum M v + h f (less the lead) and rows of joints, `velocity` is
     /// v after the impact. Appends rows of contacts behind those of joints; fills velocity and multipliers.
-    /// False if a value was not finite.
+    /// False if a value was not finite. It ends unfinished where ends_passed().
     bool solve(MixedSystem& system, const std::vector<Vec6>& velocity);
+
+    /// Whether the solve leads past the end of some joint's stop whose row is that of its other end: it is to be solved
+    /// again with rows for both.
+    bool ends_passed() const noexcept { return ends_passed_; }
 
     /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none. It leads an event's
     /// bodies to where they are at the step's end.
@@ -284,8 +289,10 @@ private:
                        FrictionModel model, const std::vector<char>* answered = nullptr);
     Islands hanging(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
+    bool is_hit(const RowBlock& block) const noexcept;
     bool stop_is_hit(const MixedSystem& system) const;
     bool stop_comes_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
+    bool pass_other_ends(const MixedSystem& system, std::size_t joints);
     void take_part(MixedSystem& system, const std::vector<std::size_t>& who,
                    std::vector<RowBlock>& rows) const;
     void share_blow(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& who) const;
@@ -394,6 +401,7 @@ private:
     bool foreseen_ = false;       // the step's next solve starts from foresee()
     bool late_blow_ = false;      // a strike found after the solve needs an impact
     bool plastic_first_ = false;  // plastic blows are met in the impact as well
+    bool ends_passed_ = false;    // by the last solve
     int impact_rounds_ = 0;
     double residual_ = 0.0, unsettled_by_ = 0.0;
     bool sunk_ = false;

@@ -7,6 +7,7 @@
 // limit, have 0 and infinity; a motor has ∓ time step times its largest force; friction has ∓ mu nu.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <span>
@@ -32,8 +33,15 @@ struct Beyond {
 struct StopRow {
     int row = -1;           // of the block; −1: it has none
     bool touching = false;  // as the step begins
+    bool struck = false;    // its rate leads there within the step
     double rebound = 0.0;   // where it is hit, the rate it sends back, m/s or rad/s; else 0
     bool answered = false;  // by a blow
+    // Of a stop with two ends:
+    double room = unbounded;  // to the other end, m or rad
+    double range = 0.0;       // from one to the other
+    double other = 0.0;       // right side of a row for the other end
+    double given = 0.0;       // what bodies that move as they are told give to its rate, m/s or rad/s
+    bool both = false;        // the other end has its row, too
 };
 
 /// Up to six rows between two moving bodies (or one: `second` or `first` is −1), or one row over any number.
@@ -70,6 +78,18 @@ inline double row_velocity(const RowBlock& block, int i, const std::vector<Vec6>
     if (block.second >= 0) sum += dot(block.second_jacobian[i], velocity[block.second]);
     for (const Beyond& other : block.beyond) sum += dot(other.jacobian, velocity[other.body]);
     return sum;
+}
+
+/// Whether velocities lead within a step past the end of a stop whose row is that of its other end.
+inline bool passes_other_end(const RowBlock& block, const std::vector<Vec6>& velocity,
+                             double time_step) noexcept {
+    constexpr double passed = 1e-12;  // of its range: rounding
+    const StopRow& stop = block.stop;
+    if (stop.row < 0 || stop.both || stop.room == unbounded) return false;
+    const bool low = block.lower[stop.row] == 0.0, high = block.upper[stop.row] == 0.0;
+    if (low == high) return false;  // broken
+    const double way = time_step * (row_velocity(block, stop.row, velocity) + stop.given);
+    return (low ? way : -way) > std::max(0.0, stop.room) + passed * stop.range;
 }
 
 /// wᵢ = (G v)ᵢ + Sigᵢ zᵢ − rᵢ.

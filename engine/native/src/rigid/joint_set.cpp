@@ -168,8 +168,11 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         } else {
             const double inwards = low ? 1.0 : -1.0;
             right.stop.row = k;
-            const double value = one_sided(inwards, violation, row.rate, r, axial.restitution,
-                                           low ? up : down, state, right.stop);
+            const double room = right.stop.room = low ? up : down;
+            right.stop.range = axial.upper - axial.lower;
+            right.stop.other = inwards * (room > 0.0 ? room / time_step_ : r.violation_gain * room);
+            const double value =
+                one_sided(inwards, violation, row.rate, r, axial.restitution, room, state, right.stop);
             (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
@@ -202,9 +205,10 @@ double JointSet::one_sided(double inwards, double violation, double rate, const 
     const double gap = inwards * violation, approach = -inwards * rate;
     const bool open = gap > 0.0, hit = approach > 0.0 && state.at_limit * inwards <= 0.0;
     double value = open ? -violation / time_step_ : row.upsilon * rate - row.violation_gain * violation;
-    stop.touching = !open;
+    stop.touching = !open || state.met * inwards > 0.0;
     stop.rebound = 0.0;
-    if (restitution > 0.0 && approach > state.rebounds && (open ? time_step_ * approach > gap : hit))
+    stop.struck = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
+    if (restitution > 0.0 && stop.struck)
         value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
     else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
         value = -row.violation_gain * violation;

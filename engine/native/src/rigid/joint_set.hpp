@@ -68,6 +68,7 @@ public:
         bool broken = false;
         signed char at_limit = 0;  // 1 or −1: the lower or upper limit was closed in the last step,
         signed char closed = 0;    // and is in this one
+        signed char met = 0;       // the end at which a blow of the step has left it: it was on its way there
         double rebounds =
             0.0;  // only what arrives faster than this, m/s or rad/s: a blow of the step has answered it
         double given =
@@ -153,6 +154,7 @@ public:
         for (const int joint : stops_) {
             states[joint].at_limit = states[joint].closed;
             states[joint].rebounds = 0.0;
+            states[joint].met = 0;
         }
     }
     /// Counts the turns of tracked hinges that no drive follows anyway; after every step.

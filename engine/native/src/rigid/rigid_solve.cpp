@@ -291,6 +291,7 @@ void RigidSystem::fill_beyond(int block, RowBlock& rows, BlockRight& numbers,
 
 void RigidSystem::fill_rows() {
     const auto blocks = joints_.blocks();
+    mixed_.rows.resize(blocks.size());
     beyond_.resize(blocks.size());
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         RowBlock& rows = mixed_.rows[k];
@@ -306,12 +307,17 @@ void RigidSystem::fill_rows() {
                              s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z};
             const auto& jacobian = body == blocks[k].first ? rows.first_jacobian : rows.second_jacobian;
             for (int i = 0; i < rows.size; ++i) numbers.right[i] -= dot(jacobian[i], given);
+            if (const int i = numbers.stop.row; i >= 0) numbers.stop.given += dot(jacobian[i], given);
         }
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;
         rows.stop = numbers.stop;
         if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
+    }
+    for (const int k : other_ends_) {
+        mixed_.rows[k].stop.both = true;
+        mixed_.rows.push_back(other_end(mixed_.rows[k]));
     }
 }
 
@@ -384,7 +390,8 @@ void RigidSystem::judge_sweeps() {
     double speed = 0.0;
     for (const Vec6& v : mixed_.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
     if (!(worst.residual > method_.unsettled_residual + 1e-6 * speed)) return;
-    note_unsettled(body_of(worst.row), worst.residual);
+    const int blocks = static_cast<int>(joints_.blocks().size());
+    note_unsettled(body_of(worst.row < blocks ? worst.row : other_ends_[worst.row - blocks]), worst.residual);
 }
 
 /// Takes over what the contact stage has found of its last solve.
@@ -392,6 +399,16 @@ void RigidSystem::judge_contacts() {
     residual_ = std::max(residual_, contacts_->residual());
     if (contacts_->unsettled_body() >= 0)
         note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(), contacts_->unsettled_sunk());
+}
+
+/// Rows without contacts.
+bool RigidSystem::solve_joints() {
+    if (solver_ != RigidSolver::iterative) return pivot_rows();
+    std::vector<FrictionPoint> none;
+    const FrictionReport report =
+        solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
+    sweeps_ += static_cast<std::uint64_t>(report.sweeps);
+    return report.finite;
 }
 
 void RigidSystem::solve_mixed(bool touching) {
@@ -403,26 +420,17 @@ void RigidSystem::solve_mixed(bool touching) {
         return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
     };
     bool finite = true;
+    other_ends_.clear();
     do {
-        mixed_.rows.resize(blocks.size());
         fill_rows();
         while (blow()) impact();
         fill_momenta(true);
         if (clock_) clock_->mark(Stage::assemble_rows);
-        if (touching) finite = contacts_->solve(mixed_, velocities_);
-    } while (finite && blow());  // the solve may find some that is to come first
-    if (touching) {
-        judge_contacts();
-    } else if (solver_ == RigidSolver::iterative) {
-        std::vector<FrictionPoint> none;
-        const FrictionReport report =
-            solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
-        finite = report.finite;
-        judge_sweeps();
-        sweeps_ += static_cast<std::uint64_t>(report.sweeps);
-    } else {
-        finite = pivot_rows();
-    }
+        finite = touching ? contacts_->solve(mixed_, velocities_) : solve_joints();
+    } while (finite && (blow() || ((!touching || contacts_->ends_passed()) &&
+                                   find_other_ends())));  // the solve may find some that is to come first
+    if (touching) judge_contacts();
+    else if (solver_ == RigidSolver::iterative) judge_sweeps();
     if (!finite) {
         live_.not_solved = tied_.front();
         return;

@@ -130,10 +130,12 @@ bool RigidSystem::find_contacts() {
 /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, next_:
 /// swept with their own they do not. Then the step is to be solved with contacts.
 bool RigidSystem::meet_late() {
-    const bool stopped =
-        mixed_values_ && std::any_of(mixed_.rows.begin(), mixed_.rows.end(),
-                                     [](const RowBlock& block) { return block.stop.rebound != 0.0; });
-    if (!contacts_->meets(next_, stopped)) return false;
+    const auto any = [this](auto is) {
+        return mixed_values_ && std::any_of(mixed_.rows.begin(), mixed_.rows.end(), is);
+    };
+    const bool struck = any([](const RowBlock& block) { return block.stop.struck; }),
+               rebounds = any([](const RowBlock& block) { return block.stop.rebound != 0.0; });
+    if (!contacts_->meets(next_, struck, rebounds)) return false;
     touching_ = true;
     note_begin();
     return true;
@@ -147,12 +149,36 @@ void RigidSystem::impact() {
     take_velocities(true, [this](int k) { return !contacts_->held(k); });
     for (std::size_t k = 0; k < tied_.size(); ++k)
         if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
-    for (std::size_t k = 0; k < mixed_.rows.size(); ++k)
-        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered)
-            joints_.states[joints_.blocks()[k].joint].rebounds =
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
+        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered) {
+            JointSet::State& state = joints_.states[joints_.blocks()[k].joint];
+            state.rebounds =
                 method_.impacts == ImpactOrder::simultaneous ? unbounded : again * std::abs(stop.rebound);
+            if (stop.rebound == 0.0) state.met = mixed_.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
+        }
     fill_rows();
     if (clock_) clock_->mark(Stage::impact);
+}
+
+/// The row of the other end of a block's stop: the coordinate may get there within the step, no further.
+RowBlock RigidSystem::other_end(const RowBlock& block) {
+    const int i = block.stop.row;
+    RowBlock row;
+    row.first = block.first, row.second = block.second;
+    row.first_jacobian[0] = block.first_jacobian[i], row.second_jacobian[0] = block.second_jacobian[i];
+    row.softness[0] = block.softness[i];
+    row.right[0] = block.stop.other - block.stop.given;
+    (block.lower[i] == 0.0 ? row.upper : row.lower)[0] = 0.0;
+    row.stop.row = 0;
+    return row;
+}
+
+/// Whether velocities lead past such ends; in the next solve of this step they have rows.
+bool RigidSystem::find_other_ends() {
+    const std::size_t known = other_ends_.size();
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+        if (passes_other_end(mixed_.rows[k], mixed_.velocity, h_)) other_ends_.push_back(k);
+    return other_ends_.size() > known;
 }
 
 void RigidSystem::integrate_body(int i) {

@@ -263,6 +263,9 @@ private:
     void fill_masses();
     void fill_momenta(bool forces);
     void fill_rows();
+    static RowBlock other_end(const RowBlock& block);
+    bool find_other_ends();
+    bool solve_joints();
     void fill_beyond(int block, RowBlock& rows, BlockRight& numbers, std::vector<Beyond>& beyond) const;
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
@@ -389,6 +392,7 @@ private:
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_;
     std::vector<std::vector<Beyond>> beyond_, holding_beyond_;  // per block of joints: what its rows show
+    std::vector<int> other_ends_;  // blocks of the step's joints whose stops have a row for each end
     PivotSolver pivot_;
     FollowingBounds following_;
     bool breaks_ = false;  // whether some joint may
