@@ -63,6 +63,8 @@ PLATES = 1e-3  # s a step of fallen plates
 STILL = 1.2e-3  # s a step of a stack of 100 at rest
 ANY = 10e-3  # the same in any step that starts it or follows a knock at .5 m/s
 BOXES = 5e-3  # s a step of 1000 boxes, fallen
+ASLEEP = 0.02  # × a step of 1000 boxes at rest: nobody is looked at
+BESIDE = 0.25  # the same while one ball rolls by: they are looked for, and no more
 PACKED = ((64, Method()), (256, Method(solver="iterative")))  # spheres in a bin: 256 directly take minutes
 
 
@@ -272,6 +274,35 @@ def direct_at_rest() -> bool:
     )
 
 
+def asleep(count: int) -> bool:
+    """Fallen boxes asleep against the same awake, alone and with a ball that rolls away from them for ever."""
+    print(f"{count} boxes asleep: at most {ASLEEP} × a step awake; {BESIDE} × while somebody else is awake")
+    lying = heap(count, Box((0.5, 0.5, 0.5)))
+    ball = RigidBody(
+        name="ball", mass=1.0, shape=BALL, position=(-50.0, 0.0, 0.25), velocity=(-1.0, 0.0, 0.0)
+    )
+    rolls = Scene(bodies=(*lying.bodies, ball), gravity=lying.gravity)
+    kept = True
+    for solver in ("direct", "iterative"):
+        for title, scene, limit in (("alone", lying, ASLEEP), ("beside a ball", rolls, BESIDE)):
+            costs = []
+            for speed in (0.0, 0.02):
+                method = Method(solver=solver, sleep_speed=speed)  # type: ignore[arg-type]
+                with start(scene, time_step=TIME_STEP, method=method) as held:
+                    held.step(240)
+                    begin = time.process_time()
+                    held.step(60)
+                    costs.append((time.process_time() - begin) / 60)
+                    sleepers = held.result().counters.get("asleep", 0)
+            print(
+                f"  {f'{solver}, {title}':<34}{1e6 * costs[1]:>9.0f} us, awake {1e6 * costs[0]:.0f}: "
+                f"{costs[1] / costs[0]:.4f} ×, {sleepers} asleep",
+                flush=True,
+            )
+            kept = kept and sleepers == count and costs[1] <= limit * costs[0]
+    return kept
+
+
 def mixed(count: int) -> Scene:
     """Balls, boxes and capsules in turn, in layers of a square grid."""
     rng = np.random.default_rng(3)
@@ -348,6 +379,7 @@ def main() -> int:
         "spheres packed in a bin": packed(given.steps),
         "cost per contact grows little": growth(given.largest, max(20, given.steps // 4)),
         "rest is cheap, and linear": direct_at_rest(),
+        "who sleeps costs next to nothing": asleep(1000),
         "bodies of every shape are solved directly": unlike_bodies(given.steps),
     }
     for claim, kept in claims.items():

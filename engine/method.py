@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass
 from typing import Literal
@@ -14,6 +15,14 @@ STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
     "solve_block": "solve_block",
     "rotation": "integrate_rotations",
 }
+_NUMBERS = (
+    "correction_cap",
+    "residual_tolerance",
+    "unsettled_residual",
+    "sleep_speed",
+    "sleep_after",
+    "floor",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +55,15 @@ class Method:
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
                        law, its impulse against where a step of projection would put it; so does one that stopped early
                        and left bodies sunk into each other by a fiftieth of the smaller one's radius
+    sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep; 0: nobody does. They do so
+                       by islands, all that hang together by contacts, joints and springs, and wake at once, in the same
+                       step, when a body meets one of them, a kinematic one that touches or holds one moves, or a load,
+                       motor or spring of one is set. Asleep they have no speed, keep their places to the last bit, cost
+                       next to nothing, and forces read as they were last; what speed they had is lost. Never asleep:
+                       bodies in scenes where nothing can touch, that displace a fluid, whose load or joint follows the
+                       time or whose joints' friction follows their load, and what touches a moving surface. Plain steps
+                       only
+    sleep_after        how long bodies must have been that slow, s
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
     force_stages       stages to keep although the scene does not need them, to measure what they cost; solve_block: the
@@ -64,6 +82,8 @@ class Method:
     friction: Literal["cone", "box", "scaled_box"] = "cone"
     impacts: Literal["simultaneous", "successive"] = "simultaneous"
     unsettled_residual: float = 0.1
+    sleep_speed: float = 0.0
+    sleep_after: float = 0.5
     refinements: int = 1
     floor: float = 1e-12
     force_stages: tuple[str, ...] = ()
@@ -72,7 +92,7 @@ class Method:
         def refuse(field: str, rule: str) -> None:
             raise MethodError(f"method: {field} must be {rule}, not {getattr(self, field)!r}")
 
-        for field in ("correction_cap", "residual_tolerance", "unsettled_residual", "floor"):
+        for field in _NUMBERS:
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, int | float):
                 refuse(field, "a number")
@@ -98,6 +118,12 @@ class Method:
             refuse("impacts", "simultaneous or successive")
         if not self.unsettled_residual > 0.0:
             refuse("unsettled_residual", "above 0")
+        if not 0.0 <= self.sleep_speed < math.inf:
+            refuse("sleep_speed", "a speed from 0, which lets nobody sleep")
+        if not 0.0 < self.sleep_after < math.inf:
+            refuse("sleep_after", "a time above 0")
+        if self.sleep_speed > 0.0:
+            self._refuse_beside_sleep()
         if not isinstance(self.iterations, int) or not 1 <= self.iterations <= 1_000_000_000:
             refuse("iterations", "a whole number from 1 to a thousand million")
         if not self.residual_tolerance >= 0.0:
@@ -116,6 +142,20 @@ class Method:
             if not isinstance(stage, str) or stage not in STAGES_THAT_CAN_BE_FORCED:
                 raise MethodError(
                     f"method: {stage!r} cannot be forced; try one of {', '.join(STAGES_THAT_CAN_BE_FORCED)}"
+                )
+
+    def _refuse_beside_sleep(self) -> None:
+        """What looks further than the step at hand, or bends its rows, would not see who sleeps."""
+        plain = {
+            "composition": "none",
+            "half_step_velocities": False,
+            "string_stiffness": False,
+            "corrections": 0,
+        }
+        for field, value in plain.items():
+            if getattr(self, field) != value:
+                raise MethodError(
+                    f"method: bodies sleep in plain steps only; with sleep_speed leave {field} at {value!r}"
                 )
 
 

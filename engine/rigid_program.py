@@ -143,6 +143,8 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
             "friction": method.friction,
             "impacts": method.impacts,
             "unsettled_residual": method.unsettled_residual,
+            "sleep_speed": method.sleep_speed,
+            "sleep_after": method.sleep_after,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "composition": method.composition,

@@ -333,6 +333,8 @@ RigidMethod to_method(const nb::dict& method) {
     options.read("residual_tolerance", out.residual_tolerance);
     options.read_kind("impacts", out.impacts);
     options.read("unsettled_residual", out.unsettled_residual);
+    options.read("sleep_speed", out.sleep_speed);
+    options.read("sleep_after", out.sleep_after);
     Composition composition{};
     options.read_kind("composition", composition);
     out.composition = order_of(composition);

@@ -17,9 +17,10 @@ std::uint64_t pair_key(int i, int j) noexcept {
 
 }  // namespace
 
-Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
+Detection::Detection(std::vector<Collider> colliders, const std::vector<char>& dynamic,
                      const std::vector<IndexPair>& excluded)
-    : colliders_(std::move(colliders)), dynamic_(std::move(dynamic)), radius_(dynamic_.size(), 0.0) {
+    : colliders_(std::move(colliders)), radius_(dynamic.size(), 0.0) {
+    for (const char moves : dynamic) role_.push_back(moves ? awake : none);
     std::stable_sort(colliders_.begin(), colliders_.end(),
                      [](const Collider& a, const Collider& b) { return a.body < b.body; });
     for (auto [i, j] : excluded) excluded_.push_back(pair_key(i, j));
@@ -45,7 +46,7 @@ Detection::Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
 }
 
 std::vector<char> Detection::balls() const {
-    std::vector<char> ball(dynamic_.size(), 1);
+    std::vector<char> ball(role_.size(), 1);
     for (const Collider& c : colliders_)
         if (c.shape.kind != ShapeKind::sphere || norm(c.part.position) > 0.0) ball[c.body] = 0;
     return ball;
@@ -59,7 +60,8 @@ bool Detection::single_points() const noexcept {
 
 bool Detection::may_touch(int i, int j) const noexcept {
     const int a = colliders_[i].body, b = colliders_[j].body;
-    if (a == b || (!dynamic_[a] && !dynamic_[b])) return false;
+    const unsigned roles = role_[a] | role_[b];
+    if (a == b || ((roles & awake) == 0 && roles != (sleeps | stirs))) return false;
     if (colliders_[i].shape.kind == ShapeKind::plane && colliders_[j].shape.kind == ShapeKind::plane)
         return false;
     return excluded_.empty() || !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
@@ -121,7 +123,7 @@ const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
         for (std::size_t p = 0; p < bounded_.size(); ++p) {
             const int k = bounded_[p];
             hits_.clear();
-            if (dynamic_[colliders_[k].body]) tree_.overlapping(bounds_[p], hits_);
+            if (role_[colliders_[k].body] == awake) tree_.overlapping(bounds_[p], hits_);
             for (const int hit : hits_)
                 if (may_touch(sheets_[hit], k))
                     on_planes_.emplace_back(std::min(sheets_[hit], k), std::max(sheets_[hit], k));
@@ -157,7 +159,7 @@ bool Detection::near_again(const std::vector<int>& grown, const std::vector<doub
             for (const int plane : planes_)
                 if (reaches(plane, *at, margin)) add(plane, *at);
             hits_.clear();
-            if (planted_ && dynamic_[body]) tree_.overlapping(own, hits_);
+            if (planted_ && role_[body] == awake) tree_.overlapping(own, hits_);
             for (const int hit : hits_) add(sheets_[hit], *at);
         }
     std::sort(out.begin(), out.end());

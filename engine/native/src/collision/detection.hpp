@@ -34,11 +34,11 @@ struct Contact {
 };
 
 /// Finds contacts among a fixed set of colliders. Pairs of one body, pairs in which neither body is dynamic and
-/// excluded pairs never touch.
+/// excluded pairs never touch; a dynamic body that sleeps counts as one that is not, but for those told to stir.
 class Detection {
 public:
     /// `dynamic` has one entry per body; `excluded` lists pairs of body indices in either order.
-    Detection(std::vector<Collider> colliders, std::vector<char> dynamic,
+    Detection(std::vector<Collider> colliders, const std::vector<char>& dynamic,
               const std::vector<IndexPair>& excluded);
 
     /// Whether any pair of colliders could ever touch; if not, the stage can be left out.
@@ -69,6 +69,11 @@ public:
     /// Largest distance [m] of any surface of a body from its centre; 0 without a bounded shape.
     const std::vector<double>& radius() const noexcept { return radius_; }
 
+    /// A dynamic body sleeps, or is awake again.
+    void rest(int body, bool asleep) noexcept { role_[body] = asleep ? sleeps : awake; }
+    /// A body that moves as it is told does so, or stands still: then no sleeper need be told from it.
+    void stir(int body, bool moves) noexcept { role_[body] = moves ? stirs : none; }
+
     /// Per body: whether a sphere round its centre is all its surface, so that its orientation does not matter.
     std::vector<char> balls() const;
 
@@ -80,8 +85,10 @@ private:
     bool reaches(int plane, int k, const std::vector<double>& margin) const noexcept;
     void add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const;
 
-    std::vector<Collider> colliders_;  // by body
-    std::vector<char> dynamic_;
+    static constexpr unsigned char none = 0, awake = 1, sleeps = 2, stirs = 4;
+
+    std::vector<Collider> colliders_;      // by body
+    std::vector<unsigned char> role_;      // of each body
     std::vector<std::uint64_t> excluded_;  // sorted
     std::vector<double> radius_;
     std::vector<int> bounded_, planes_,

@@ -74,6 +74,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     correction_.clear();
     parting_.velocity.clear();
     points_.clear();
+    roused_.clear();
     impact_needed_ = plastic_first_ = false;
     impact_rounds_ = 0;
 
@@ -187,6 +188,7 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     point.strike = strike;
     if (oriented_) orient(point, first, second);
     points_.push_back(point);
+    if (!asleep_.empty()) rouse(contact);
 }
 
 /// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In

@@ -77,8 +77,8 @@ void ContactStage::hold_joints(MixedSystem& parting, double least) const {
 
 /// Whether a moving surface, or a body that moves as it is told, may do work at a contact.
 bool ContactStage::is_supplied(const Contact& contact) const {
+    if (conveys(contact)) return true;
     for (const int b : {contact.first, contact.second}) {
-        if (norm(materials_[b].surface_velocity) > 0.0) return true;
         if (norm(linear(prescribed_[b])) > 0.0 || norm(angular(prescribed_[b])) > 0.0) return true;
     }
     return false;
@@ -99,6 +99,9 @@ void ContactStage::find_given() {
 void ContactStage::note_given() {
     if (given_.empty()) return;
     std::map<std::uint64_t, double> left;
+    for (const Touch& touch : kept_)
+        if (const auto given = given_.find(touch.contact.key >> feature_bits); given != given_.end())
+            left.insert(*given);
     for (const Point& lap : laps_) {
         const auto given = given_.find(lap.contact.key >> feature_bits);
         if (!(lap.push > 0.0) || given == given_.end()) continue;
@@ -157,6 +160,7 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
 
 ContactStage::Point& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses,
                                            double excess) {
+    if (!asleep_.empty()) rouse(contact);
     Point& lap = laps_.emplace_back();
     lap.contact = contact;
     lap.material = combined(materials_[contact.first], materials_[contact.second]);

@@ -186,9 +186,27 @@ public:
     };
     const std::vector<Touch>& touches() const noexcept { return touches_; }
 
+    // contact_sleep.cpp: bodies that sleep have no pairs with each other, nor with what stands still.
+    /// These fall asleep where they are, and everybody who touches them: what their touches did stays, to be read.
+    void put_to_sleep(const std::vector<int>& bodies);
+    /// These are awake again, with their touches as they were left.
+    void wake(const std::vector<int>& bodies);
+    /// A body that moves as it is told does so in this step, or stands still.
+    void stir(int body, bool moves) noexcept { detection_.stir(body, moves); }
+    /// Sleepers that touch one of those who `stirs`, by body.
+    std::vector<int> touching(const std::vector<char>& stirs) const;
+    /// Sleepers that somebody met, or was led into, since the step began.
+    const std::vector<int>& roused() const noexcept { return roused_; }
+    /// A step that all bodies sleep through.
+    void sleep_through();
+    /// Whether a surface of the contact moves along itself.
+    bool conveys(const Contact& contact) const;
+    double radius(int body) const noexcept { return detection_.radius()[body]; }  // m, of its surface
+
     /// All that a later step depends on.
     struct Memory {
-        std::vector<Touch> touches;
+        std::vector<Touch> touches, kept;
+        std::vector<char> asleep;
         ContactCounters counters;
         std::map<int, Patience> resting, impact, parting;
         std::map<std::uint64_t, double> given;
@@ -196,6 +214,8 @@ public:
     };
     Memory memory() const {
         return {touches_,
+                kept_,
+                asleep_,
                 counters_,
                 resting_solver_.patience(),
                 impact_solver_.patience(),
@@ -205,6 +225,7 @@ public:
     }
     void remember(const Memory& memory) {
         touches_ = memory.touches, counters_ = memory.counters;
+        lie_as(memory);
         given_ = memory.given, begun_ = memory.begun;
         resting_solver_.be_patient(memory.resting);
         impact_solver_.be_patient(memory.impact);
@@ -260,6 +281,9 @@ private:
         double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
     };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
+    void lie_as(const Memory& memory);
+    void rouse(const Contact& contact);
+    bool sleeps(int body) const noexcept { return asleep_[body] != 0; }
     void orient(Point& point, const Pose& first, const Pose& second) const;
     void find_open();
     void find_open_again();
@@ -393,6 +417,9 @@ private:
     std::vector<double> lead_, event_time_;
     LargeArray<Point> points_, strikes_;
     std::vector<Touch> touches_;           // of the last step until the end of solve()
+    std::vector<Touch> kept_;              // of sleepers
+    std::vector<char> asleep_;             // by body; empty while none has slept
+    std::vector<int> roused_;              // sleepers met in this step
     std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
     std::vector<char> held_;               // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest

@@ -298,19 +298,24 @@ double JointSet::coordinate(int index, std::span<const BodyState> bodies) const 
     return joint.tracked ? unwrapped(joint, row.coordinate, states[index].angle) : row.coordinate;
 }
 
-void JointSet::set_motor(int joint, double speed, double max_force) {
+bool JointSet::set_motor(int joint, double speed, double max_force) {
     Axial& axial = axials_.at(joints_.at(joint).axial);
     if (!axial.has_motor || std::isfinite(axial.impulse) != std::isfinite(max_force))
         throw std::invalid_argument("a motor keeps its kind: with a bound or without");
+    const double impulse = time_step_ * max_force;
+    const bool other = axial.speed != speed || axial.impulse != impulse;
     axial.speed = speed;
-    axial.impulse = time_step_ * max_force;
+    axial.impulse = impulse;
+    return other;
 }
 
-void JointSet::set_rest(int joint, double rest) {
+bool JointSet::set_rest(int joint, double rest) {
     Axial& axial = axials_.at(joints_.at(joint).axial);
     if (!axial.has_spring) throw std::invalid_argument("the joint has no spring");
+    const bool other = axial.spring_rest != rest;
     axial.spring_rest = rest;
     axial.rest_moves = false;
+    return other;
 }
 
 void JointSet::set_moving_rest(int joint, double rest, double before, double ahead) {

@@ -170,16 +170,16 @@ public:
     double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
     void set_speed(int joint, double speed) noexcept { axials_[joints_[joint].axial].speed = speed; }
-    /// A new target of a motor whose force stays bounded or unbounded, as it was.
-    void set_motor(int joint, double speed, double max_force);
+    /// A new target of a motor whose force stays bounded or unbounded, as it was. Whether it is another.
+    bool set_motor(int joint, double speed, double max_force);
     /// What a motor pushes with, or the most it may [N or N m].
     void set_push(int joint, double force) noexcept {
         Axial& axial = axials_[joints_[joint].axial];
         axial.impulse = time_step_ * (axial.pushes ? force : std::max(0.0, force));
     }
     /// A new rest of a spring of a free coordinate; the second: one that moves with the time, with its speeds over
-    /// the step before and the coming one.
-    void set_rest(int joint, double rest);
+    /// the step before and the coming one. Whether it is another.
+    bool set_rest(int joint, double rest);
     void let_rest_move(int joint) noexcept { axials_[joints_[joint].axial].rest_moves = true; }
     void set_moving_rest(int joint, double rest, double before, double ahead);
 

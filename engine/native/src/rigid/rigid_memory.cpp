@@ -63,6 +63,8 @@ void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
     if (!constants.moves()) return;
     if (in_plane_) leave_plane();
     in_plane_ = false;
+    const Load before = steady_.empty() ? Load{constants.force, constants.torque} : steady_[body];
+    if (!is_zero(force - before.force) || !is_zero(torque - before.torque)) stir(body);
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
     constants.force = force;
     constants.torque = torque;

@@ -163,6 +163,7 @@ void RigidSystem::lead_back() {
     gather_islands();
     std::vector<char> beyond(islands, 0);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
+        if (rests(static_cast<int>(k))) continue;
         const auto [first, second] = ties[k];
         const int island = leading_.islands.of_body[std::max(first, second)];
         if (std::min(first, second) < 0) leading_.grounded[island] = 1;
@@ -181,6 +182,7 @@ void RigidSystem::part_bodies() {
     parting_ = &contacts_->parting();
     gather_islands();
     for (int island = 0; island < parting_->islands.count; ++island) {
+        if (rests(parted_[island])) continue;
         taken_[island] = taken(parted_[island], parted_blocks_[island]);
         const double share = fundable(island);
         for (int halving = 0; halving < most_halvings; ++halving) {

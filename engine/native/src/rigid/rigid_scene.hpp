@@ -148,7 +148,8 @@ struct RigidMethod {
     int iterations = 50;
     double residual_tolerance = 1e-10;  // m/s
     ImpactOrder impacts = ImpactOrder::simultaneous;
-    double unsettled_residual = 0.1;    // m/s
+    double unsettled_residual = 0.1;              // m/s
+    double sleep_speed = 0.0, sleep_after = 0.5;  // m/s, s: who is slower for so long sleeps; 0: nobody
     int composition = 2;                // order; above 2 a symmetric composition of constrained steps
     bool string_stiffness = false;      // the geometric stiffness of loaded joints, implicitly
     bool half_step_velocities = false;  // velocities live at mid-step

@@ -295,6 +295,11 @@ void RigidSystem::fill_rows() {
     beyond_.resize(blocks.size());
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         RowBlock& rows = mixed_.rows[k];
+        if (rests(static_cast<int>(k))) {
+            rows.right = rows.lower = rows.upper = rows.multiplier = Vec6{};
+            rows.stop = {};
+            continue;
+        }
         BlockRight numbers;
         joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
                          rows.second_jacobian[0].data(), numbers);
@@ -363,6 +368,7 @@ void RigidSystem::take_velocities(bool angular_too, const std::function<bool(int
 /// Bodies led to the time of an event take the part of their forces that acts before it.
 void RigidSystem::lead_events() {
     share_.assign(constants_.size(), 1.0);
+    leave_out_sleepers();
     for (int i : tied_) {
         const double lead = contacts_->lead(i);
         if (lead == 0.0) continue;
@@ -445,6 +451,7 @@ void RigidSystem::solve_mixed(bool touching) {
         following_.follow(mixed_, joints_);  // for the next step: here bounds are a step late
     }
     for (std::size_t k = 0; k < blocks.size(); ++k) {
+        if (rests(static_cast<int>(k))) continue;
         JointSet::State& state = joints_.states[blocks[k].joint];
         double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
         std::copy_n(mixed_.rows[k].multiplier.data(), blocks[k].size, multiplier);

@@ -41,6 +41,7 @@ void RigidSystem::step() {
     if (contacts_ || constants_.size() >= looking_from) Watch::look();
     ++live_.step;
     if (clock_) clock_->start();
+    if (sleep_rules_.on()) note_places();
     if (!live_.velocity_ready) velocity_stage();
     live_.velocity_ready = false;
     if (replaying_ && early_joints_.empty()) {
@@ -53,6 +54,7 @@ void RigidSystem::step() {
     ++live_.moved;
     if (at_hand_ && joints_.follows()) write_plane();
     joints_.follow(live_.bodies);
+    if (sleep_rules_.on()) fall_asleep();
 }
 
 /// What the coming steps do not read, and a reader between them does.
@@ -69,12 +71,17 @@ void RigidSystem::velocity_stage() {
         for (int i = 0; i < bodies(); ++i)
             live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
+    if (live_.sleep.sleepers > 0) velocities_beside_sleepers();
+    else find_velocities();
+}
+
+void RigidSystem::find_velocities() {
     if (!force_.empty()) apply_forces();
     joints_.begin_step();
     kick_free_bodies();
     if (contacts_ && find_contacts()) {
-        solve_mixed(true);
-    } else if (solver_ == RigidSolver::block) {
+        if (contacts_->roused().empty()) solve_mixed(true);
+    } else if (solver_ == RigidSolver::block && live_.sleep.sleepers == 0) {
         solve_block();
     } else if (solver_ != RigidSolver::none) {
         solve_mixed(false);
@@ -117,7 +124,7 @@ bool RigidSystem::find_contacts() {
         const Vec3 dv = kick(i);
         for (int k = 0; k < 3; ++k) free_velocities_[i][k] += dv[k];
         if (dot(constants_[i].torque, constants_[i].torque) > 0.0 && !constants_[i].particle) {
-            const Vec3 dw = turned_by(constants_[i], s, h_ * constants_[i].torque);
+            const Vec3 dw = turned_by(constants_[i], s, twist(i));
             for (int k = 0; k < 3; ++k) free_velocities_[i][3 + k] += dw[k];
         }
     }
@@ -187,15 +194,17 @@ void RigidSystem::integrate_body(int i) {
 
 void RigidSystem::integrate_all() {
     if (!tied_are_moved_)
-        for (int i : tied_) integrate_body(i);
+        for (int i : tied_)
+            if (!asleep(i)) integrate_body(i);
     tied_are_moved_ = false;
     for (int i : free_) integrate_body(i);
     for (int i : driven_) integrate_body(i);
     if (contacts_ && !contacts_->correction().empty()) {
         const std::vector<Vec6>& extra = contacts_->correction();
         for (std::size_t k = 0; k < tied_.size(); ++k)
-            displace(constants_[tied_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
-                     {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[tied_[k]]);
+            if (!asleep(tied_[k]))
+                displace(constants_[tied_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
+                         {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[tied_[k]]);
     }
     if (joints_.take_given()) lead_back();
     if (touching_) part_overlaps();

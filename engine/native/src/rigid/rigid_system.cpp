@@ -99,9 +99,11 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
-    if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0)
+    if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
+        !(method_.sleep_speed > 0.0))
         locked_.analyse(constants_, joints_, tied_);
     if (solver_ == RigidSolver::block && locked_.empty()) analyse_block(), find_loops();
+    take_sleep(scene);
     const bool tilted =  // joint coordinates see inertias along the bodies' own axes
         std::any_of(constants_.begin(), constants_.end(),
                     [](const BodyConstants& body) { return body.tilted; });
@@ -174,6 +176,7 @@ void RigidSystem::reset(StageClock* clock) {
     replaying_ = false;
     early_joints_.clear();
     live_.bodies = start_;
+    begin_sleep();
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
     redundant_.reset(matrix_);
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
@@ -389,6 +392,10 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["halved_steps"] = live_.halved_steps;
     }
     if (!loops_.empty()) report.counters["redundancy_looks"] = live_.looks;
+    if (sleep_rules_.on()) {
+        report.counters["asleep"] = static_cast<std::int64_t>(live_.sleep.sleepers);
+        report.counters["slept_steps"] = live_.sleep.slept;
+    }
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     std::int64_t moving = 0;
     for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;

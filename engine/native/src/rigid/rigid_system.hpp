@@ -19,6 +19,7 @@
 #include "rigid/joint_tree.hpp"
 #include "rigid/locked_tree.hpp"
 #include "rigid/plane_step.hpp"
+#include "rigid/sleep.hpp"
 #include "run/quantities.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
@@ -77,8 +78,12 @@ public:
     void place(std::span<const double> state);
     void set_load(int body, Vec3 force, Vec3 torque);
     void set_velocity(int body, Vec3 velocity, Vec3 angular_velocity);
-    void set_motor(int joint, double speed, double max_force) { joints_.set_motor(joint, speed, max_force); }
-    void set_rest(int joint, double rest) { joints_.set_rest(joint, rest); }
+    void set_motor(int joint, double speed, double max_force) {
+        if (joints_.set_motor(joint, speed, max_force)) stir_joint(joint);
+    }
+    void set_rest(int joint, double rest) {
+        if (joints_.set_rest(joint, rest)) stir_joint(joint);
+    }
 
     void reset(StageClock* clock);
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
@@ -133,6 +138,7 @@ private:
         std::int64_t step = 0;   // steps of h begun
         std::int64_t moved = 0;  // steps of h after which positions are known
         Unsettled unsettled;
+        Sleep sleep;
         // Velocities at mid-step:
         bool velocity_ready = false;         // the velocities of the coming step are found already
         LargeArray<BodyMomenta> before;      // those of the step before
@@ -209,6 +215,7 @@ private:
     void step();
     void deliver();
     void velocity_stage();
+    void find_velocities();
     void look_ahead();
 
     // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
@@ -222,6 +229,24 @@ private:
     double row_speed(int block, int row, bool solved) const;
     void bend_rows_back();
     void correct_curvature();
+
+    // rigid_sleep.cpp
+    void take_sleep(const RigidScene& scene);
+    void begin_sleep();
+    bool asleep(int body) const noexcept { return live_.sleep.sleepers > 0 && live_.sleep.island[body] != 0; }
+    bool rests(int block) const noexcept;
+    bool rests(const std::vector<int>& parted) const;
+    void leave_out_sleepers();
+    void velocities_beside_sleepers();
+    void keep_jacobians();
+    bool stirs(int body) const noexcept;
+    void wake_carried();
+    void wake(const std::vector<int>& met);
+    void stir(int body);
+    void stir_joint(int joint);
+    void note_places();
+    double pace(int body) const noexcept;
+    void fall_asleep();
 
     // rigid_plane.cpp: steps by numbers of a plane
     bool may_lie_in_plane(const RigidScene& scene) const;
@@ -356,6 +381,7 @@ private:
     // The state.
     Live live_;
     Memory saved_, before_ahead_;  // the latter: before look_ahead(), with contacts
+    Memory before_waking_;         // before the velocities of a step in which somebody may wake
     JointSet joints_;
     bool replaying_ = false;                    // a block that ended unfit
     LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
@@ -416,7 +442,13 @@ private:
     std::vector<std::size_t> overstep_at_;                  // per block
     MixedSystem holding_;
     PivotSolver holding_pivot_;
-    double residual_ = 0.0;  // largest an iterative solve stopped at, m/s
+    SleepRules sleep_rules_;
+    struct Place {
+        Vec3 displacement;
+        Quat turn;
+    };
+    std::vector<Place> left_;  // per body: where it was as the step began
+    double residual_ = 0.0;    // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body

@@ -1,0 +1,268 @@
+// Sleeping: bodies at rest are left out of the steps until something comes to them.
+//
+// Bodies that hang together by contacts, joints or springs are an island; what does not move by itself joins none. An
+// island whose bodies all were slower than the method's sleep_speed, |v| + |w| r and as measured by where they got,
+// for so many steps in a row falls asleep: velocities zero, places as they are to the last bit, forces to be read as
+// they were. It takes no part in a step but for being met: it stays in the search for pairs of those who are awake,
+// at rest. Whatever gets a point with a sleeper, or moves what it touches or hangs on, wakes its island, and the
+// velocities of that step are found anew: nothing was moved yet. Falling asleep takes the kinetic energy that was left,
+// and lying there neither takes nor gives any.
+//
+// Never asleep: bodies that displace a fluid, whose load or joint follows the time, whose joints have friction that
+// follows their load, and what touches a body that moves as it is told, or a surface that moves along itself.
+#include <algorithm>
+#include <cmath>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double far = 1e3;  // m: as far out may a sleeper lie on a plane that begins to turn
+constexpr double rounding =
+    1e-6;  // of sleep_speed: a path that stands still leaves bodies that follow it such speeds
+
+}  // namespace
+
+void RigidSystem::take_sleep(const RigidScene& scene) {
+    if (!(method_.sleep_speed > 0.0) || !fresh_contacts_ || !fresh_contacts_->possible()) return;
+    SleepRules& rules = sleep_rules_;
+    rules.may.assign(constants_.size(), 0);
+    for (const int i : tied_) rules.may[i] = 1;
+    for (std::size_t i = 0; i < floaters_.size(); ++i)
+        if (!floaters_[i].empty()) rules.may[i] = 0;
+    std::vector<char> driven(scene.joints.size(), !following_.empty());
+    for (const TimeDrive& drive : drives_) {
+        if (drive.kind == DriveKind::load) rules.may[drive.index] = 0;
+        if (drive.kind == DriveKind::motor || drive.kind == DriveKind::push || drive.kind == DriveKind::rest)
+            driven[drive.index] = 1;
+    }
+    const auto blocks = joints_.blocks();
+    for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
+        std::vector<int> bodies{blocks[k].first, blocks[k].second};
+        bodies.insert(bodies.end(), joints_.others(k).begin(), joints_.others(k).end());
+        std::erase_if(bodies, [](int body) { return body < 0; });
+        const auto first =
+            std::find_if(bodies.begin(), bodies.end(), [this](int i) { return constants_[i].moves(); });
+        for (const int body : bodies) {
+            if (driven[blocks[k].joint]) rules.may[body] = 0;
+            if (first != bodies.end() && body != *first) rules.ties.emplace_back(*first, body);
+        }
+    }
+    for (const std::vector<SpringForce>* springs : {&springs_, &turning_springs_})
+        for (const SpringForce& spring : *springs)
+            if (spring.ends[0].body >= 0 && spring.ends[1].body >= 0)
+                rules.ties.emplace_back(spring.ends[0].body, spring.ends[1].body);
+    for (int i = 0; i < bodies(); ++i) {
+        const BodyConstants& body = constants_[i];
+        double reach = fresh_contacts_->radius(i);
+        if (body.motion == Motion::kinematic && reach == 0.0) reach = far;  // a plane
+        if (body.moves() && !body.particle)
+            reach = std::max(
+                reach, std::sqrt(std::max({body.inertia.x, body.inertia.y, body.inertia.z}) / body.mass));
+        rules.reach.push_back(reach);
+    }
+    rules.after = static_cast<std::int64_t>(std::max(1.0, std::ceil(method_.sleep_after / h_ - 1e-9)));
+    left_.resize(constants_.size());
+}
+
+void RigidSystem::begin_sleep() {
+    live_.sleep = {};
+    if (!sleep_rules_.on()) return;
+    live_.sleep.island.assign(constants_.size(), 0);
+    live_.sleep.quiet.assign(constants_.size(), 0);
+}
+
+/// Sleepers get no part of their forces.
+void RigidSystem::leave_out_sleepers() {
+    if (live_.sleep.sleepers == 0) return;
+    for (const int i : tied_)
+        if (asleep(i)) share_[i] = 0.0;
+}
+
+/// Nothing is asked of a joint of sleepers: it holds what it held.
+bool RigidSystem::rests(int block) const noexcept {
+    const JointBlock& of = joints_.blocks()[block];
+    return (of.first >= 0 && asleep(of.first)) || (of.second >= 0 && asleep(of.second));
+}
+
+/// Whether an island of what parts sleeps, and nothing is to be parted there.
+bool RigidSystem::rests(const std::vector<int>& parted) const {
+    return live_.sleep.sleepers > 0 && std::all_of(parted.begin(), parted.end(), [this](int k) {
+               return asleep(tied_[k]) && parting_->velocity[k] == Vec6{};
+           });
+}
+
+/// Rows of sleepers are read where all rows are while others are solved with bounds.
+void RigidSystem::keep_jacobians() {
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
+        const int block = static_cast<int>(k);
+        if (!rests(block)) continue;
+        RowBlock& rows = mixed_.rows[k];
+        const auto numbers = 6 * static_cast<std::size_t>(rows.size);
+        std::copy_n(jacobian(block, false), numbers, rows.first_jacobian[0].data());
+        std::copy_n(jacobian(block, true), numbers, rows.second_jacobian[0].data());
+    }
+}
+
+/// The velocities of a step that some bodies may sleep through.
+void RigidSystem::velocities_beside_sleepers() {
+    wake_carried();
+    while (live_.sleep.sleepers > 0) {
+        const auto stands = [this](int i) { return !stirs(i); };
+        if (live_.sleep.sleepers == tied_.size() && std::all_of(driven_.begin(), driven_.end(), stands)) {
+            contacts_->sleep_through();
+            touching_ = false;
+            return;
+        }
+        keep(before_waking_);
+        const double residual = residual_;
+        share_.assign(constants_.size(), 1.0);
+        leave_out_sleepers();
+        find_velocities();
+        share_.clear();
+        if (contacts_->roused().empty()) return;
+        const std::vector<int> roused = contacts_->roused();
+        go_back(before_waking_);
+        residual_ = residual;
+        wake(roused);
+    }
+    find_velocities();
+}
+
+/// Whether a body that moves as it is told does so.
+bool RigidSystem::stirs(int i) const noexcept {
+    const BodyState& s = live_.bodies[i];
+    return constants_[i].motion == Motion::kinematic &&
+           norm(s.velocity) + sleep_rules_.reach[i] * norm(s.angular_velocity) >
+               rounding * method_.sleep_speed;
+}
+
+/// Wakes whom a body that moves as it is told touches or holds.
+void RigidSystem::wake_carried() {
+    if (live_.sleep.sleepers == 0 || driven_.empty()) return;
+    std::vector<char> told(constants_.size(), 0);
+    bool some = false;
+    for (const int i : driven_) {
+        told[i] = stirs(i);
+        some = some || told[i] != 0;
+        contacts_->stir(i, told[i] != 0);
+    }
+    if (!some) return;
+    std::vector<int> met = contacts_->touching(told);
+    for (const auto& [a, b] : sleep_rules_.ties) {
+        if (told[a]) met.push_back(b);
+        if (told[b]) met.push_back(a);
+    }
+    wake(met);
+}
+
+/// Wakes the islands of some bodies; who is awake begins anew to be at rest.
+void RigidSystem::wake(const std::vector<int>& met) {
+    Sleep& sleep = live_.sleep;
+    std::vector<char> wakes(constants_.size() + 1, 0);
+    for (const int body : met) {
+        sleep.quiet[body] = 0;
+        wakes[sleep.island[body]] = 1;
+    }
+    wakes[0] = 0;
+    std::vector<int> woken;
+    for (const int i : tied_)
+        if (wakes[sleep.island[i]]) woken.push_back(i);
+    if (woken.empty()) return;
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {  // rows start from what they held
+        const JointBlock& block = joints_.blocks()[k];
+        if (!rests(static_cast<int>(k))) continue;
+        if (wakes[sleep.island[block.first >= 0 && asleep(block.first) ? block.first : block.second]] == 0)
+            continue;
+        const JointSet::State& state = joints_.states[block.joint];
+        const double* multiplier = block.axial ? state.axial_multiplier.data() : state.multiplier.data();
+        std::copy_n(multiplier, block.size, mixed_.rows[k].multiplier.data());
+        mixed_.rows[k].state.fill(RowState::free);
+    }
+    for (const int i : woken) sleep.island[i] = 0, sleep.quiet[i] = 0;
+    sleep.sleepers -= woken.size();
+    contacts_->wake(woken);
+}
+
+/// What acts on a body has been changed from outside.
+void RigidSystem::stir(int body) {
+    if (sleep_rules_.on() && body >= 0) wake({body});
+}
+
+void RigidSystem::stir_joint(int joint) {
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
+        const JointBlock& block = joints_.blocks()[k];
+        if (block.joint != joint) continue;
+        stir(block.first);
+        stir(block.second);
+    }
+}
+
+/// Where bodies are as a step begins.
+void RigidSystem::note_places() {
+    for (const int i : tied_)
+        if (!asleep(i)) left_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
+}
+
+/// How fast a body's surface was in the step: by its velocities, or by where it got if that is more, m/s.
+double RigidSystem::pace(int i) const noexcept {
+    const BodyState& s = live_.bodies[i];
+    const double way = norm(s.displacement - left_[i].displacement) / h_;
+    double speed = std::max(norm(s.velocity), way);
+    if (constants_[i].particle) return speed;
+    const Quat turn = s.turn * conjugate(left_[i].turn);
+    const double turned = 2.0 * norm(Vec3{turn.x, turn.y, turn.z}) / h_;
+    return speed + sleep_rules_.reach[i] * std::max(norm(s.angular_velocity), turned);
+}
+
+/// The end of a step: who was met by what parted is awake, and islands that have been at rest fall asleep.
+void RigidSystem::fall_asleep() {
+    Sleep& sleep = live_.sleep;
+    if (!contacts_->roused().empty()) wake(contacts_->roused());
+    sleep.slept += static_cast<std::int64_t>(sleep.sleepers);
+    const bool broke = !joints_.breaks.empty() && joints_.breaks.back().step == live_.step;
+    bool some = false;
+    for (const int i : tied_) {
+        if (asleep(i)) continue;
+        const bool still = sleep_rules_.may[i] != 0 && !broke && pace(i) < method_.sleep_speed;
+        sleep.quiet[i] = still ? std::min(sleep.quiet[i] + 1, sleep_rules_.after) : 0;
+        some = some || sleep.quiet[i] == sleep_rules_.after;
+    }
+    if (!some) return;
+    std::vector<Islands::Tie> ties;
+    std::vector<char> kept_up(constants_.size(), 0);
+    const auto tie = [&](int a, int b) {
+        for (const auto& [one, other] : {IndexPair{a, b}, IndexPair{b, a}})
+            if (stirs(other)) kept_up[one] = 1;
+        ties.push_back({constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1});
+    };
+    for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
+    for (const ContactStage::Touch& touch : contacts_->touches()) {
+        tie(touch.contact.first, touch.contact.second);
+        if (contacts_->conveys(touch.contact))
+            kept_up[touch.contact.first] = kept_up[touch.contact.second] = 1;
+    }
+    for (const int i : tied_) ties.push_back({i, i});
+    const Islands islands = spook::find_islands(bodies(), ties);
+    std::vector<char> awake(static_cast<std::size_t>(islands.count), 0);
+    for (const int i : tied_)
+        if (sleep.quiet[i] < sleep_rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;
+    std::vector<int> tired, first(static_cast<std::size_t>(islands.count), 0);
+    for (const int i : tied_) {
+        const int island = islands.of_body[i];
+        if (asleep(i) || awake[island]) continue;
+        if (first[island] == 0) first[island] = i + 1;
+        sleep.island[i] = first[island];
+        tired.push_back(i);
+        BodyState& s = live_.bodies[i];
+        s.velocity = s.angular_velocity = s.angular_momentum = {};
+    }
+    if (tired.empty()) return;
+    sleep.sleepers += tired.size();
+    if (!mixed_values_) keep_jacobians();
+    contacts_->put_to_sleep(tired);
+}
+
+}  // namespace spook
