@@ -51,7 +51,8 @@ class Method:
                        a pair, or a joint's stop, is struck once in a step, and stops without rebound where it approaches
                        again;
                        successive: one pair after the other until none approaches, as if there were small gaps (the
-                       last ball leaves, no energy is lost at restitution 1)
+                       last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in
+                       the order in which they close, free balls led from one blow to the next
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
                        law, its impulse against where a step of projection would put it; so does one that stopped early
                        and left bodies sunk into each other by a fiftieth of the smaller one's radius

@@ -26,8 +26,8 @@ double ContactStage::size(const Contact& contact) const noexcept {
     return std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
 }
 
-bool ContactStage::is_closed(const Contact& contact) const noexcept {
-    return contact.point.gap <= closed * size(contact);
+bool ContactStage::is_closed(const Contact& contact, double gap) const noexcept {
+    return gap <= closed * size(contact);
 }
 
 /// How far a body may get in the step with either velocity, m.
@@ -77,10 +77,12 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     roused_.clear();
     impact_needed_ = plastic_first_ = false;
     impact_rounds_ = 0;
+    if (options_.impacts == ImpactOrder::successive) clock_.assign(bodies, 0.0), way_.assign(bodies, Vec6{});
 
     for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
     search_ = margin_;
-    if (options_.solver == SolverKind::iterative) {  // room for those that are only pushed in this step
+    // Room for those that are only pushed in this step.
+    if (options_.solver == SolverKind::iterative || options_.impacts == ImpactOrder::successive) {
         double squares = 0.0;
         for (const double margin : margin_) squares += margin * margin;
         const double room = std::sqrt(squares / static_cast<double>(margin_.size()));
@@ -186,6 +188,7 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     point.second_arm = contact.point.position - second.position;
     point.tangent = world_tangent(contact.point.normal);
     point.strike = strike;
+    point.begun = contact.point.gap;
     if (oriented_) orient(point, first, second);
     points_.push_back(point);
     if (!asleep_.empty()) rouse(contact);
@@ -269,7 +272,11 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
         const double time = first_touch(first, second, h, slop(open));
         if (time < 0.0) return false;
+        const std::size_t known = points_.size();
         const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
+        const Vec3 led = (at_a.position - poses_[a].position) - (at_b.position - poses_[b].position);
+        for (std::size_t k = known; k < points_.size(); ++k)
+            points_[k].begun -= dot(points_[k].contact.point.normal, led);
         found += met;
         return met;
     });
@@ -317,7 +324,8 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
             continue;
         }
         point.meeting_gap = contact.point.gap;
-        point.contact.point.gap = std::max(0.0, contact.point.gap + time * closing);
+        point.begun = contact.point.gap + time * closing;
+        point.contact.point.gap = std::max(0.0, point.begun);
         met = true;
     }
     return met;
@@ -486,12 +494,6 @@ void ContactStage::measure_points() {
         point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
         impact_needed_ = impact_needed_ || is_blow(point);
     }
-}
-
-/// Whether a point is approached so that the impact is to answer it.
-bool ContactStage::is_blow(const Point& point) const noexcept {
-    const bool answered = point.bounce > 0.0 || (plastic_first_ && point.bounce == 0.0);
-    return answered && point.approach < -point.rounding;
 }
 
 }  // namespace spook

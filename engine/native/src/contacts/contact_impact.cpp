@@ -246,6 +246,7 @@ void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>
     for (RowBlock& given : system.rows) {
         if (!struck[island(given)]) continue;
         given.stop.answered = is_hit(given);
+        given.stop.spent = impact_rounds_ > most_rounds(points_.size());
         RowBlock& block = rows.emplace_back(given);
         for (int i = 0; i < block.size; ++i) {
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
@@ -261,6 +262,90 @@ void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>
     }
 }
 
+/// Whether a point is approached so that the impact is to answer it.
+bool ContactStage::is_blow(const Point& point) const noexcept {
+    const bool answered = point.bounce > 0.0 || (plastic_first_ && point.bounce == 0.0);
+    return answered && point.approach < -point.rounding;
+}
+
+/// How far a body has come since the step began, at a time from when on nothing has hit it.
+Vec6 ContactStage::way_until(std::size_t body, double time) const {
+    if (unknown_[body] < 0) return sum(Vec6{}, prescribed_[body], time);
+    const double on = time - clock_[body];
+    const Vec6 way = sum(way_[body], velocity_[body], on);
+    return supported_[body] || jointed_[body] ? way : sum(way, kick_[body], on);
+}
+
+/// The gap of a point at that time, with both bodies on their ways.
+double ContactStage::gap_at(const Point& point, double time) const {
+    const Contact& contact = point.contact;
+    const Vec3 n = contact.point.normal;
+    return point.begun + dot(contact_row(n, point.first_arm), way_until(contact.first, time)) -
+           dot(contact_row(n, point.second_arm), way_until(contact.second, time));
+}
+
+/// From when on the ways of both bodies of a point are straight, s.
+double ContactStage::both_known(const Point& point) const noexcept {
+    return std::max(clock_[point.contact.first], clock_[point.contact.second]);
+}
+
+/// An open point among balls that are led by successive blows is led to the time of their last one.
+void ContactStage::lead_point(Point& point) {
+    for (const int body : {point.contact.first, point.contact.second})
+        if (unknown_[body] >= 0 && event_time_[body] < 0.0) return;
+    const double time = both_known(point), gap = gap_at(point, time);
+    if (point.strike < 0.0 && is_closed(point.contact, gap)) return;
+    point.event = true;
+    point.strike = time;
+    point.contact.point.gap = std::max(0.0, gap);
+}
+
+/// Of successive blows those to be answered next: of what may meet in this step the points that are approached, and closed
+/// when the first of them is. Free balls are led there, as to the time of a single strike.
+std::vector<std::size_t> ContactStage::earliest_blows(const MixedSystem& system) {
+    std::vector<Islands::Tie> ties;
+    for (const RowBlock& block : system.rows) add_ties(block, ties);
+    for (const Point& point : points_)
+        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
+    for (const OpenPair& open : open_) ties.push_back({unknown_[open.first], unknown_[open.second]});
+    const Islands islands = find_islands(static_cast<int>(system.mass.size()), ties);
+    const auto is_blow = [](const Point& point) {
+        return point.bounce >= 0.0 && point.approach < -point.rounding;
+    };
+    std::vector<double> first(islands.count, unbounded);
+    for (const Point& point : points_) {
+        if (!is_blow(point)) continue;
+        const double from = both_known(point), gap = std::max(0.0, gap_at(point, from));
+        double& earliest = first[island_of(islands, point)];
+        earliest = std::min(earliest, from + gap / -point.approach);
+    }
+    std::vector<std::size_t> who;
+    std::vector<char> hit(unknown_.size(), 0), balls(islands.count, 1);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        if (!is_blow(point) || !is_closed(point.contact, gap_at(point, first[island_of(islands, point)])))
+            continue;
+        who.push_back(k);
+        hit[point.contact.first] = hit[point.contact.second] = 1;
+    }
+    const auto island = [&](std::size_t b) { return unknown_[b] >= 0 ? islands.of_body[unknown_[b]] : -1; };
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        if (island(b) >= 0) balls[island(b)] = balls[island(b)] && ball_[b] && !jointed_[b];
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        const int own = island(b);
+        if (own < 0 || first[own] == unbounded) continue;
+        if (const double time = std::min(first[own], options_.time_step); hit[b] && time > clock_[b]) {
+            way_[b] = way_until(b, time);
+            clock_[b] = time;
+        }
+        if (!balls[own]) continue;
+        event_time_[b] = clock_[b];
+        if (clock_[b] > 0.0) predicted_[b] = sum(Vec6{}, way_[b], 1.0 / clock_[b]);
+    }
+    for (Point& point : points_) lead_point(point);
+    return who;
+}
+
 void ContactStage::impact(MixedSystem& system) {
     ++counters_.impacts;
     ++impact_rounds_;
@@ -270,9 +355,9 @@ void ContactStage::impact(MixedSystem& system) {
     const bool successive =
         options_.impacts == ImpactOrder::successive && impact_rounds_ <= most_rounds(points_.size());
     std::vector<std::size_t> who;
-    for (std::size_t k = 0; k < points_.size(); ++k)
-        if (points_[k].bounce >= 0.0 && (!successive || points_[k].approach < -points_[k].rounding))
-            who.push_back(k);
+    if (successive) who = earliest_blows(system);
+    for (std::size_t k = 0; !successive && k < points_.size(); ++k)
+        if (points_[k].bounce >= 0.0) who.push_back(k);
     MixedSystem hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
@@ -355,6 +440,8 @@ void ContactStage::after_impact(const MixedSystem& system) {
     const std::size_t known = points_.size();
     const bool found = find_strikes(next, false) > 0;
     if (found) {
+        if (!clock_.empty())
+            std::for_each(points_.begin() + known, points_.end(), [this](Point& p) { lead_point(p); });
         take_back_strikes(known, next);
         counters_.contacts += points_.size() - known;
         order_points();

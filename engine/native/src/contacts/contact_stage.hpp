@@ -70,7 +70,7 @@ SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
 
 /// What bodies that touch but do not approach each other do while a blow passes. simultaneous: they take part in
 /// it. successive: only points that are approached take part, again and again until none is: a blow runs through a
-/// row of touching balls, and the last one leaves.
+/// row of touching balls, and the last one leaves. Of open ones the next to close comes next, with those closed by then.
 SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
 
 struct ContactOptions {
@@ -260,6 +260,7 @@ private:
         double strike = -1.0;            // when it touches within the step, s; negative if the pair is closed
         bool event = false;              // acts at that time, not at the start of the step
         double meeting_gap = 0.0;        // then, m: other points of the pair may still be open
+        double begun = 0.0;              // gap along its normal with both bodies where the step began, m
         double approach = 0.0;           // C v, m/s, negative when closing
         double push = 0.0;               // C (free velocity − v), m/s, negative when pressed together
         double bounce = -1.0;            // psi' if the point takes part in the impact, else −1
@@ -317,6 +318,11 @@ private:
     bool stop_is_hit(const MixedSystem& system) const;
     bool stop_comes_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     bool pass_other_ends(const MixedSystem& system, std::size_t joints);
+    std::vector<std::size_t> earliest_blows(const MixedSystem& system);
+    Vec6 way_until(std::size_t body, double time) const;
+    double gap_at(const Point& point, double time) const;
+    double both_known(const Point& point) const noexcept;
+    void lead_point(Point& point);
     void take_part(MixedSystem& system, const std::vector<std::size_t>& who,
                    std::vector<RowBlock>& rows) const;
     void share_blow(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& who) const;
@@ -375,7 +381,8 @@ private:
     double slack(const Contact& contact) const noexcept;
     double size(const Contact& contact) const noexcept;
     double gap(const Contact& contact) const noexcept;
-    bool is_closed(const Contact& contact) const noexcept;
+    bool is_closed(const Contact& contact, double gap) const noexcept;
+    bool is_closed(const Contact& contact) const noexcept { return is_closed(contact, contact.point.gap); }
 
     Detection detection_;
     std::vector<SurfaceMaterial> materials_;
@@ -415,6 +422,8 @@ private:
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
     std::vector<double> lead_, event_time_;
+    std::vector<double> clock_;  // of successive blows: up to when a body's way in the step is known, s
+    std::vector<Vec6> way_;      // and that way, m and rad
     LargeArray<Point> points_, strikes_;
     std::vector<Touch> touches_;           // of the last step until the end of solve()
     std::vector<Touch> kept_;              // of sleepers

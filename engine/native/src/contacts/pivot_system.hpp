@@ -36,6 +36,7 @@ struct StopRow {
     bool struck = false;    // its rate leads there within the step
     double rebound = 0.0;   // where it is hit, the rate it sends back, m/s or rad/s; else 0
     bool answered = false;  // by a blow
+    bool spent = false;     // by the last of its step
     // Of a stop with two ends:
     double room = unbounded;  // to the other end, m or rad
     double range = 0.0;       // from one to the other

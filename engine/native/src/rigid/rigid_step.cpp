@@ -157,10 +157,11 @@ void RigidSystem::impact() {
     for (std::size_t k = 0; k < tied_.size(); ++k)
         if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
-        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered) {
+        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered || stop.spent) {
             JointSet::State& state = joints_.states[joints_.blocks()[k].joint];
-            state.rebounds =
-                method_.impacts == ImpactOrder::simultaneous ? unbounded : again * std::abs(stop.rebound);
+            const bool once = method_.impacts == ImpactOrder::simultaneous || stop.spent;
+            state.rebounds = once ? unbounded : again * std::abs(stop.rebound);
+            if (!stop.answered) continue;
             if (stop.rebound == 0.0) state.met = mixed_.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
         }
     fill_rows();
