@@ -253,7 +253,6 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
 /// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
 /// for an impact: if they need one, late_blow_ tells so, see blows_come_first().
 int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
-    const double h = options_.time_step;
     int found = 0;
     auto moved = [&](int b) {  // an event's bodies have gone part of their way with another velocity
         Pose pose = poses_[b];
@@ -270,7 +269,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         const Pose at_a = moved(a), at_b = moved(b);
         const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
         const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
-        const double time = first_touch(first, second, h, slop(open));
+        const double time = first_touch(first, second, options_.time_step, slop(open));
         if (time < 0.0) return false;
         const std::size_t known = points_.size();
         const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
@@ -368,10 +367,13 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
         points_.resize(old);
         for (; k < end; ++k) {
             Point& p = points_.emplace_back(strikes_[k]);
-            const Vec3 way = linear(velocity[p.contact.first]) + linear(velocity[p.contact.second]);
-            p.contact.point.position -= 0.5 * p.strike * way;
-            p.first_arm = p.contact.point.position - poses_[p.contact.first].position;
-            p.second_arm = p.contact.point.position - poses_[p.contact.second].position;
+            const int a = p.contact.first, b = p.contact.second;
+            const bool alone = std::min(unknown_[a], unknown_[b]) < 0;  // then its arm is that of the meeting
+            const Vec3 own = linear(velocity[unknown_[a] < 0 ? b : a]);
+            p.contact.point.position -= p.strike * (alone ? own : 0.5 * (own + linear(velocity[b])));
+            if (alone) continue;
+            p.first_arm = p.contact.point.position - poses_[a].position;
+            p.second_arm = p.contact.point.position - poses_[b].position;
         }
     }
 }
