@@ -289,8 +289,7 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool struck, bool reboun
     if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
     int found = find_strikes(next, true);
-    if (late_blow_ && struck &&
-        !plastic_first_) {  // so are those to whom it leaves a body that it only stops
+    if (late_blow_ && struck && !plastic_first_) {  // as are those to a body that it only stops
         plastic_first_ = true;
         found += find_strikes(next, true);
     }
@@ -332,7 +331,7 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
 
 /// A strike that is no event acts with the bodies at the start of the step, or the angular momentum of both would
 /// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
-/// taken back half-way between both bodies.
+/// taken back half-way between both bodies, or with the one that moves by itself.
 void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity) {
     const double h = options_.time_step;
     strikes_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
