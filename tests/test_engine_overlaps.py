@@ -95,3 +95,33 @@ def test_an_end_that_is_struck_down_within_a_step_does_not_sink(
     )
 
     assert result["overlap"] < 2e-3 * 0.6  # of how far the bar reaches: less than curved paths may overlap
+
+
+@pytest.mark.parametrize("shape", [Sphere(0.2), Box((0.4, 0.4, 0.4))], ids=["ball", "box"])
+@pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
+def test_what_is_sunk_into_one_body_sinks_into_no_other(solver: str, shape: Sphere | Box) -> None:
+    """15 mm deep in a floor it comes to a wall, and no further: as much as twice its depth in the floor was let in."""
+    depth, speed, face = 0.015, 3.0, 0.013
+    floor, wall = (
+        RigidBody(name=name, motion="static", shape=Box(size), position=place)
+        for name, size, place in (
+            ("floor", (4.0, 2.0, 0.5), (0.0, 0.0, -0.25)),
+            ("wall", (0.4, 1.0, 1.0), (face + 0.2, 0.0, 0.5)),
+        )
+    )
+    slider = RigidBody(
+        name="slider",
+        mass=1.0,
+        shape=shape,
+        position=(-0.225, 0.0, 0.2 - depth),
+        velocity=(speed, 0.0, 0.0),
+    )
+    result = simulate(
+        Scene(bodies=(floor, wall, slider)),
+        time_step=TIME_STEP,
+        steps=12,
+        method=Method(solver=solver),
+        observe={"x": Trace(quantity=Position("slider"))},
+    )
+
+    assert abs(result["x"][:, 0].max() - (face - 0.2)) < 1e-8

@@ -219,8 +219,8 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) c
     point.stretch[1] = across / point.material.friction;
 }
 
-/// The overlap at which a pair counts as met. Bodies sunk into a seamless support, or sinking while sweeps have not
-/// settled, meet the sides of its next part as deep as they are sunk; round shapes and planes have no sides.
+/// The overlap at which a pair counts as met, m. Bodies that sink while sweeps have not settled meet the sides of the next
+/// part of what holds them as deep as that; round shapes and planes have no sides.
 double ContactStage::slop(const OpenPair& open) const noexcept {
     const int a = open.first, b = open.second;
     const ShapeKind one = detection_.collider(open.pair.first).shape.kind;
@@ -228,7 +228,7 @@ double ContactStage::slop(const OpenPair& open) const noexcept {
     const bool balls = one == ShapeKind::sphere && two == ShapeKind::sphere;
     const bool sides = !balls && one != ShapeKind::plane && two != ShapeKind::plane;
     return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
-           (sides ? 2.0 * std::max(depth_[a] + sinking_[a], depth_[b] + sinking_[b]) : 0.0);
+           (sides ? 2.0 * std::max(sinking_[a], sinking_[b]) : 0.0);
 }
 
 /// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first
@@ -270,7 +270,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
         const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
         const double time = first_touch(first, second, options_.time_step, slop(open));
-        if (time < 0.0) return false;
+        if (time < 0.0 || is_seam(first, a, second, open) || is_seam(second, b, first, open)) return false;
         const std::size_t known = points_.size();
         const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
         const Vec3 led = (at_a.position - poses_[a].position) - (at_b.position - poses_[b].position);

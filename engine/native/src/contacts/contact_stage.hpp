@@ -333,6 +333,8 @@ private:
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
     bool outrun(const std::vector<Vec6>& velocity);
     double slop(const OpenPair& open) const noexcept;
+    double sunk_by(const Point& point) const;
+    bool is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open) const;
     bool passes(const OpenPair& open, const std::vector<Vec6>& velocity) const;
     double resting_right(Point& point) const;
     bool is_pressed(const Point& point) const noexcept;
