@@ -94,6 +94,27 @@ def test_a_load_that_is_set_wakes_in_the_same_step(solver: str) -> None:
     assert math.isclose(run.state["sled"][7], 3.0 / 2.0 * TIME_STEP, rel_tol=1e-12)
 
 
+def test_where_bodies_went_before_a_run_is_restored_does_not_keep_them_awake() -> None:
+    """Woken by next to nothing it sleeps again after so many steps, whatever was in between."""
+    sled = box("sled", 0.0, 0.5, material=SMOOTH)
+    run = held(scene(FLOOR, sled, forces=(Load(name="push", body="sled"),)), sleepy(), 60)
+    saved = run.save()
+    steps = []
+    for _ in range(2):
+        run.set_load("push", force=(1e-9, 0.0, 0.0))
+        run.step()
+        assert asleep(run) == 0
+        while not asleep(run):
+            run.step()
+        steps.append(run.steps - saved.native.steps)
+        run.restore(saved)
+        run.set_load("push", force=(50.0, 0.0, 0.0))
+        run.step(30)
+        run.restore(saved)
+
+    assert steps == [30, 30]
+
+
 def test_a_load_so_light_that_it_gives_little_speed_in_a_step_is_not_slept_over() -> None:
     """.1 m/s²: .0017 m/s a step, and .05 m/s in the time before sleep."""
     sled = box("sled", 0.0, 0.5, material=SMOOTH)

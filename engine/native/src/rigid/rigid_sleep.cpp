@@ -202,8 +202,7 @@ void RigidSystem::stir_joint(int joint) {
 
 /// Where bodies are as a step begins.
 void RigidSystem::note_places() {
-    for (const int i : tied_)
-        if (!asleep(i)) left_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
+    for (const int i : tied_) left_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
 }
 
 /// How fast a body's surface was in the step: by its velocities, or by where it got if that is more, m/s.
