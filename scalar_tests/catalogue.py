@@ -41,6 +41,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "resting_stack": "resting_stack",
     "rolling_sphere": "rolling_sphere",
     "pile": "pile",
+    "falling_pile": "falling_pile",
     "hanging_chain": "hanging_chain.question",
     "loaded_rods": "loaded_rods",
     "spinning_top": "spinning_top",

@@ -15,6 +15,7 @@ from spook_tracker.scalar_tests import (
     bowl,
     card_house,
     climb,
+    falling_pile,
     grain,
     hanging_cable,
     masonry_arch,
@@ -381,3 +382,22 @@ def test_what_rolls_needs_the_friction_that_spins_it_up_or_bends_its_way() -> No
     assert 0.5 * (high - low) / rolling_coin.LEAST == pytest.approx(
         abs(motion.spin) * rolling_coin.step(motion), rel=1e-9
     )
+
+
+def test_what_turns_leaves_its_tangent_by_what_a_falling_pile_allows() -> None:
+    """Points of a turning box against their tangents, by the matrix of the turn; and two boxes at a time."""
+    rng = np.random.default_rng(4)
+    most = 0.0
+    for turn in (0.01, 0.1, 0.5, 2.0):
+        allowed = falling_pile.bend(np.array([[0.0, turn, turn]]), np.array([True, True, True]))[0]
+        for _ in range(200):
+            axis, arm = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+            arm *= falling_pile.REACH
+            across = np.cross(axis, arm)
+            turned = (
+                arm * math.cos(turn) + across * math.sin(turn) + axis * (axis @ arm) * (1.0 - math.cos(turn))
+            )
+            most = max(most, 2.0 * np.linalg.norm(turned - arm - turn * across) / allowed)
+    assert 0.99 < most <= 1.0
+    one = falling_pile.bend(np.array([[0.3, 9.0]]), np.array([True, False]))  # a ball's turn moves nothing
+    assert one[0] == pytest.approx(0.5 * falling_pile.REACH * 0.3**2, rel=1e-12)
