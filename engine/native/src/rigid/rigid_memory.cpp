@@ -26,6 +26,7 @@ void RigidSystem::keep(Memory& memory) const {
 
 void RigidSystem::go_back(const Memory& memory) {
     at_hand_ = false;
+    share_.clear();  // of a step that was left unfinished
     redundant_.restore(matrix_, memory.redundancy);
     live_ = memory.live, joints_.states = memory.joints, mixed_ = memory.mixed;
     joints_.breaks = memory.breaks;
