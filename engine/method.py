@@ -43,7 +43,8 @@ class Method:
                        compliance, damping and corrections play no part; forces are those at the sample's time.
                        Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct); a blow
-                       among up to 24 contacts that sweeps do not settle is solved directly, since what it leaves stays
+                       among up to 24 contacts that sweeps do not settle is solved directly, since what it leaves stays;
+                       so are up to 24 joints (and their contacts) that would be unsettled
     iterations, residual_tolerance   when an iterative solve stops; where rows are still off by more than
                        unsettled_residual, sweeps go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)

@@ -23,6 +23,8 @@ void add_ties(const RowBlock& block, std::vector<Islands::Tie>& ties);
 Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties);
 Islands find_islands(const MixedSystem& system);
 
+inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
+
 /// Splits a system into its islands and solves each with a solver of its own, which keeps its analysis as long as
 /// the island does not change. Islands are done in order on one thread: equal input gives equal bits.
 class IslandSolver {

@@ -174,7 +174,8 @@ void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
     }
 }
 
-bool ContactStage::solve_by_sweeps(MixedSystem& system) {
+/// `left`: it ends unfinished, since few joints and contacts are better solved by rows, and directly if need be.
+bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     sweeps_.start(system, options_.friction);
     next_.clear();
     late_blow_ = false;
@@ -212,6 +213,10 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system) {
         if (again) take_in(known);
     }
     if (report.finite && pass_other_ends(system, system.rows.size())) return true;
+    left = report.finite && !report.converged && (by_rows_ || unsettled_body_ >= 0) && !system.rows.empty() &&
+           system.rows.size() + points_.size() <= few_rows;
+    by_rows_ = by_rows_ || left;
+    if (left) return true;
     counters_.unsettled += !report.converged;
 
     std::vector<double> share;

@@ -14,7 +14,6 @@ namespace {
 
 constexpr double slack_share = 1e-10;  // of the smaller body's radius
 constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
-constexpr std::size_t few_rows = 24;   // blocks: so many are solved directly at little cost
 constexpr int late_rounds = 64;  // of solves that set others in motion towards a third: each finds pairs anew
 
 FrictionReport sweep(const ContactOptions& o, FrictionModel model, MixedSystem& island,
@@ -177,7 +176,8 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
         still_right(system, points, model))
         return {};
     // What a resting solve leaves, the next step sees; what a blow leaves stays.
-    const double enough = &islands == &impact_solver_ ? o.residual_tolerance : o.unsettled_residual;
+    const bool exact = &islands == &impact_solver_ || by_rows_;
+    const double enough = exact ? o.residual_tolerance : o.unsettled_residual;
     const bool foreseen = foreseen_ && &islands == &resting_solver_;
     const FrictionReport report = islands.run(
         system, points,
@@ -279,7 +279,11 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
     foreseen_ = ends_passed_ = false;
-    if (options_.solver == SolverKind::iterative && !resists_turning_) return solve_by_sweeps(system);
+    if (options_.solver == SolverKind::iterative && !resists_turning_) {
+        bool left = false;
+        const bool finite = solve_by_sweeps(system, left);
+        if (!left) return finite;
+    }
     std::vector<FrictionPoint> friction;
     std::vector<Vec6> next;
     FrictionReport report;

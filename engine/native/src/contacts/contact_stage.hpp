@@ -210,7 +210,7 @@ public:
         ContactCounters counters;
         std::map<int, Patience> resting, impact, parting;
         std::map<std::uint64_t, double> given;
-        bool begun = false;
+        bool begun = false, by_rows = false;
     };
     Memory memory() const {
         return {touches_,
@@ -221,12 +221,13 @@ public:
                 impact_solver_.patience(),
                 parting_solver_.patience(),
                 given_,
-                begun_};
+                begun_,
+                by_rows_};
     }
     void remember(const Memory& memory) {
         touches_ = memory.touches, counters_ = memory.counters;
         lie_as(memory);
-        given_ = memory.given, begun_ = memory.begun;
+        given_ = memory.given, begun_ = memory.begun, by_rows_ = memory.by_rows;
         resting_solver_.be_patient(memory.resting);
         impact_solver_.be_patient(memory.impact);
         parting_solver_.be_patient(memory.parting);
@@ -343,7 +344,7 @@ private:
     double pressed(const MixedSystem& system, const Point& point) const;
     Vec3 read_back(const RowBlock& block, Point& point) const;
     // contact_iterative.cpp: the same by sweeps over compact contacts
-    bool solve_by_sweeps(MixedSystem& system);
+    bool solve_by_sweeps(MixedSystem& system, bool& left);
     void foresee(MixedSystem& system, std::size_t known, int round);
     struct Unanswered {
         std::vector<int> island;  // of each point
@@ -407,7 +408,8 @@ private:
     LargeArray<Point> laps_;                 // points of the step's pairs where it ends
     std::map<std::uint64_t, double> given_;  // by pair: overlap the scene began with, as far as it is left, m
     bool begun_ = false;                     // whether it is known
-    std::vector<Vec6> next_;                 // velocities between sweeps, per body of the scene
+    bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly
+    std::vector<Vec6> next_;     // velocities between sweeps, per body of the scene
     std::vector<char> changed_;  // who has another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
 

@@ -389,32 +389,11 @@ void RigidSystem::note_unsettled(int body, double residual, bool sunk) {
     first.residual = std::max(first.residual, residual);
 }
 
-/// Holds sweeps over joints alone to what contacts are held to.
-void RigidSystem::judge_sweeps() {
-    const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
-    residual_ = std::max(residual_, worst.residual);
-    double speed = 0.0;
-    for (const Vec6& v : mixed_.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
-    if (!(worst.residual > method_.unsettled_residual + 1e-6 * speed)) return;
-    const int blocks = static_cast<int>(joints_.blocks().size());
-    note_unsettled(body_of(worst.row < blocks ? worst.row : other_ends_[worst.row - blocks]), worst.residual);
-}
-
 /// Takes over what the contact stage has found of its last solve.
 void RigidSystem::judge_contacts() {
     residual_ = std::max(residual_, contacts_->residual());
     if (contacts_->unsettled_body() >= 0)
         note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(), contacts_->unsettled_sunk());
-}
-
-/// Rows without contacts.
-bool RigidSystem::solve_joints() {
-    if (solver_ != RigidSolver::iterative) return pivot_rows();
-    std::vector<FrictionPoint> none;
-    const FrictionReport report =
-        solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
-    sweeps_ += static_cast<std::uint64_t>(report.sweeps);
-    return report.finite;
 }
 
 void RigidSystem::solve_mixed(bool touching) {

@@ -189,6 +189,68 @@ bool RigidSystem::find_other_ends() {
     return other_ends_.size() > known;
 }
 
+/// Rows without contacts.
+bool RigidSystem::solve_joints() {
+    if (solver_ != RigidSolver::iterative) return pivot_rows();
+    std::vector<FrictionPoint> none;
+    const FrictionReport report =
+        solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
+    sweeps_ += static_cast<std::uint64_t>(report.sweeps);
+    return report.finite && settle_joints();
+}
+
+/// Joints that sweeps have left further off than the method allows are solved directly where few hang together, and from
+/// then on wherever sweeps do not settle: what many of these leave adds up.
+bool RigidSystem::settle_joints() {
+    std::optional<Islands> islands;
+    std::vector<std::size_t> rows;  // of each island
+    while (true) {
+        const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
+        live_.by_rows = live_.by_rows || worst.residual > tolerated_by_sweeps();
+        if (!live_.by_rows || !(worst.residual > method_.residual_tolerance)) return true;
+        const auto island = [&](const RowBlock& block) {
+            return islands->of_body[std::max(block.first, block.second)];
+        };
+        if (!islands) {
+            islands = spook::find_islands(mixed_);
+            rows.assign(islands->count, 0);
+            for (const RowBlock& block : mixed_.rows) ++rows[island(block)];
+        }
+        const int own = island(mixed_.rows[worst.row]);
+        if (rows[own] > few_rows) return true;
+        rows[own] = few_rows + 1;  // once
+        std::vector<char> answered;
+        for (const RowBlock& block : mixed_.rows) answered.push_back(island(block) != own);
+        IslandSolver direct;
+        direct.floor = method_.floor, direct.refinements = method_.refinements;
+        std::vector<FrictionPoint> none;
+        const FrictionReport report = direct.run(
+            mixed_, none,
+            [this](MixedSystem& part, std::vector<FrictionPoint>& points, DirectSolver& solver) {
+                return solve_friction_direct(part, points, method_.friction, solver);
+            },
+            &answered);
+        rounds_ += static_cast<std::uint64_t>(report.pivots);
+        if (!report.finite) return false;
+    }
+}
+
+/// What sweeps may leave of a row, m/s.
+double RigidSystem::tolerated_by_sweeps() const {
+    double speed = 0.0;
+    for (const Vec6& v : mixed_.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
+    return method_.unsettled_residual + 1e-6 * speed;
+}
+
+/// Holds sweeps over joints alone to what contacts are held to.
+void RigidSystem::judge_sweeps() {
+    const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
+    residual_ = std::max(residual_, worst.residual);
+    if (!(worst.residual > tolerated_by_sweeps())) return;
+    const int blocks = static_cast<int>(joints_.blocks().size());
+    note_unsettled(body_of(worst.row < blocks ? worst.row : other_ends_[worst.row - blocks]), worst.residual);
+}
+
 void RigidSystem::integrate_body(int i) {
     if (!integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
 }

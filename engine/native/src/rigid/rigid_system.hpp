@@ -138,6 +138,7 @@ private:
         std::int64_t step = 0;   // steps of h begun
         std::int64_t moved = 0;  // steps of h after which positions are known
         Unsettled unsettled;
+        bool by_rows = false;  // sweeps over joints alone have failed: few are solved directly
         Sleep sleep;
         // Velocities at mid-step:
         bool velocity_ready = false;         // the velocities of the coming step are found already
@@ -291,6 +292,8 @@ private:
     static RowBlock other_end(const RowBlock& block);
     bool find_other_ends();
     bool solve_joints();
+    bool settle_joints();
+    double tolerated_by_sweeps() const;
     void fill_beyond(int block, RowBlock& rows, BlockRight& numbers, std::vector<Beyond>& beyond) const;
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
