@@ -285,10 +285,15 @@ def test_a_seam_of_two_faces_is_no_obstacle(h: float, shape: Sphere | Box) -> No
     assert np.abs(result["z"][:, 2] - 0.05).max() < 1e-12
 
 
-@pytest.mark.parametrize("seed", [0, 5, 10, 11, 12, 18, 36, 106, 113])
-def test_sweeps_see_no_step_where_tiles_go_on(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("sweeps", "seed"),
+    [(50, seed) for seed in (0, 5, 10, 11, 12, 18, 36, 106, 113)]
+    + [(5, seed) for seed in (24, 58, 121, 128, 189)],
+)
+def test_sweeps_see_no_step_where_tiles_go_on(sweeps: int, seed: int) -> None:
     """Tiles of random lengths in one plane, leaning so that nothing is exact: before its sweeps have settled a box sinks a
-    little, and met the side of the next tile with that speed. Two slides in five ended so."""
+    little, and met the side of the next tile with that speed. Two slides in five ended so. Five sweeps leave a speed that
+    the next step sank by: one slide in nine was thrown up."""
     rng = np.random.default_rng(seed)
     edges = np.concatenate(((-3.0,), np.sort(rng.uniform(-1.0, 8.0, 8)), (12.0,)))
     turn = rng.normal(size=4)
@@ -319,11 +324,12 @@ def test_sweeps_see_no_step_where_tiles_go_on(seed: int) -> None:
         Scene(bodies=(*tiles, slider), gravity=tuple(frame @ GRAVITY)),
         time_step=h,
         duration=0.35,
-        method=Method(solver="iterative"),
+        method=Method(solver="iterative", iterations=sweeps),
         observe={"v": Trace(quantity=Velocity("slider"))},
     )
 
-    assert np.abs(result["v"] - speed).max() < 1e-6
+    off = 1e-6 if sweeps == 50 else Method().unsettled_residual
+    assert np.abs(result["v"] - speed).max() < off
 
 
 # Blows that follow from blows -----------------------------------------------------------------------------------------

@@ -169,12 +169,10 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         for (const Contact& contact : scratch_) {
             if (!reachable(contact)) continue;
             add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
-            const double depth = std::max(0.0, -contact.point.gap);
-            const double sinking =
-                -options_.time_step * relative(points_.back(), contact.point.normal, velocity_, false);
+            const double depth = sunk_by(points_.back());
             for (const int b : {contact.first, contact.second}) {
                 supported_[b] = 1;  // and as deep as it will be when it meets the next part of what holds it
-                depth_[b] = std::max(depth_[b], depth + std::clamp(sinking, 0.0, depth));
+                depth_[b] = std::max(depth_[b], depth);
             }
         }
     }

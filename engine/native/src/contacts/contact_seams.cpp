@@ -18,11 +18,13 @@ constexpr double share = 0.25;  // of the overlap at which pairs count as met: l
 
 }  // namespace
 
-/// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
+/// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m: as
+/// much as sweeps that count as settled may have left, or as the depth.
 double ContactStage::sunk_by(const Point& point) const {
-    const double depth = std::max(0.0, -point.contact.point.gap);
-    const double speed = relative(point, point.contact.point.normal, velocity_, false);
-    return depth + std::clamp(-options_.time_step * speed, 0.0, depth);
+    const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
+    const double sinking = -h * relative(point, point.contact.point.normal, velocity_, false);
+    const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
+    return depth + std::clamp(sinking, 0.0, std::max(depth, left));
 }
 
 /// Whether `body`, that would meet another as they move, does not once it is lifted out of what holds it.
