@@ -68,6 +68,8 @@ class Method:
     sleep_after        how long bodies must have been that slow, s
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
+    threads            that share the work on contacts: the search, sweeps, islands. The results are equal to the bit for
+                       every number of them; heaps of fewer than some hundred contacts gain nothing
     force_stages       stages to keep although the scene does not need them, to measure what they cost; solve_block: the
                        general factorisation also where a chain or a mechanism in a plane has a faster way
     """
@@ -88,6 +90,7 @@ class Method:
     sleep_after: float = 0.5
     refinements: int = 1
     floor: float = 1e-12
+    threads: int = 1
     force_stages: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -103,7 +106,7 @@ class Method:
         for field in ("half_step_velocities", "string_stiffness"):
             if not isinstance(getattr(self, field), bool):
                 refuse(field, "True or False")
-        for field in ("corrections", "substeps", "iterations", "refinements"):
+        for field in ("corrections", "substeps", "iterations", "refinements", "threads"):
             if isinstance(getattr(self, field), bool):
                 refuse(field, "a whole number")
         if not isinstance(self.corrections, int) or self.corrections not in (0, 1, 2):
@@ -132,6 +135,8 @@ class Method:
             refuse("residual_tolerance", "zero or above")
         if not one_of(self.friction, ("cone", "box", "scaled_box")):
             refuse("friction", "cone, box or scaled_box")
+        if not isinstance(self.threads, int) or not 1 <= self.threads <= 256:
+            refuse("threads", "a whole number from 1 to 256")
         if not isinstance(self.refinements, int) or not 0 <= self.refinements <= 10:
             refuse("refinements", "a whole number from 0 to 10")
         if not 0.0 <= self.floor < 1.0:

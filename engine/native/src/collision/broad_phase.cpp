@@ -9,9 +9,10 @@ namespace spook {
 
 namespace {
 
-constexpr std::size_t few = 32;   // below, a grid costs more than comparing all
-constexpr int most_levels = 31;   // what is larger than the cells of the last is compared with all
-constexpr double furthest = 1e9;  // cells from the origin; what lies further counts as there
+constexpr std::size_t few = 32;    // below, a grid costs more than comparing all
+constexpr int most_levels = 31;    // what is larger than the cells of the last is compared with all
+constexpr std::size_t many = 512;  // worth several threads
+constexpr double furthest = 1e9;   // cells from the origin; what lies further counts as there
 
 std::int32_t coordinate(double x, double size) noexcept {
     return static_cast<std::int32_t>(std::floor(std::clamp(x / size, -furthest, furthest)));
@@ -86,7 +87,7 @@ void BroadPhase::fill_cells(const std::vector<Bounds>& bounds) {
 }
 
 /// All partners of i of its own level, each pair once, and of coarser ones.
-void BroadPhase::search(const std::vector<Bounds>& bounds, int i) {
+void BroadPhase::search(const std::vector<Bounds>& bounds, int i, std::vector<IndexPair>& found) const {
     const Bounds own = bounds[i];
     const auto look = [&](const Cell& cell, bool later_only) {
         const std::size_t k = bucket(cell);
@@ -94,7 +95,7 @@ void BroadPhase::search(const std::vector<Bounds>& bounds, int i) {
             const Entry& entry = entries_[e];
             if (!(entry.cell == cell) || (later_only && entry.index <= i)) continue;
             if (overlap(own, bounds[entry.index]))
-                found_.emplace_back(std::min(i, entry.index), std::max(i, entry.index));
+                found.emplace_back(std::min(i, entry.index), std::max(i, entry.index));
         }
     };
     const Cell home = cells_[i];
@@ -111,10 +112,15 @@ void BroadPhase::search(const std::vector<Bounds>& bounds, int i) {
 /// Into `out` by first index and then by second: a counting sort, and short insertions.
 void BroadPhase::sort_pairs(std::size_t count, std::vector<IndexPair>& out) {
     fill_.assign(count + 1, 0);
-    for (const auto& [i, j] : found_) ++fill_[i + 1];
+    std::size_t all = 0;
+    for (const auto& found : found_) {
+        all += found.size();
+        for (const auto& [i, j] : found) ++fill_[i + 1];
+    }
     for (std::size_t k = 1; k <= count; ++k) fill_[k] += fill_[k - 1];
-    out.resize(found_.size());
-    for (const auto& pair : found_) out[fill_[pair.first]++] = pair;
+    out.resize(all);
+    for (const auto& found : found_)
+        for (const auto& pair : found) out[fill_[pair.first]++] = pair;
     for (std::size_t i = 0, from = 0; i < count; ++i) {
         const auto to = static_cast<std::size_t>(fill_[i]);
         std::sort(out.begin() + static_cast<std::ptrdiff_t>(from),
@@ -123,7 +129,8 @@ void BroadPhase::sort_pairs(std::size_t count, std::vector<IndexPair>& out) {
     }
 }
 
-void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out) {
+void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out,
+                                   Team* team) {
     out.clear();
     const int count = static_cast<int>(bounds.size());
     if (bounds.size() <= few) {
@@ -133,13 +140,16 @@ void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vecto
         return;
     }
     fill_cells(bounds);
-    found_.clear();
-    for (int i = 0; i < count; ++i)
-        if (cells_[i].level >= 0) search(bounds, i);
+    found_.resize(team != nullptr ? static_cast<std::size_t>(team->size()) : 1);
+    for (auto& found : found_) found.clear();
+    share_out(team, bounds.size(), many, [&](int part, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (cells_[i].level >= 0) search(bounds, static_cast<int>(i), found_[part]);
+    });
     for (const int i : everywhere_)
         for (int j = 0; j < count; ++j)
             if (j != i && (j > i || cells_[j].level >= 0) && overlap(bounds[i], bounds[j]))
-                found_.emplace_back(std::min(i, j), std::max(i, j));
+                found_[0].emplace_back(std::min(i, j), std::max(i, j));
     sort_pairs(bounds.size(), out);
 }
 

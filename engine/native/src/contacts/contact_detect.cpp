@@ -1,7 +1,6 @@
 // The contact stage's first part: which points are closed, which pairs will meet, and when.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "collision/sweep.hpp"
 #include "contacts/contact_geometry.hpp"
@@ -16,9 +15,9 @@ constexpr double closed = 1e-9;  // gaps up to this part of the larger body's ra
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
 constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
+constexpr std::size_t many_pairs = 512;  // worth several threads
 constexpr double vanishing = 1e-8;       // a direction so steep on the surface has no shadow
 constexpr double steep = 0.9;            // of normals: up to it another side, or an edge of one
-constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
 
 }  // namespace
 
@@ -59,6 +58,7 @@ bool ContactStage::reachable(const Contact& contact) const {
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                           const std::vector<Vec6>& free_velocity) {
     const std::size_t bodies = margin_.size();
+    if (team_) team_->refresh();
     poses_ = poses;
     velocity_ = velocity;
     kick_.resize(bodies);
@@ -136,15 +136,24 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
     known_.clear();
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
-    unsigned seen = 0;
-    for (const IndexPair& pair : near) {
-        if (++seen % pairs_a_look == 0) Watch::look();
+    const auto separation_of = [this](const IndexPair& pair) {
+        return separation(detection_.collider(pair.first).shape, detection_.pose(pair.first),
+                          detection_.collider(pair.second).shape, detection_.pose(pair.second));
+    };
+    const bool shared = team_ && near.size() >= many_pairs;
+    if (shared) {
+        apart_.resize(near.size());
+        share_out(team_.get(), near.size(), many_pairs, [&](int, std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) apart_[k] = separation_of(near[k]);
+        });
+    }
+    for (std::size_t k = 0; k < near.size(); ++k) {
+        const IndexPair& pair = near[k];
+        if ((k + 1) % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
         const double reach = search_[first.body] + search_[second.body];
-        OpenPair open{
-            pair, first.body, second.body,
-            separation(first.shape, detection_.pose(pair.first), second.shape, detection_.pose(pair.second))};
+        OpenPair open{pair, first.body, second.body, shared ? apart_[k] : separation_of(pair)};
         open.first_arm = first.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.first);
         open.second_arm = second.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.second);
         const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
@@ -248,35 +257,61 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
     return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
 }
 
+/// When an open pair meets along `velocity`, s; negative if it does not in this step, or was judged before.
+double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const {
+    if (late && !changed_[open.first] && !changed_[open.second]) return -1.0;
+    if (passes(open, velocity)) return -1.0;
+    const Pose at_first = moved(open.first, velocity), at_second = moved(open.second, velocity);
+    const Mover first = mover(open.pair.first, at_first, velocity),
+                second = mover(open.pair.second, at_second, velocity);
+    const double time = first_touch(first, second, options_.time_step, slop(open));
+    if (time < 0.0 || is_seam(first, open.first, second, open) || is_seam(second, open.second, first, open))
+        return -1.0;
+    return time;
+}
+
+/// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
+Pose ContactStage::moved(int b, const std::vector<Vec6>& velocity) const {
+    Pose pose = poses_[b];
+    if (event_time_[b] >= 0.0)
+        pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
+    return pose;
+}
+
+/// A collider whose body goes on from `pose`, which must outlive it.
+Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const {
+    const Collider& own = detection_.collider(collider);
+    return {own.shape, own.part, pose, linear(velocity[own.body]), angular(velocity[own.body])};
+}
+
 /// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
 /// for an impact: if they need one, late_blow_ tells so, see blows_come_first().
 int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
-    int found = 0;
-    auto moved = [&](int b) {  // an event's bodies have gone part of their way with another velocity
-        Pose pose = poses_[b];
-        if (event_time_[b] >= 0.0)
-            pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
-        return pose;
-    };
-    std::erase_if(open_, [&](const OpenPair& open) {
-        if (late && !changed_[open.first] && !changed_[open.second]) return false;
-        if (passes(open, velocity)) return false;
-        const IndexPair pair = open.pair;
-        const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
-        const int a = one.body, b = two.body;
-        const Pose at_a = moved(a), at_b = moved(b);
-        const Mover first{one.shape, one.part, at_a, linear(velocity[a]), angular(velocity[a])};
-        const Mover second{two.shape, two.part, at_b, linear(velocity[b]), angular(velocity[b])};
-        const double time = first_touch(first, second, options_.time_step, slop(open));
-        if (time < 0.0 || is_seam(first, a, second, open) || is_seam(second, b, first, open)) return false;
-        const std::size_t known = points_.size();
-        const bool met = add_strike(pair, first.body_at(time), second.body_at(time), time, velocity, late);
-        const Vec3 led = (at_a.position - poses_[a].position) - (at_b.position - poses_[b].position);
-        for (std::size_t k = known; k < points_.size(); ++k)
-            points_[k].begun -= dot(points_[k].contact.point.normal, led);
-        found += met;
-        return met;
+    meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
+    for (auto& meetings : meetings_) meetings.clear();
+    share_out(team_.get(), open_.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k)
+            if (const double time = meeting(open_[k], velocity, late); !(time < 0.0))
+                meetings_[part].push_back({k, time});
     });
+    int found = 0;
+    for (const auto& meetings : meetings_)
+        for (const auto& [k, time] : meetings) {
+            OpenPair& open = open_[k];
+            const Pose first = moved(open.first, velocity), second = moved(open.second, velocity);
+            const std::size_t known = points_.size();
+            const bool met =
+                add_strike(open.pair, mover(open.pair.first, first, velocity).body_at(time),
+                           mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
+            const Vec3 led = (first.position - poses_[open.first].position) -
+                             (second.position - poses_[open.second].position);
+            for (std::size_t i = known; i < points_.size(); ++i)
+                points_[i].begun -= dot(points_[i].contact.point.normal, led);
+            if (!met) continue;
+            open.first = -1;
+            ++found;
+        }
+    if (found > 0) std::erase_if(open_, [](const OpenPair& open) { return open.first < 0; });
     return found;
 }
 
@@ -372,126 +407,6 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
             p.first_arm = p.contact.point.position - poses_[a].position;
             p.second_arm = p.contact.point.position - poses_[b].position;
         }
-    }
-}
-
-/// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
-/// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
-/// that goes with it changes the energy.
-void ContactStage::find_events() {
-    root_.resize(unknown_.size());
-    std::iota(root_.begin(), root_.end(), 0);
-    auto root = [this](int b) {
-        while (root_[b] != b) b = root_[b] = root_[root_[b]];
-        return b;
-    };
-    auto join = [&](int a, int b) {
-        if (unknown_[a] < 0 || unknown_[b] < 0) return;
-        a = root(a), b = root(b);
-        root_[std::max(a, b)] = std::min(a, b);
-    };
-    for (const Point& point : points_) join(point.contact.first, point.contact.second);
-    for (const auto& [a, b] : joints_)
-        if (a >= 0 && b >= 0) join(a, b);
-
-    std::vector<std::size_t> members(unknown_.size(), 0);
-    std::vector<std::uint64_t> struck(unknown_.size(), 0);  // the pair of the island's strike, plus one
-    std::vector<char> plain(unknown_.size(), 1), bouncy(unknown_.size(), 0);
-    std::vector<double> when(unknown_.size(), -1.0);
-    for (std::size_t b = 0; b < unknown_.size(); ++b)
-        if (unknown_[b] >= 0) {
-            const int island = root(static_cast<int>(b));
-            ++members[island];
-            plain[island] = plain[island] && ball_[b];
-        }
-    for (const Point& point : points_) {
-        const Contact& contact = point.contact;
-        const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
-        if (point.strike < 0.0) {
-            const double approach = -relative(point, contact.point.normal, predicted_, false);
-            if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
-                plain[island] = 0;
-            continue;
-        }
-        const std::uint64_t pair = (contact.key >> feature_bits) + 1;
-        if (struck[island] != 0 && struck[island] != pair) plain[island] = 0;
-        struck[island] = pair;
-        when[island] = point.strike;
-        bouncy[island] = bouncy[island] || point.material.restitution > 0.0;
-    }
-    // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
-    // others will: bodies led to an event's time would not be where such rows expect them.
-    std::vector<double> speed(unknown_.size(), 0.0);
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        double& fastest = speed[unknown_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
-        fastest = std::max(fastest, norm(linear(predicted_[b])));
-    }
-    const auto island = [&](int b) { return unknown_[b] >= 0 ? root(b) : b; };
-    for (const OpenPair& open : open_) {
-        const int a = island(open.first), b = island(open.second);
-        if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
-        plain[a] = plain[a] && bouncy[a];
-        plain[b] = plain[b] && bouncy[b];
-    }
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        if (unknown_[b] < 0) continue;
-        const int island = root(static_cast<int>(b));
-        if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
-        event_time_[b] = when[island];
-        if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
-        velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);
-        for (double& k : kick_[b]) k *= 1.0 - lead_[b];
-    }
-    for (Point& point : points_) {
-        if (point.strike < 0.0) continue;
-        const int body = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
-        point.event = event_time_[body] >= 0.0;
-        if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
-    }
-}
-
-/// Sorts the points by key and finds each one's predecessor in the step before.
-void ContactStage::order_points() {
-    const auto in_order = [](const Point& a, const Point& b) { return by_key(a.contact, b.contact); };
-    if (!std::is_sorted(points_.begin(), points_.end(), in_order))  // closed ones come so
-        std::stable_sort(points_.begin(), points_.end(), in_order);
-    std::size_t old = 0;
-    for (Point& point : points_) {
-        while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
-        if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
-        point.before = touches_[old].normal;
-        point.parting_before = touches_[old].parting;
-        point.pressed_before = touches_[old].pressed;
-        std::copy_n(touches_[old].tangent, 2, point.tangent_before);
-        std::copy_n(touches_[old].turning, 3, point.turning_before);
-    }
-    ordered_ = points_.size();
-}
-
-/// Approach, push and part in the impact of every point, from the current velocities.
-void ContactStage::measure_points() {
-    const double h = options_.time_step;
-    impact_needed_ = false;
-    for (Point& point : points_) {
-        const Contact& contact = point.contact;
-        const double gap = contact.point.gap;
-        point.approach = relative(point, contact.point.normal, velocity_, false);
-        point.push = relative(point, contact.point.normal, kick_, false);
-        const double psi = point.material.restitution, speed = -point.approach;
-        point.bounce = -1.0;
-        if (is_closed(contact)) {
-            point.bounce = speed > 0.0 ? psi : 0.0;
-        } else if (plastic_first_ && point.impact > 0.0) {  // a blow of this step has brought them together
-            point.bounce = 0.0;
-        } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
-            const double ahead = 2.0 * (-point.push / h) * gap / (speed * speed);
-            const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
-            if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
-            else if (plastic_first_) point.bounce = 0.0;
-        }
-        const double kick = norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second]));
-        point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
-        impact_needed_ = impact_needed_ || is_blow(point);
     }
 }
 

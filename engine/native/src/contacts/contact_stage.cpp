@@ -76,6 +76,10 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
         solver->floor = options.floor;
         solver->refinements = options.refinements;
     }
+    if (options.threads > 1) team_ = std::make_shared<Team>(options.threads);
+    detection_.help(team_.get());
+    sweeps_.help(team_.get());
+    parting_sweeps_.help(team_.get());
     for (const SurfaceMaterial& material : materials_) {
         conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
         oriented_ = oriented_ || material.is_oriented();

@@ -52,6 +52,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -63,6 +64,7 @@
 #include "contacts/friction_sweeps.hpp"
 #include "linear/large_array.hpp"
 #include "run/named_enum.hpp"
+#include "run/team.hpp"
 
 namespace spook {
 
@@ -83,6 +85,7 @@ struct ContactOptions {
     int refinements = 1;
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
+    int threads = 1;
 };
 
 struct ContactCounters {  // exact, equal on every machine
@@ -336,6 +339,9 @@ private:
     double slop(const OpenPair& open) const noexcept;
     double sunk_by(const Point& point) const;
     bool is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open) const;
+    Pose moved(int body, const std::vector<Vec6>& velocity) const;
+    Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
+    double meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const;
     bool passes(const OpenPair& open, const std::vector<Vec6>& velocity) const;
     double resting_right(Point& point) const;
     bool is_pressed(const Point& point) const noexcept;
@@ -388,6 +394,7 @@ private:
     bool is_closed(const Contact& contact) const noexcept { return is_closed(contact, contact.point.gap); }
 
     Detection detection_;
+    std::shared_ptr<Team> team_;  // of several threads, or none
     std::vector<SurfaceMaterial> materials_;
     std::vector<int> unknown_;
     ContactOptions options_;
@@ -416,12 +423,18 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     LargeArray<OpenPair> open_;
-    std::vector<IndexPair> beside_;  // pairs without points, where others part
-    std::vector<IndexPair> near_;    // where the search was widened
-    std::vector<int> grown_;         // whom it was widened for
-    std::vector<char> supported_;    // bodies with a closed contact
-    std::vector<double> depth_;      // of a body's closed contacts, m
-    std::vector<double> sinking_;    // what sweeps that have not settled would add to it in this step, m
+    std::vector<Separation> apart_;  // of pairs, found on several threads
+    struct Meeting {
+        std::size_t open;
+        double time;
+    };
+    std::vector<std::vector<Meeting>> meetings_;  // found by each thread
+    std::vector<IndexPair> beside_;               // pairs without points, where others part
+    std::vector<IndexPair> near_;                 // where the search was widened
+    std::vector<int> grown_;                      // whom it was widened for
+    std::vector<char> supported_;                 // bodies with a closed contact
+    std::vector<double> depth_;                   // of a body's closed contacts, m
+    std::vector<double> sinking_;  // what sweeps that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
@@ -429,10 +442,11 @@ private:
     std::vector<double> clock_;  // of successive blows: up to when a body's way in the step is known, s
     std::vector<Vec6> way_;      // and that way, m and rad
     LargeArray<Point> points_, strikes_;
-    std::vector<Touch> touches_;           // of the last step until the end of solve()
-    std::vector<Touch> kept_;              // of sleepers
-    std::vector<char> asleep_;             // by body; empty while none has slept
-    std::vector<int> roused_;              // sleepers met in this step
+    std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
+    std::vector<Touch> touches_;                                 // of the last step until the end of solve()
+    std::vector<Touch> kept_;                                    // of sleepers
+    std::vector<char> asleep_;                                   // by body; empty while none has slept
+    std::vector<int> roused_;                                    // sleepers met in this step
     std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
     std::vector<char> held_;               // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest

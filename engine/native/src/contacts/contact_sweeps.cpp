@@ -3,30 +3,39 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/disc.hpp"
 #include "run/watch.hpp"
+
+#define SPOOK_ISA single
+#include "contacts/contact_update.inl"
 
 namespace spook {
 
 namespace {
 
 constexpr int late_rounds = 3;         // of sweeps for contacts found after the last one
-constexpr int cold = -2;               // before every sweep
+constexpr unsigned char now_hot = 2;   // and 1 in the sweep after
 constexpr double glance = 1.0 / 16.0;  // of what sweeping a contact costs: to see that it is cold
 constexpr double measuring = 0.5;      // the same: to see how far off it is
-constexpr int bodies_ahead = 2, contacts_ahead = 4;  // asked for while others are swept
+constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are swept
+constexpr std::size_t narrow = 64;  // contacts of a level for each thread: fewer are not worth to wait for
+constexpr std::size_t narrow_due = 192;     // the same where only some of them are due
+constexpr std::size_t worth_threads = 512;  // contacts, where nothing is waited for
+constexpr double few_left = 0.75;           // of the contacts in the list: a shorter one is made
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
-Mat3 symmetric_inverse(const Mat6& mass) noexcept {
+SweptBody swept_body(const Mat6& mass) noexcept {
+    const double one = 1.0 / mass[0];
     const double a = mass[21], b = mass[22], c = mass[23], d = mass[28], e = mass[29], f = mass[35];
-    if (b == 0.0 && c == 0.0 && e == 0.0) return Mat3::diagonal({1.0 / a, 1.0 / d, 1.0 / f});
+    if (b == 0.0 && c == 0.0 && e == 0.0) return {one, 1.0 / a, 0.0, 0.0, 1.0 / d, 0.0, 1.0 / f};
     const double A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
     const double s = 1.0 / (a * A + b * B + c * C);
     const double D = a * f - c * c, E = b * c - a * e, F = a * d - b * b;
-    return {{s * A, s * B, s * C, s * B, s * D, s * E, s * C, s * E, s * F}};
+    return {one, s * A, s * B, s * C, s * D, s * E, s * F};
 }
 
 }  // namespace
@@ -34,8 +43,7 @@ Mat3 symmetric_inverse(const Mat6& mass) noexcept {
 void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
     bodies_ = static_cast<int>(system.mass.size());
     inertia_.resize(bodies_ + 1);
-    for (int b = 0; b < bodies_; ++b)
-        inertia_[b] = {1.0 / system.mass[b][0], symmetric_inverse(system.mass[b])};
+    for (int b = 0; b < bodies_; ++b) inertia_[b] = swept_body(system.mass[b]);
     inertia_[bodies_] = {};
     begin(system, model);
 }
@@ -56,27 +64,35 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
         velocity.resize(bodies_ + 1);
         for (int b = 0; b < bodies_; ++b) {
             const Vec6& p = system.momentum[b];
-            const Vec3 v = inertia_[b].inverse_mass * linear(p), w = inertia_[b].inverse * angular(p);
+            const Vec3 v = inertia_[b].inverse_mass * linear(p), w = inertia_[b].turn(angular(p));
             velocity[b] = {v.x, v.y, v.z, w.x, w.y, w.z};
         }
         velocity[bodies_] = Vec6{};
     }
     contacts_.clear();
+    rests_.clear();
     slips_.clear();
     parent_.resize(bodies_ + 1);
     std::iota(parent_.begin(), parent_.end(), 0);
-    head_.assign(bodies_ + 1, -1);
-    tail_.assign(bodies_ + 1, -1);
     active_.assign(bodies_ + 1, 0);
     spent_.assign(bodies_ + 1, 0);
     left_.assign(bodies_ + 1, 0.0);
-    next_.clear();
+    parts_.resize(team_ != nullptr ? static_cast<std::size_t>(team_->size()) : 1);
+    for (Part& part : parts_) {
+        part.change.assign(bodies_ + 1, 0.0);
+        part.none.first = part.none.second = bodies_;
+        part.none.step = 1.0;
+    }
     bodies_of_.clear();
     roots_.clear();
-    chained_ = false;
-    stamp_ = 0;
+    known_.assign(bodies_ + 1, 0);
+    scheduled_ = 0;
+    order_.clear();
+    level_end_.clear();
+    swept_ = stretched_ = joined_ = false;
+    plain_ = true;
     done_ = 0.0;
-    hot_.assign(bodies_ + 1, cold);
+    hot_.assign(bodies_ + 1, 0);
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
         int anchor = std::max(rows.first, rows.second);
@@ -84,112 +100,69 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
             if (anchor < 0) anchor = other.body;
             else if (other.body >= 0) join(anchor, other.body);
         }
-        link(k, anchor, anchor == rows.first ? rows.second : rows.first);
+        link(anchor, anchor == rows.first ? rows.second : rows.first);
     }
 }
 
 int ContactSweeps::add(const SweepContact& given) {
-    Contact& c = contacts_.emplace_back();
+    SweptContact& c = contacts_.emplace_back();
     c.first = given.first >= 0 ? given.first : bodies_;
     c.second = given.second >= 0 ? given.second : bodies_;
+    SweptRest& rest = rests_.emplace_back();
     c.normal = given.normal;
     c.tangent = given.tangent;
-    c.across = given.across;
-    c.stretched = given.stretched;
+    rest.across = given.across;
+    stretched_ = stretched_ || given.stretched;
     c.first_arm = given.first_arm;
     c.second_arm = given.second_arm;
-    std::copy_n(given.right, 3, c.right);
+    c.right = given.right[0], rest.right_along = given.right[1], rest.right_across = given.right[2];
     std::copy_n(given.impulse, 3, c.impulse);
-    c.softness = given.softness;
-    c.slip_softness = given.slip_softness;
+    rest.softness = given.softness;
+    rest.slip_softness = given.slip_softness;
     c.friction = given.friction;
-    c.normal_before = given.normal_before >= 0.0 ? given.normal_before : given.impulse[0];
-    const Inertia &one = inertia_[c.first], &two = inertia_[c.second];
+    rest.normal_before = given.normal_before >= 0.0 ? given.normal_before : given.impulse[0];
+    const Vec3 third = cross(c.normal, c.tangent);
+    plain_ = plain_ && rest.right_along == 0.0 && rest.right_across == 0.0 && rest.softness == 0.0 &&
+             rest.slip_softness == 0.0 && third.x == rest.across.x && third.y == rest.across.y &&
+             third.z == rest.across.z;
+    const SweptBody &one = inertia_[c.first], &two = inertia_[c.second];
     const double inverse_mass = one.inverse_mass + two.inverse_mass;
-    const Vec3 direction[3] = {c.normal, c.tangent, c.across};
+    const Vec3 direction[3] = {c.normal, c.tangent, rest.across};
     Vec3 first[3], second[3], first_push[3], second_push[3];
     for (int i = 0; i < 3; ++i) {
         first[i] = cross(c.first_arm, direction[i]);
         second[i] = cross(c.second_arm, direction[i]);
-        first_push[i] = one.inverse * first[i];
-        second_push[i] = two.inverse * second[i];
+        first_push[i] = one.turn(first[i]);
+        second_push[i] = two.turn(second[i]);
     }
     const auto part = [&](int i, int j) {
         return dot(first[i], first_push[j]) + dot(second[i], second_push[j]);
     };
-    c.own = inverse_mass + part(0, 0) + c.softness;
+    c.own = inverse_mass + part(0, 0) + rest.softness;
     c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
     c.coupling[0] = part(1, 0);
     c.coupling[1] = part(2, 0);
-    const double along = c.stretched ? dot(c.tangent, c.tangent) : 1.0,
-                 across = c.stretched ? dot(c.across, c.across) : 1.0;
-    double* const slip = slips_.emplace_back().own;
-    slip[0] = inverse_mass * along + part(1, 1) + c.slip_softness;
+    const double along = given.stretched ? dot(c.tangent, c.tangent) : 1.0,
+                 across = given.stretched ? dot(rest.across, rest.across) : 1.0;
+    slips_.emplace_back().stretched = given.stretched;
+    double* const slip = slips_.back().own;
+    slip[0] = inverse_mass * along + part(1, 1) + rest.slip_softness;
     slip[1] = part(1, 2);
-    slip[2] = inverse_mass * across + part(2, 2) + c.slip_softness;
+    slip[2] = inverse_mass * across + part(2, 2) + rest.slip_softness;
     const double largest = 0.5 * (slip[0] + slip[2]) + length(0.5 * (slip[0] - slip[2]), slip[1]);
     c.step = largest > 0.0 ? 1.0 / largest : 0.0;
     if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
-        push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * c.across);
-    heat({c.first, c.second});
-    const int index = static_cast<int>(contacts_.size()) - 1;
-    link(joint_count_ + index, given.first, given.second);
-    return index;
+        push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * rest.across);
+    heat(c.first, c.second);
+    link(given.first, given.second);
+    return static_cast<int>(contacts_.size()) - 1;
 }
 
-int ContactSweeps::root(int body) noexcept {
-    while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
-    return body;
-}
-
-/// Joins the islands of both bodies, and once sweeping has begun their chains, too.
-void ContactSweeps::link(int item, int first, int second) {
-    next_.push_back(-1);
-    bodies_of_.push_back({first >= 0 ? first : bodies_, second >= 0 ? second : bodies_});
-    if (first < 0 && second < 0) return;
-    if (first >= 0 && second >= 0) join(first, second);
-    if (chained_) chain(item);
-}
-
-void ContactSweeps::join(int first, int second) {
-    int a = root(first), b = root(second);
-    if (a == b) return;
-    if (a > b) std::swap(a, b);
-    parent_[b] = a;
-    left_[a] = larger(left_[a], left_[b]);
-    spent_[a] = spent_[a] || spent_[b];
-    if (!chained_ || head_[b] < 0) return;
-    if (head_[a] >= 0) {
-        next_[tail_[a]] = head_[b];
-        roots_.erase(std::find(roots_.begin(), roots_.end(), b));
-    } else {
-        head_[a] = head_[b];
-        *std::find(roots_.begin(), roots_.end(), b) = a;
-    }
-    tail_[a] = tail_[b];
-    head_[b] = -1;
-}
-
-void ContactSweeps::chain(int item) {
-    const int body = std::min(bodies_of_[item].first, bodies_of_[item].second);
-    if (body == bodies_) return;
-    const int island = root(body);
-    if (head_[island] < 0) {
-        head_[island] = item;
-        roots_.push_back(island);
-    } else {
-        next_[tail_[island]] = item;
-    }
-    tail_[island] = item;
-    active_[island] = 1;
-}
-
-void ContactSweeps::push(const Contact& c, Vec3 impulse) noexcept {
-    const Inertia &one = inertia_[c.first], &two = inertia_[c.second];
+void ContactSweeps::push(const SweptContact& c, Vec3 impulse) noexcept {
+    const SweptBody &one = inertia_[c.first], &two = inertia_[c.second];
     Vec6 &v = joints_.velocity()[c.first], &w = joints_.velocity()[c.second];
-    const Vec3 turn = one.inverse * cross(c.first_arm, impulse),
-               back = two.inverse * cross(c.second_arm, impulse);
+    const Vec3 turn = one.turn(cross(c.first_arm, impulse)), back = two.turn(cross(c.second_arm, impulse));
     v[0] += one.inverse_mass * impulse.x;
     v[1] += one.inverse_mass * impulse.y;
     v[2] += one.inverse_mass * impulse.z;
@@ -204,129 +177,209 @@ void ContactSweeps::push(const Contact& c, Vec3 impulse) noexcept {
     w[5] -= back.z;
 }
 
-/// One contact; the largest change of a row, as a velocity.
-double ContactSweeps::update(Contact& c) noexcept {
-    const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
-                   add_turn(joints_.velocity()[c.second], c.second_arm);
-    const double old = c.impulse[0];
-    const double asked = old - (dot(c.normal, u) + c.softness * old - c.right[0]) * c.own_inverse;
-    const double nu = asked <= 0.0 ? 0.0 : asked;  // what is not a number stays
-    const double dn = nu - old;
-    c.impulse[0] = nu;
-    double change = std::abs(dn) * c.own, d1 = 0.0, d2 = 0.0;
-    const double bound = c.friction * (model_ == FrictionModel::box ? c.normal_before : nu);
-    const double b1 = c.impulse[1], b2 = c.impulse[2];
-    if (bound > 0.0 || b1 != 0.0 || b2 != 0.0) {
-        const double s1 = dot(c.tangent, u) + c.coupling[0] * dn + c.slip_softness * b1 - c.right[1];
-        const double s2 = dot(c.across, u) + c.coupling[1] * dn + c.slip_softness * b2 - c.right[2];
-        if (model_ == FrictionModel::cone) {
-            double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
-            const double reach = length(z1, z2);
-            if (c.stretched) least_on_disc(slip(c), b1, b2, s1, s2, bound, z1, z2);
-            else if (reach > bound) z1 *= bound / reach, z2 *= bound / reach;
-            d1 = z1 - b1, d2 = z2 - b2;
-            change = larger(change, length(d1, d2) / c.step);
-        } else {
-            const double* const own = slip(c);
-            d1 = std::clamp(b1 - s1 / own[0], -bound, bound) - b1;
-            d2 = std::clamp(b2 - (s2 + own[1] * d1) / own[2], -bound, bound) - b2;
-            change = larger(change, larger(std::abs(d1) * own[0], std::abs(d2) * own[2]));
-        }
-        c.impulse[1] = b1 + d1;
-        c.impulse[2] = b2 + d2;
+namespace {
+
+/// Friction whose two directions differ in scale, solved exactly.
+struct Stretched {
+    const double* own;
+    double operator()(double step, double b1, double b2, double s1, double s2, double bound, double& d1,
+                      double& d2) const {
+        double z1 = b1 - step * s1, z2 = b2 - step * s2;
+        least_on_disc(own, b1, b2, s1, s2, bound, z1, z2);
+        d1 = z1 - b1, d2 = z2 - b2;
+        return length(d1, d2) / step;
     }
-    if (dn != 0.0 || d1 != 0.0 || d2 != 0.0) push(c, dn * c.normal + d1 * c.tangent + d2 * c.across);
-    return change;
+};
+
+/// Each direction by itself.
+struct Square {
+    const double* own;
+    double operator()(double, double b1, double b2, double s1, double s2, double bound, double& d1,
+                      double& d2) const {
+        d1 = std::clamp(b1 - s1 / own[0], -bound, bound) - b1;
+        d2 = std::clamp(b2 - (s2 + own[1] * d1) / own[2], -bound, bound) - b2;
+        return larger(std::abs(d1) * own[0], std::abs(d2) * own[2]);
+    }
+};
+
+}  // namespace
+
+/// One contact; the largest change of a row, as a velocity.
+double ContactSweeps::update(std::size_t contact) noexcept {
+    const auto by = [&](const auto& law, bool box) {
+        return single::solve_contact<double>(
+            single::Single{contacts_[contact], rests_[contact], joints_.velocity().data(), inertia_.data(),
+                           bodies_},
+            law, box);
+    };
+    const Slip& slip = slips_[contact];
+    if (model_ != FrictionModel::cone) return by(Square{slip.own}, model_ == FrictionModel::box);
+    return slip.stretched ? by(Stretched{slip.own}, false) : by(single::Disc{}, false);
 }
 
-/// Asks for what the items behind this one will read: in large heaps bodies come from far away.
-void ContactSweeps::fetch(int item) const noexcept {
+/// Asks for what the contacts behind this one will read: in large heaps they come from far away.
+void ContactSweeps::fetch(const Due& later, const Due& soon) const noexcept {
     const auto ask = [](const auto& what) {
         constexpr std::size_t line = 64;
         const char* const at = reinterpret_cast<const char*>(&what);
         for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
     };
-    // Items follow each other, but where islands grew together: a guess that costs nothing where it is wrong.
-    const int items = static_cast<int>(bodies_of_.size());
-    if (const int soon = item + bodies_ahead; soon >= joint_count_ && soon < items)
-        for (const int body : {bodies_of_[soon].first, bodies_of_[soon].second}) {
-            ask(joints_.velocity()[body]);
-            ask(inertia_[body]);
+    ask(contacts_[later.item - joint_count_]);
+    for (const int body : {soon.first, soon.second}) {
+        ask(joints_.velocity()[body]);
+        ask(inertia_[body]);
+    }
+}
+
+void ContactSweeps::heat(int first, int second) noexcept {
+    if (first < bodies_) hot_[first] |= now_hot;
+    if (second < bodies_) hot_[second] |= now_hot;
+}
+
+void ContactSweeps::note(Part& part, const Due& due, double change, double focus) noexcept {
+    part.change[due.island] = larger(part.change[due.island], change);
+    if (!(change <= focus) && spent_[due.island]) heat(due.first, due.second);
+}
+
+/// Up to four contacts that share no moving body.
+void ContactSweeps::solve(Part& part, const Due* const group[4], int size, double focus) noexcept {
+    const auto contact = [&](int k) { return static_cast<std::size_t>(group[k]->item - joint_count_); };
+    if (size > 1 && model_ == FrictionModel::cone && !stretched_) {
+        SweptContact* four[4] = {&part.none, &part.none, &part.none, &part.none};
+        const SweptRest* rests[4] = {&no_rest_, &no_rest_, &no_rest_, &no_rest_};
+        double change[4];
+        for (int k = 0; k < size; ++k) four[k] = &contacts_[contact(k)], rests[k] = &rests_[contact(k)];
+        sweep_four()(
+            {four, plain_ ? nullptr : rests, joints_.velocity().data(), inertia_.data(), bodies_, change});
+        for (int k = 0; k < size; ++k) note(part, *group[k], change[k], focus);
+    } else {
+        for (int k = 0; k < size; ++k) note(part, *group[k], update(contact(k)), focus);
+    }
+}
+
+/// A piece of a level whose contacts are all due.
+void ContactSweeps::solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept {
+    const std::size_t last = due().size();
+    for (std::size_t place = begin; place < end; place += 4) {
+        const int size = static_cast<int>(std::min<std::size_t>(4, end - place));
+        const Due* group[4];
+        for (int k = 0; k < size; ++k) {
+            group[k] = &due()[place + k];
+            if (place + k + contacts_ahead < last)
+                fetch(due()[place + k + contacts_ahead], due()[place + k + bodies_ahead]);
         }
-    if (const int later = item + contacts_ahead; later >= joint_count_ && later < items)
-        ask(contacts_[later - joint_count_]);
-}
-
-double ContactSweeps::sweep_island(int island) noexcept {
-    double change = 0.0;
-    int swept = 0;
-    for (int item = head_[island]; item >= 0; item = next_[item], ++swept) {
-        fetch(item);
-        const double own = item < joint_count_ ? joints_.update_joint(static_cast<std::size_t>(item))
-                                               : update(contacts_[item - joint_count_]);
-        change = larger(change, own);
+        solve(part, group, size, focus);
     }
-    done_ += swept;
-    return change;
+    part.swept += end - begin;
 }
 
-void ContactSweeps::heat(Both bodies) noexcept {
-    if (bodies.first < bodies_) hot_[bodies.first] = stamp_;
-    if (bodies.second < bodies_) hot_[bodies.second] = stamp_;
-}
-
-/// As sweep_island(), but of the contacts only those of hot bodies.
-double ContactSweeps::sweep_hot(int island, double focus) noexcept {
-    double change = 0.0;
-    int seen = 0, swept = 0;
-    for (int item = head_[island]; item >= 0; item = next_[item], ++seen) {
-        const Both bodies = bodies_of_[item];
-        const bool joint = item < joint_count_;
-        if (!joint && hot_[bodies.first] < stamp_ - 1 && hot_[bodies.second] < stamp_ - 1) continue;
-        ++swept;
-        const double own = joint ? joints_.update_joint(static_cast<std::size_t>(item))
-                                 : update(contacts_[item - joint_count_]);
-        change = larger(change, own);
-        if (!(own <= focus)) heat(bodies);
+/// A piece of a level some of whose contacts are due: those of active islands, of spent ones those of hot bodies.
+void ContactSweeps::solve_due(Part& part, std::size_t begin, std::size_t end, double focus) noexcept {
+    part.picked.resize(end - begin + 1);
+    std::size_t picked = 0;
+    for (std::size_t place = begin; place < end; ++place) {
+        const Due& due = this->due()[place];
+        const bool active = active_[due.island] != 0, spent = spent_[due.island] != 0;
+        const bool asked = active && (!spent || (hot_[due.first] | hot_[due.second]) != 0);
+        part.picked[picked] = &due;
+        picked += asked;
+        part.seen += active && spent;
+        part.hot += asked && spent;
+        part.swept += asked && !spent;
     }
-    done_ += swept + glance * (seen - swept);
-    return change;
+    for (std::size_t k = 0; k < picked; ++k) fetch(*part.picked[k], *part.picked[k]);
+    for (std::size_t k = 0; k < picked; k += 4)
+        solve(part, &part.picked[k], static_cast<int>(std::min<std::size_t>(4, picked - k)), focus);
+}
+
+/// Once over what is active: joints, then contacts level by level.
+void ContactSweeps::sweep(double focus) noexcept {
+    for (unsigned char& hot : hot_) hot >>= 1;
+    bool all = whole_, any_spent = false;
+    for (const int island : roots_) {
+        all = all && active_[island];
+        any_spent = any_spent || (active_[island] && spent_[island]);
+    }
+    for (Part& part : parts_) {
+        part.swept = part.seen = part.hot = 0;
+        for (const int island : roots_) part.change[island] = 0.0;
+    }
+    for (int item = 0; item < joint_count_; ++item) {
+        const auto [first, second] = bodies_of_[item];
+        if (std::min(first, second) == bodies_) continue;
+        const int island = root(std::min(first, second));
+        if (!active_[island]) continue;
+        ++(spent_[island] ? parts_[0].seen : parts_[0].swept);
+        parts_[0].hot += spent_[island] != 0;
+        note(parts_[0], {item, first, second, island}, joints_.update_joint(static_cast<std::size_t>(item)),
+             focus);
+    }
+    const bool plain = all && !any_spent;
+    const auto piece = [&](Part& part, std::size_t begin, std::size_t end) {
+        if (plain) solve_all(part, begin, end, focus);
+        else solve_due(part, begin, end, focus);
+    };
+    const std::size_t wide = parts_.size() * (plain ? narrow : narrow_due);
+    const bool worth = parts_.size() > 1 && due().size() > 2 * wide * due_end().size() / 3;
+    if (!worth) {
+        std::size_t place = 0;
+        for (const std::size_t end : due_end()) piece(parts_[0], std::exchange(place, end), end);
+    } else {
+        // Narrow levels are the first thread's; the others wait for it where a wide one comes next.
+        team_->each([&](int index) {
+            Part& part = parts_[index];
+            const std::vector<std::size_t>& ends = due_end();
+            for (std::size_t level = 0; level < ends.size(); ++level) {
+                const std::size_t begin = level == 0 ? 0 : ends[level - 1], end = ends[level];
+                const bool shared = end - begin >= wide;
+                const auto [from, to] = shared ? team_->share(index, begin, end, 4) : std::pair{begin, end};
+                if (shared || index == 0) piece(part, from, to);
+                if (shared || (level + 1 < ends.size() && ends[level + 1] - end >= wide)) team_->meet();
+            }
+        });
+    }
+    std::size_t swept = 0, seen = 0, hot = 0;
+    for (const Part& part : parts_) swept += part.swept, seen += part.seen, hot += part.hot;
+    done_ += static_cast<double>(swept + hot) + glance * static_cast<double>(seen - hot);
+    // Lists of what has settled are not read for long.
+    if (static_cast<double>(swept + seen) < few_left * static_cast<double>(due().size())) select();
 }
 
 FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus,
                                   const std::function<bool()>& more) {
     FrictionReport report;
-    if (!chained_) {
-        for (int item = 0; item < static_cast<int>(next_.size()); ++item) chain(item);
-        chained_ = true;
-    }
+    if (!swept_) std::fill(active_.begin(), active_.end(), 1);
+    swept_ = true;
+    if (scheduled_ < bodies_of_.size()) schedule();
     for (const int island : roots_) active_[island] = active_[island] || spent_[island];
+    select();
     int look = 2, late = 0;
-    for (int sweep = 1, until = iterations;; ++sweep) {
+    for (int round = 1, until = iterations;; ++round) {
         Watch::look();
-        ++stamp_;
         bool any = false;
-        for (std::size_t k = 0; k < roots_.size(); ++k) {
-            const int island = roots_[k];
+        sweep(focus);
+        for (const int island : roots_) {
             if (!active_[island]) continue;
             const bool spent = spent_[island] != 0;
-            const double change = spent ? sweep_hot(island, focus) : sweep_island(island);
+            double change = 0.0;
+            for (const Part& part : parts_) change = larger(change, part.change[island]);
             left_[island] = spent ? larger(left_[island], change) : change;
             ++report.sweeps;
             active_[island] = !(change <= (spent ? focus : tolerance));
             any = any || active_[island];
         }
-        const bool over = !any || sweep >= until;
-        if (!over && sweep < look) continue;
-        look = 2 * sweep;
-        if (sweep >= until)
+        const bool over = !any || round >= until;
+        if (!over && round < look) continue;
+        look = 2 * round;
+        if (round >= until)
             for (const int island : roots_) spent_[island] = spent_[island] || active_[island];
         const bool grown = more && more();
+        if (scheduled_ < bodies_of_.size()) schedule();
         if (!over) continue;
         if (!grown || late == late_rounds) break;
         ++late;
-        until = sweep + iterations;
-        look = sweep + 2;
+        until = round + iterations;
+        look = round + 2;
     }
     for (const int island : roots_) {
         report.residual = larger(report.residual, left_[island]);
@@ -343,18 +396,33 @@ void ContactSweeps::write(MixedSystem& system) const {
 }
 
 RowsResidual ContactSweeps::worst(double focus) {
+    done_ += measuring * static_cast<double>(bodies_of_.size());
+    std::vector<RowsResidual> found(parts_.size(), {0.0, -1});
+    share_out(team_, contacts_.size(), worth_threads, [&](int part, std::size_t begin, std::size_t end) {
+        found[part] = worst_of(parts_[part], begin, end, focus);
+    });
     RowsResidual worst{0.0, -1};
-    done_ += measuring * static_cast<double>(next_.size());
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const Contact& c = contacts_[k];
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+        for (const int contact : parts_[k].off) heat(contacts_[contact].first, contacts_[contact].second);
+        parts_[k].off.clear();
+        if (!(found[k].residual <= worst.residual) && !std::isnan(worst.residual)) worst = found[k];
+    }
+    return worst;
+}
+
+RowsResidual ContactSweeps::worst_of(Part& part, std::size_t begin, std::size_t end, double focus) const {
+    RowsResidual worst{0.0, -1};
+    for (std::size_t k = begin; k < end; ++k) {
+        const SweptContact& c = contacts_[k];
+        const SweptRest& rest = rests_[k];
         const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
                        add_turn(joints_.velocity()[c.second], c.second_arm);
-        const double w = dot(c.normal, u) + c.softness * c.impulse[0] - c.right[0];
+        const double w = dot(c.normal, u) + rest.softness * c.impulse[0] - c.right;
         double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
         const double b1 = c.impulse[1], b2 = c.impulse[2];
-        const double s1 = dot(c.tangent, u) + c.slip_softness * b1 - c.right[1];
-        const double s2 = dot(c.across, u) + c.slip_softness * b2 - c.right[2];
-        const double bound = c.friction * (model_ == FrictionModel::box ? c.normal_before : c.impulse[0]);
+        const double s1 = dot(c.tangent, u) + rest.slip_softness * b1 - rest.right_along;
+        const double s2 = dot(rest.across, u) + rest.slip_softness * b2 - rest.right_across;
+        const double bound = c.friction * (model_ == FrictionModel::box ? rest.normal_before : c.impulse[0]);
         double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
         bool sticks = true;
         if (model_ == FrictionModel::cone) {
@@ -367,7 +435,7 @@ RowsResidual ContactSweeps::worst(double focus) {
         }
         if (c.friction > 0.0)
             residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
-        if (!(residual <= focus)) heat({c.first, c.second});
+        if (!(residual <= focus)) part.off.push_back(static_cast<int>(k));
         const bool worse = !(residual <= worst.residual) && !std::isnan(worst.residual);
         if (worse) worst = {residual, static_cast<int>(k)};
     }

@@ -5,9 +5,11 @@
 #include <vector>
 
 #include "contacts/friction_point.hpp"
+#include "contacts/sweep_kernel.hpp"
 #include "contacts/sweep_rows.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
+#include "run/team.hpp"
 
 namespace spook {
 
@@ -30,9 +32,13 @@ struct SweepContact {
 /// serves all three rows, their own 3×3 part of C M⁻¹ Cᵀ carries the normal's change over to the tangents.
 /// Islands are swept until they have settled, each for itself. Contacts may be added between sweeps, so that a pair
 /// that meets only because of this step's impulses has its rows in the same solve; islands then grow together.
-/// Rows are swept in the order they were given, on one thread: equal input gives equal bits. Memory is kept.
+/// Rows are swept in the order they were given, or so that nobody sees a difference: four at once, and on several
+/// threads, where they share no body. Equal input gives equal bits, whatever the number of threads. Memory is kept.
 class ContactSweeps {
 public:
+    /// From now on contacts that share no body are swept on as many threads: the bits are the same. null: on one.
+    void help(Team* team) noexcept { team_ = team; }
+
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
     /// The same, with the masses that `other` was started with.
@@ -48,7 +54,9 @@ public:
     FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool()>& more);
 
     /// What has been done since start(), in sweeps over everything there is now; looking for the worst is work, too.
-    double work() const noexcept { return next_.empty() ? 0.0 : done_ / static_cast<double>(next_.size()); }
+    double work() const noexcept {
+        return bodies_of_.empty() ? 0.0 : done_ / static_cast<double>(bodies_of_.size());
+    }
 
     const Vec6& velocity(int body) const noexcept { return joints_.velocity()[body]; }
     const double* impulse(int contact) const noexcept { return contacts_[contact].impulse; }
@@ -59,57 +67,77 @@ public:
     RowsResidual worst(double focus);
 
 private:
-    struct Contact {
-        int first, second;
-        Vec3 normal, tangent, across, first_arm, second_arm;
-        double right[3], softness, slip_softness, friction, normal_before, impulse[3];
-        double own, own_inverse;  // of the normal, with Sig
-        double coupling[2];       // between normal and tangents
-        double step;              // 1/lambda_max of the tangents' part
+    struct Slip {       // what only boxes and stretched friction read
+        double own[3];  // (t, t), (t, u), (u, u), with gamma/h
         bool stretched;
-    };
-    static_assert(sizeof(Contact) == 256);  // what every sweep reads of every contact: four lines of a cache
-    struct Slip {                           // what only boxes and stretched friction read
-        double own[3];                      // (t, t), (t, u), (u, u), with gamma/h
-    };
-    struct Inertia {
-        double inverse_mass = 0.0;
-        Mat3 inverse;  // of the inertia, world axes, 1/(kg m²)
     };
     struct Both {
         int first, second;  // bodies; bodies_ for one that does not move
     };
+    /// A contact in the order of a sweep.
+    struct Due {
+        int item, first, second, island;  // its bodies and root
+    };
     void begin(MixedSystem& system, FrictionModel model);
-    double update(Contact& contact) noexcept;
-    const double* slip(const Contact& contact) const noexcept {
-        return slips_[static_cast<std::size_t>(&contact - contacts_.data())].own;
-    }
-    void push(const Contact& contact, Vec3 impulse) noexcept;
+    double update(std::size_t contact) noexcept;
+    void push(const SweptContact& contact, Vec3 impulse) noexcept;
     int root(int body) noexcept;
-    void link(int item, int first, int second);
+    void link(int first, int second);
     void join(int first, int second);
-    void chain(int item);
-    void fetch(int item) const noexcept;
-    void heat(Both bodies) noexcept;
-    double sweep_island(int root) noexcept;
-    double sweep_hot(int root, double focus) noexcept;
+    void schedule();
+    void select();
+    void fetch(const Due& later, const Due& soon) const noexcept;
+    void heat(int first, int second) noexcept;
+    /// What one thread counts and keeps while it sweeps.
+    struct alignas(64) Part {
+        std::size_t swept = 0, seen = 0,
+                    hot = 0;         // of fresh islands; of spent ones; those of them that were swept
+        std::vector<double> change;  // by root
+        std::vector<const Due*> picked;
+        std::vector<int> off;  // contacts that worst() found far off
+        SweptContact none{};   // fills a group
+    };
+    void note(Part& part, const Due& due, double change, double focus) noexcept;
+    void solve(Part& part, const Due* const group[4], int size, double focus) noexcept;
+    void solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
+    void solve_due(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
+    void sweep(double focus) noexcept;
+    RowsResidual worst_of(Part& part, std::size_t begin, std::size_t end, double focus) const;
 
+    Team* team_ = nullptr;
+    std::vector<Part> parts_;
     FrictionModel model_ = FrictionModel::cone;
     Sweeper joints_;
     int joint_count_ = 0, bodies_ = 0;
-    std::vector<Inertia> inertia_;
-    LargeArray<Contact> contacts_;
-    LargeArray<Slip> slips_;  // of each
-    // Islands: bodies joined by union-find; the items of one, joints first, are a chain in the order they came.
-    std::vector<int> parent_, head_, tail_, next_;
-    std::vector<Both> bodies_of_;
-    std::vector<int> roots_;
+    LargeArray<SweptBody> inertia_;
+    LargeArray<SweptContact> contacts_;
+    LargeArray<SweptRest> rests_;  // of each
+    LargeArray<Slip> slips_;
+    bool stretched_ = false, plain_ = true;  // some contact is; none has more than SweptContact says
+    SweptRest no_rest_{};
+    // Islands: bodies joined by union-find.
+    std::vector<int> parent_;
+    std::vector<Both> bodies_of_;  // of every item, joints first
+    std::vector<int> roots_;       // of items
+    std::vector<char> known_;      // those that are in the list, or were before they joined another
     std::vector<char> active_, spent_;
     std::vector<double> left_;  // the last sweep's change, by root; the largest since it is spent
-    std::vector<int> hot_;      // the last sweep that changed a body's rows much
-    int stamp_ = 0;             // counts sweeps
-    double done_ = 0.0;         // items swept, and looked at for less
-    bool chained_ = false;
+    std::vector<unsigned char>
+        hot_;             // bodies whose rows were changed much: 2 in this sweep, 1 in the one before
+    double done_ = 0.0;   // items swept, and looked at for less
+    bool swept_ = false;  // since start()
+    // The order of a sweep: levels, in each of them contacts that share no moving body, and every contact in a later one
+    // than those before it that share one. Whatever is done at a level together, the bits are those of one after the other.
+    std::size_t scheduled_ = 0;  // items; those that come late have levels of their own, behind
+    bool joined_ = false;        // islands have, since
+    LargeArray<Due> order_, active_order_;
+    std::vector<std::size_t> level_end_, active_level_end_;
+    bool whole_ = true;  // all islands are active
+    const LargeArray<Due>& due() const noexcept { return whole_ ? order_ : active_order_; }
+    const std::vector<std::size_t>& due_end() const noexcept {
+        return whole_ ? level_end_ : active_level_end_;
+    }
+    std::vector<int> level_, next_level_;  // of items, and of bodies
 };
 
 }  // namespace spook

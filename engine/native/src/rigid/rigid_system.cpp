@@ -87,7 +87,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         fresh_contacts_.emplace(
             Detection(scene.colliders, dynamic, scene.no_contact), materials, slot_,
             ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
-                           method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
+                           method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual,
+                           method_.threads},
             joint_pairs, yielding);
         for (const JointBlock& block : joints_.blocks())
             for (const int body : {block.first, block.second})

@@ -1,0 +1,144 @@
+// The points of a step, once they are found: which of them act at the time of their strike, in which order they are
+// solved, and how fast they close.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
+
+}  // namespace
+
+/// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
+/// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
+/// that goes with it changes the energy.
+void ContactStage::find_events() {
+    root_.resize(unknown_.size());
+    std::iota(root_.begin(), root_.end(), 0);
+    auto root = [this](int b) {
+        while (root_[b] != b) b = root_[b] = root_[root_[b]];
+        return b;
+    };
+    auto join = [&](int a, int b) {
+        if (unknown_[a] < 0 || unknown_[b] < 0) return;
+        a = root(a), b = root(b);
+        root_[std::max(a, b)] = std::min(a, b);
+    };
+    for (const Point& point : points_) join(point.contact.first, point.contact.second);
+    for (const auto& [a, b] : joints_)
+        if (a >= 0 && b >= 0) join(a, b);
+
+    std::vector<std::size_t> members(unknown_.size(), 0);
+    std::vector<std::uint64_t> struck(unknown_.size(), 0);  // the pair of the island's strike, plus one
+    std::vector<char> plain(unknown_.size(), 1), bouncy(unknown_.size(), 0);
+    std::vector<double> when(unknown_.size(), -1.0);
+    for (std::size_t b = 0; b < unknown_.size(); ++b)
+        if (unknown_[b] >= 0) {
+            const int island = root(static_cast<int>(b));
+            ++members[island];
+            plain[island] = plain[island] && ball_[b];
+        }
+    for (const Point& point : points_) {
+        const Contact& contact = point.contact;
+        const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
+        if (point.strike < 0.0) {
+            const double approach = -relative(point, contact.point.normal, predicted_, false);
+            if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
+                plain[island] = 0;
+            continue;
+        }
+        const std::uint64_t pair = (contact.key >> feature_bits) + 1;
+        if (struck[island] != 0 && struck[island] != pair) plain[island] = 0;
+        struck[island] = pair;
+        when[island] = point.strike;
+        bouncy[island] = bouncy[island] || point.material.restitution > 0.0;
+    }
+    // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
+    // others will: bodies led to an event's time would not be where such rows expect them.
+    std::vector<double> speed(unknown_.size(), 0.0);
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        double& fastest = speed[unknown_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
+        fastest = std::max(fastest, norm(linear(predicted_[b])));
+    }
+    const auto island = [&](int b) { return unknown_[b] >= 0 ? root(b) : b; };
+    for (const OpenPair& open : open_) {
+        const int a = island(open.first), b = island(open.second);
+        if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
+        plain[a] = plain[a] && bouncy[a];
+        plain[b] = plain[b] && bouncy[b];
+    }
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        if (unknown_[b] < 0) continue;
+        const int island = root(static_cast<int>(b));
+        if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
+        event_time_[b] = when[island];
+        if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
+        velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);
+        for (double& k : kick_[b]) k *= 1.0 - lead_[b];
+    }
+    for (Point& point : points_) {
+        if (point.strike < 0.0) continue;
+        const int body = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+        point.event = event_time_[body] >= 0.0;
+        if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
+    }
+}
+
+/// Sorts the points by key and finds each one's predecessor in the step before.
+void ContactStage::order_points() {
+    const auto in_order = [](const Point& a, const Point& b) { return a.contact.key < b.contact.key; };
+    if (!std::is_sorted(points_.begin(), points_.end(), in_order)) {  // closed ones come so
+        places_.resize(points_.size());  // a point is long: sorted are their places, and each is moved once
+        for (std::size_t k = 0; k < points_.size(); ++k) places_[k] = {points_[k].contact.key, k};
+        std::sort(places_.begin(), places_.end());
+        strikes_.clear();
+        for (const auto& [key, place] : places_) strikes_.push_back(points_[place]);
+        points_.swap(strikes_);
+    }
+    std::size_t old = 0;
+    for (Point& point : points_) {
+        while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
+        if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
+        point.before = touches_[old].normal;
+        point.parting_before = touches_[old].parting;
+        point.pressed_before = touches_[old].pressed;
+        std::copy_n(touches_[old].tangent, 2, point.tangent_before);
+        std::copy_n(touches_[old].turning, 3, point.turning_before);
+    }
+    ordered_ = points_.size();
+}
+
+/// Approach, push and part in the impact of every point, from the current velocities.
+void ContactStage::measure_points() {
+    const double h = options_.time_step;
+    impact_needed_ = false;
+    for (Point& point : points_) {
+        const Contact& contact = point.contact;
+        const double gap = contact.point.gap;
+        point.approach = relative(point, contact.point.normal, velocity_, false);
+        point.push = relative(point, contact.point.normal, kick_, false);
+        const double psi = point.material.restitution, speed = -point.approach;
+        point.bounce = -1.0;
+        if (is_closed(contact)) {
+            point.bounce = speed > 0.0 ? psi : 0.0;
+        } else if (plastic_first_ && point.impact > 0.0) {  // a blow of this step has brought them together
+            point.bounce = 0.0;
+        } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
+            const double ahead = 2.0 * (-point.push / h) * gap / (speed * speed);
+            const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
+            if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
+            else if (plastic_first_) point.bounce = 0.0;
+        }
+        const double kick = norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second]));
+        point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
+        impact_needed_ = impact_needed_ || is_blow(point);
+    }
+}
+
+}  // namespace spook

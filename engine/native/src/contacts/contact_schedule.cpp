@@ -1,0 +1,105 @@
+// In which order contacts are swept: islands, and levels of contacts that share no body.
+#include <algorithm>
+
+#include "contacts/contact_sweeps.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double few_late = 0.1;  // of all items: so many get levels of their own
+
+}  // namespace
+
+int ContactSweeps::root(int body) noexcept {
+    while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
+    return body;
+}
+
+/// Joins the islands of both bodies.
+void ContactSweeps::link(int first, int second) {
+    bodies_of_.push_back({first >= 0 ? first : bodies_, second >= 0 ? second : bodies_});
+    if (first >= 0 && second >= 0) join(first, second);
+    if (swept_ && (first >= 0 || second >= 0)) active_[root(first >= 0 ? first : second)] = 1;
+}
+
+void ContactSweeps::join(int first, int second) {
+    int a = root(first), b = root(second);
+    if (a == b) return;
+    if (a > b) std::swap(a, b);
+    parent_[b] = a;
+    joined_ = true;
+    left_[a] = larger(left_[a], left_[b]);
+    spent_[a] = spent_[a] || spent_[b];
+    active_[a] = active_[a] || active_[b];
+}
+
+/// Islands of all items, and levels of those that have none yet.
+void ContactSweeps::schedule() {
+    const std::size_t items = bodies_of_.size();
+    if (items - scheduled_ > few_late * static_cast<double>(items)) {  // all anew, or levels would be short
+        scheduled_ = 0;
+        order_.clear();
+        level_end_.clear();
+        roots_.clear();
+        known_.assign(bodies_ + 1, 0);
+    }
+    if (joined_) {
+        for (Due& due : order_) due.island = root(std::min(due.first, due.second));
+        std::erase_if(roots_, [this](int island) { return parent_[island] != island; });
+        joined_ = false;
+    }
+    next_level_.assign(bodies_ + 1, 0);
+    level_.resize(items);
+    const std::size_t levels = level_end_.size();
+    for (std::size_t item = std::max(scheduled_, static_cast<std::size_t>(joint_count_)); item < items;
+         ++item) {
+        const Both bodies = bodies_of_[item];
+        if (std::min(bodies.first, bodies.second) == bodies_) continue;
+        const int level = std::max(next_level_[bodies.first], next_level_[bodies.second]);
+        level_[item] = level;
+        if (bodies.first < bodies_) next_level_[bodies.first] = level + 1;
+        if (bodies.second < bodies_) next_level_[bodies.second] = level + 1;
+        if (levels + level == level_end_.size()) level_end_.push_back(0);
+        ++level_end_[levels + level];
+    }
+    std::size_t sum = order_.size();
+    for (std::size_t level = levels; level < level_end_.size(); ++level) {
+        const std::size_t count = level_end_[level];
+        level_end_[level] = sum;
+        sum += count;
+    }
+    order_.resize(sum);
+    for (std::size_t item = scheduled_; item < items; ++item) {
+        const Both bodies = bodies_of_[item];
+        const int body = std::min(bodies.first, bodies.second);
+        if (body == bodies_) continue;
+        const int island = root(body);
+        if (!known_[island]) {
+            known_[island] = 1;
+            roots_.push_back(island);
+        }
+        if (item < static_cast<std::size_t>(joint_count_)) continue;
+        order_[level_end_[levels + level_[item]]++] = {static_cast<int>(item), bodies.first, bodies.second,
+                                                       island};
+    }
+    scheduled_ = items;
+    select();
+}
+
+/// The contacts of islands that are active.
+void ContactSweeps::select() {
+    whole_ = std::all_of(roots_.begin(), roots_.end(), [this](int island) { return active_[island] != 0; });
+    if (whole_) return;
+    active_order_.clear();
+    active_level_end_.clear();
+    std::size_t place = 0;
+    for (const std::size_t end : level_end_) {
+        const std::size_t before = active_order_.size();
+        for (; place < end; ++place)
+            if (active_[order_[place].island]) active_order_.push_back(order_[place]);
+        if (active_order_.size() > before) active_level_end_.push_back(active_order_.size());
+    }
+}
+
+}  // namespace spook

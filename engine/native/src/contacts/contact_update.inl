@@ -1,0 +1,186 @@
+// One contact's share of a sweep, over single numbers or over vectors of them. Included once per instruction set, with
+// SPOOK_ISA naming it. Only elementwise operations in a fixed order, and contraction is off: all round alike.
+
+#define SPOOK_ALWAYS inline __attribute__((always_inline))
+
+namespace spook::SPOOK_ISA {
+namespace {
+
+SPOOK_ALWAYS bool any(bool mask) { return mask; }
+SPOOK_ALWAYS double magnitude(double x) { return std::abs(x); }
+SPOOK_ALWAYS double root_of(double x) { return std::sqrt(x); }
+
+#ifdef SPOOK_FOURS
+typedef double Four __attribute__((vector_size(32)));
+typedef double FourInMemory __attribute__((vector_size(32), aligned(8), may_alias));
+typedef decltype(Four{} < Four{}) FourBits;
+
+SPOOK_ALWAYS bool any(const FourBits& mask) { return __builtin_ia32_movmskpd256((Four)mask) != 0; }
+SPOOK_ALWAYS Four magnitude(const Four& x) { return (Four)((FourBits)x & 0x7fffffffffffffffL); }
+SPOOK_ALWAYS Four root_of(const Four& x) { return __builtin_ia32_sqrtpd256(x); }
+#endif
+
+template <class R> struct Three {
+    R x, y, z;
+};
+template <class R> SPOOK_ALWAYS R dot(const Three<R>& a, const Three<R>& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class R> SPOOK_ALWAYS Three<R> cross(const Three<R>& a, const Three<R>& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Coulomb's disc for one step of projection: what lies outside is scaled back to it.
+struct Disc {
+    template <class R>
+    SPOOK_ALWAYS R operator()(const R& step, const R& b1, const R& b2, const R& s1, const R& s2,
+                              const R& bound, R& d1, R& d2) const {
+        R z1 = b1 - step * s1, z2 = b2 - step * s2;
+        const R reach = root_of(z1 * z1 + z2 * z2);
+        const auto slides = reach > bound;
+        const R shrunk = bound / reach;
+        d1 = (slides ? z1 * shrunk : z1) - b1;
+        d2 = (slides ? z2 * shrunk : z2) - b2;
+        return root_of(d1 * d1 + d2 * d2) / step;
+    }
+};
+
+/// Velocity of a body's point at `arm`.
+template <class R>
+SPOOK_ALWAYS Three<R> velocity_at(const Three<R>& v, const Three<R>& w, const Three<R>& arm) {
+    const Three<R> turn = cross(w, arm);
+    return {v.x + turn.x, v.y + turn.y, v.z + turn.z};
+}
+
+/// v += s M⁻¹ (impulse, moment) where `pushes`: bodies that no change reaches keep their bits.
+template <class R, class Mask, class Body>
+SPOOK_ALWAYS void push_body(Body body, const R& sign, const Three<R>& arm, const Three<R>& impulse,
+                            const Mask& pushes) {
+    const Three<R> moment = cross(arm, impulse);
+    R inverse_mass, xx, xy, xz, yy, yz, zz;
+    body.inertia(inverse_mass, xx, xy, xz, yy, yz, zz);
+    const Three<R> turn{xx * moment.x + xy * moment.y + xz * moment.z,
+                        xy * moment.x + yy * moment.y + yz * moment.z,
+                        xz * moment.x + yz * moment.y + zz * moment.z};
+    Three<R> v, w;
+    body.velocity(v, w);
+    v.x = pushes ? v.x + sign * (inverse_mass * impulse.x) : v.x;
+    v.y = pushes ? v.y + sign * (inverse_mass * impulse.y) : v.y;
+    v.z = pushes ? v.z + sign * (inverse_mass * impulse.z) : v.z;
+    w.x = pushes ? w.x + sign * turn.x : w.x;
+    w.y = pushes ? w.y + sign * turn.y : w.y;
+    w.z = pushes ? w.z + sign * turn.z : w.z;
+    body.write(v, w);
+}
+
+/// Solves a contact's rows for the velocities of its bodies: the normal first, then friction by `law`, whose bound is mu
+/// times the normal impulse, or the one before where `box`. Returns the largest change of a row, as a velocity. `from`
+/// reads and writes the contact, one of a kind or several side by side; each part when it is needed.
+template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from, const Law& law, bool box) {
+    Three<R> first_arm, second_arm, normal, tangent, v, w;
+    R right, own, own_inverse, impulse[3], friction, softness, before;
+    from.arms(first_arm, second_arm, right);
+    from.first().velocity(v, w);
+    const Three<R> a = velocity_at(v, w, first_arm);
+    from.second().velocity(v, w);
+    const Three<R> b = velocity_at(v, w, second_arm), u{a.x - b.x, a.y - b.y, a.z - b.z};
+    from.normal(normal, own);
+    from.impulse(impulse, own_inverse);
+    from.tangent(tangent, friction);
+    from.normal_rest(softness, before);
+    const R zero{}, old = impulse[0];
+    const R asked = old - (dot(normal, u) + softness * old - right) * own_inverse;
+    const R nu = asked <= 0.0 ? zero : asked;  // what is not a number stays
+    const R dn = nu - old;
+    R change = magnitude(dn) * own, d1 = zero, d2 = zero;
+    impulse[0] = nu;
+    const R bound = friction * (box ? before : nu);
+    const auto rubs = (bound > 0.0) | (impulse[1] != 0.0) | (impulse[2] != 0.0);
+    Three<R> across{};
+    if (any(rubs)) {
+        R right1, right2, coupling1, coupling2, slip_softness, step;
+        from.across(across, normal, tangent);
+        from.tangent_scales(coupling1, coupling2, step);
+        from.tangent_rest(right1, right2, slip_softness);
+        const R s1 = dot(tangent, u) + coupling1 * dn + slip_softness * impulse[1] - right1;
+        const R s2 = dot(across, u) + coupling2 * dn + slip_softness * impulse[2] - right2;
+        const R own_change = law(step, impulse[1], impulse[2], s1, s2, bound, d1, d2);
+        const auto kept = (change >= own_change) | (change != change);
+        change = rubs ? (kept ? change : own_change) : change;
+        d1 = rubs ? d1 : zero;
+        d2 = rubs ? d2 : zero;
+        impulse[1] = rubs ? impulse[1] + d1 : impulse[1];
+        impulse[2] = rubs ? impulse[2] + d2 : impulse[2];
+    }
+    from.write(impulse, own_inverse);
+    const auto pushes = (dn != 0.0) | (d1 != 0.0) | (d2 != 0.0);
+    if (!any(pushes)) return change;
+    const Three<R> all{dn * normal.x + d1 * tangent.x + d2 * across.x,
+                       dn * normal.y + d1 * tangent.y + d2 * across.y,
+                       dn * normal.z + d1 * tangent.z + d2 * across.z};
+    const R one = zero + 1.0;
+    push_body(from.first(), one, first_arm, all, pushes);
+    push_body(from.second(), -one, second_arm, all, pushes);
+    return change;
+}
+
+/// A contact by itself. `nobody`, which does not move, is not written.
+struct Single {
+    SweptContact& c;
+    const SweptRest& rest;
+    Vec6* velocities;
+    const SweptBody* bodies;
+    int nobody;
+
+    struct Body {
+        Vec6& at;
+        const SweptBody& own;
+        bool moves;
+        SPOOK_ALWAYS void velocity(Three<double>& v, Three<double>& w) const {
+            v = {at[0], at[1], at[2]};
+            w = {at[3], at[4], at[5]};
+        }
+        SPOOK_ALWAYS void inertia(double& inverse_mass, double& xx, double& xy, double& xz, double& yy,
+                                  double& yz, double& zz) const {
+            inverse_mass = own.inverse_mass;
+            xx = own.xx, xy = own.xy, xz = own.xz, yy = own.yy, yz = own.yz, zz = own.zz;
+        }
+        SPOOK_ALWAYS void write(const Three<double>& v, const Three<double>& w) const {
+            if (moves) at = {v.x, v.y, v.z, w.x, w.y, w.z};
+        }
+    };
+    SPOOK_ALWAYS static Three<double> three(const Vec3& a) { return {a.x, a.y, a.z}; }
+    SPOOK_ALWAYS Body first() const { return {velocities[c.first], bodies[c.first], c.first != nobody}; }
+    SPOOK_ALWAYS Body second() const { return {velocities[c.second], bodies[c.second], c.second != nobody}; }
+    SPOOK_ALWAYS void arms(Three<double>& first, Three<double>& second, double& right) const {
+        first = three(c.first_arm), second = three(c.second_arm), right = c.right;
+    }
+    SPOOK_ALWAYS void normal(Three<double>& n, double& own) const { n = three(c.normal), own = c.own; }
+    SPOOK_ALWAYS void impulse(double* z, double& own_inverse) const {
+        for (int k = 0; k < 3; ++k) z[k] = c.impulse[k];
+        own_inverse = c.own_inverse;
+    }
+    SPOOK_ALWAYS void tangent(Three<double>& t, double& friction) const {
+        t = three(c.tangent), friction = c.friction;
+    }
+    SPOOK_ALWAYS void normal_rest(double& softness, double& before) const {
+        softness = rest.softness, before = rest.normal_before;
+    }
+    SPOOK_ALWAYS void across(Three<double>& u, const Three<double>&, const Three<double>&) const {
+        u = three(rest.across);
+    }
+    SPOOK_ALWAYS void tangent_scales(double& coupling1, double& coupling2, double& step) const {
+        coupling1 = c.coupling[0], coupling2 = c.coupling[1], step = c.step;
+    }
+    SPOOK_ALWAYS void tangent_rest(double& right1, double& right2, double& softness) const {
+        right1 = rest.right_along, right2 = rest.right_across, softness = rest.slip_softness;
+    }
+    SPOOK_ALWAYS void write(const double* z, double) const {
+        for (int k = 0; k < 3; ++k) c.impulse[k] = z[k];
+    }
+};
+
+}  // namespace
+}  // namespace spook::SPOOK_ISA
+
+#undef SPOOK_ALWAYS

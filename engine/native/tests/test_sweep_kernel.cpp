@@ -1,0 +1,155 @@
+// Four contacts solved side by side get the bits they get one after the other; and so does a heap on several threads.
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "contacts/contact_sweeps.hpp"
+#include "contacts/sweep_kernel.hpp"
+#include "expect.hpp"
+#include "run/team.hpp"
+
+using namespace spook;
+
+namespace {
+
+constexpr int bodies = 8, nobody = bodies;
+
+struct Four {
+    std::vector<SweptContact> contacts = std::vector<SweptContact>(4);
+    std::vector<SweptRest> rests = std::vector<SweptRest>(4);
+    std::vector<Vec6> velocity = std::vector<Vec6>(bodies + 1);
+    std::vector<SweptBody> masses = std::vector<SweptBody>(bodies + 1);
+    double change[4] = {};
+
+    void solve(SweepFour with, bool plain) {
+        SweptContact* to[4];
+        const SweptRest* rest[4];
+        for (int i = 0; i < 4; ++i) to[i] = &contacts[i], rest[i] = &rests[i];
+        with({to, plain ? nullptr : rest, velocity.data(), masses.data(), nobody, change});
+    }
+    bool same_as(const Four& other) const {
+        const auto equal = [](const auto& a, const auto& b) {
+            return std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
+        };
+        for (int i = 0; i < 4; ++i)
+            for (int k = 0; k < 3; ++k)
+                if (std::memcmp(&contacts[i].impulse[k], &other.contacts[i].impulse[k], sizeof(double)) != 0) return false;
+        return equal(velocity, other.velocity) && std::memcmp(change, other.change, sizeof change) == 0;
+    }
+};
+
+/// Contacts as they come: pressed and open, smooth and rough, one body of them fixed, some numbers that are none.
+Four random_four(std::mt19937& random, bool plain) {
+    std::uniform_real_distribution<double> number(-1.0, 1.0), positive(0.1, 2.0);
+    const auto one_in = [&](unsigned n) { return random() % n == 0; };
+    const auto vec = [&] { return Vec3{number(random), number(random), number(random)}; };
+    Four f;
+    for (int b = 0; b < bodies; ++b) {
+        for (double& v : f.velocity[b]) v = one_in(6) ? 0.0 : number(random);
+        f.masses[b] = {positive(random), positive(random), 0.1 * number(random), 0.1 * number(random),
+                       positive(random), 0.1 * number(random), positive(random)};
+    }
+    for (int i = 0; i < 4; ++i) {
+        SweptContact& c = f.contacts[i];
+        SweptRest& rest = f.rests[i];
+        c.first = 2 * i, c.second = one_in(3) ? nobody : 2 * i + 1;
+        const Vec3 n = vec();
+        c.normal = (1.0 / norm(n)) * n;
+        const Vec3 t = cross(c.normal, vec());
+        c.tangent = (1.0 / norm(t)) * t;
+        rest.across = cross(c.normal, c.tangent);
+        c.first_arm = vec(), c.second_arm = vec();
+        c.right = one_in(3) ? 0.0 : number(random);
+        c.own = positive(random), c.own_inverse = 1.0 / c.own;
+        c.friction = one_in(3) ? 0.0 : positive(random);
+        c.impulse[0] = one_in(2) ? 0.0 : positive(random);
+        for (int k = 1; k < 3; ++k) c.impulse[k] = one_in(2) ? 0.0 : 0.3 * number(random);
+        for (double& coupling : c.coupling) coupling = number(random);
+        c.step = positive(random);
+        if (!plain)
+            rest.right_along = number(random), rest.right_across = number(random), rest.softness = positive(random),
+            rest.slip_softness = positive(random);
+    }
+    if (one_in(20)) f.velocity[random() % bodies][random() % 6] = std::numeric_limits<double>::quiet_NaN();
+    if (one_in(20)) f.contacts[random() % 4].impulse[0] = std::numeric_limits<double>::infinity();
+    return f;
+}
+
+SweepContact between(int first, int second, std::mt19937& random) {
+    std::uniform_real_distribution<double> number(-1.0, 1.0);
+    const Vec3 n{number(random), number(random), number(random)};
+    SweepContact c;
+    c.first = first, c.second = second;
+    c.normal = (1.0 / norm(n)) * n;
+    const Vec3 t = cross(c.normal, {0.3, 0.2, 0.9});
+    c.tangent = (1.0 / norm(t)) * t;
+    c.across = cross(c.normal, c.tangent);
+    c.first_arm = -0.5 * c.normal, c.second_arm = 0.5 * c.normal;
+    c.friction = 0.5;
+    return c;
+}
+
+/// Velocities and counts after sweeps over a large random heap, in which some contacts come late.
+std::vector<double> heap(int threads, bool portable, FrictionModel model) {
+    constexpr int count = 3000, all = 9000, late = 200;
+    std::mt19937 random(5);
+    MixedSystem system;
+    Mat6 unit{};
+    for (int i = 0; i < 6; ++i) unit[7 * i] = 1.0;
+    system.mass.assign(count, unit);
+    system.momentum.assign(count, Vec6{});
+    for (Vec6& p : system.momentum)
+        for (double& x : p) x = 1e-3 * static_cast<double>(random() % 2001) - 1.0;
+    use_portable_sweeps(portable);
+    Team team(threads);
+    ContactSweeps sweeps;
+    if (threads > 1) sweeps.help(&team);
+    sweeps.start(system, model);
+    const auto add = [&] {
+        const int first = static_cast<int>(random() % count);
+        sweeps.add(between(first, random() % 10 == 0 ? -1 : (first + 1 + static_cast<int>(random() % 40)) % count, random));
+    };
+    for (int k = 0; k < all; ++k) add();
+    int left = 2;
+    std::vector<double> out;
+    const auto more = [&] {
+        if (left-- <= 0) return false;
+        for (int k = 0; k < late; ++k) add();
+        return true;
+    };
+    for (int turn = 0; turn < 3; ++turn) {
+        const FrictionReport report = sweeps.run(12, 1e-10, 0.02, more);
+        const RowsResidual worst = sweeps.worst(0.02);
+        out.insert(out.end(), {report.residual, static_cast<double>(report.sweeps), worst.residual,
+                               static_cast<double>(worst.row), sweeps.work()});
+    }
+    for (int b = 0; b < count; ++b) out.insert(out.end(), sweeps.velocity(b).begin(), sweeps.velocity(b).end());
+    use_portable_sweeps(false);
+    return out;
+}
+
+}  // namespace
+
+int main() {
+    std::mt19937 random(1);
+    for (int round = 0; round < 20'000; ++round) {
+        const bool plain = round % 2 == 0;
+        const Four start = random_four(random, plain);
+        Four portable = start, fastest = start, vectors = start;
+        portable.solve(portable_sweep_four, plain);
+        fastest.solve(sweep_four(), plain);
+        EXPECT(fastest.same_as(portable));
+        if (plain) {  // what plain leaves out is nothing
+            vectors.solve(sweep_four(), false);
+            EXPECT(vectors.same_as(portable));
+        }
+    }
+    for (const FrictionModel model : {FrictionModel::cone, FrictionModel::box}) {
+        const std::vector<double> alone = heap(1, true, model);
+        EXPECT(heap(1, false, model) == alone);
+        for (const int threads : {2, 3, 5}) EXPECT(heap(threads, false, model) == alone);
+    }
+    return report();
+}
