@@ -1,6 +1,7 @@
 """Several threads share the work on contacts: whatever their number, the results are equal to the bit."""
 
 import multiprocessing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,19 +48,19 @@ MIXED = heap(700, Sphere(0.25), Box((0.4, 0.4, 0.4)), Capsule(0.15, 0.4))
 SOFT = heap(
     900, Sphere(0.25), material=Material(friction=0.4, compliance=1e-6, damping=0.03, slip_compliance=1e-4)
 )
+SPREAD = heap(300, Box((0.4, 0.4, 0.4)), Sphere(0.2))  # towers of their own, most of the way
 SWEPT = {
     "balls": (BALLS, Method(solver="iterative", iterations=10), 25),
     "settling": (BALLS, Method(solver="iterative", iterations=200, residual_tolerance=1e-6), 12),
     "box friction": (BALLS, Method(solver="iterative", iterations=10, friction="box"), 15),
     "mixed": (MIXED, Method(solver="iterative", iterations=10), 15),
     "soft": (SOFT, Method(solver="iterative", iterations=10, substeps=2), 12),
+    "islands": (SPREAD, Method(), 25),
     "directly": (heap(600, Sphere(0.25)), Method(), 10),
 }
 
 
 def ending(scene: Scene, method: Method, steps: int, threads: int) -> tuple[dict[str, bytes], dict[str, int]]:
-    from dataclasses import replace
-
     result = compile(scene, time_step=H, method=replace(method, threads=threads)).run(steps)
     return {name: state.tobytes() for name, state in result.final_state.items()}, result.counters
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,16 @@ def wedged(count: int, method: Method) -> Made:
         for k in range(count)
     )
     return Scene(bodies=(ground(), *balls), gravity=DOWN), method
+
+
+def islands(counts: tuple[int, ...], method: Method) -> Made:
+    """Wedged spheres, far from each other: an island and a thread for each."""
+    loose = []
+    for k, count in enumerate(counts):
+        for ball in wedged(count, method)[0].bodies[1:]:
+            x, y, z = ball.position
+            loose.append(replace(ball, name=f"{k}, {ball.name}", position=(x + 100.0 * k, y, z)))
+    return Scene(bodies=(ground(), *loose), gravity=DOWN), method
 
 
 def sheet(side: int) -> Made:
@@ -103,6 +114,8 @@ SCENES: dict[str, Callable[[], Made]] = {
     "box friction": lambda: wedged(400, Method(friction="box")),
     "rows to spare": lambda: sheet(30),
     "a mesh": lambda: landscape(60),
+    "another thread's island": lambda: islands((20, 600), Method(threads=2)),
+    "an island beside another thread's": lambda: islands((600, 20), Method(threads=2)),
 }
 
 

@@ -1,11 +1,22 @@
 #include "contacts/contact_islands.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <deque>
+#include <exception>
 #include <numeric>
+#include <optional>
 #include <utility>
 
+#include "run/watch.hpp"
+
 namespace spook {
+
+namespace {
+
+constexpr std::size_t few_blocks = 48;  // blocks in all: not worth other threads
+
+}  // namespace
 
 void add_ties(const RowBlock& block, std::vector<Islands::Tie>& ties) {
     ties.push_back({block.first, block.second});
@@ -43,6 +54,41 @@ Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties) {
         islands.of_body[b] = r == b ? islands.count++ : islands.of_body[r];
     }
     return islands;
+}
+
+/// Islands one after the other; on several threads each takes the next one that nobody has.
+void IslandSolver::solve_all(std::vector<Part>& parts, const Solve& solve) const {
+    std::size_t rows = 0;
+    for (const Part& part : parts) rows += part.system->rows.size();
+    if (team == nullptr || parts.size() == 1 || rows < few_blocks) {
+        for (Part& part : parts) part.report = solve(*part.system, *part.points, *part.solver);
+        return;
+    }
+    std::atomic<std::size_t> next{0};
+    std::atomic<bool> ended{false};
+    std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(team->size()) + 1);
+    const auto guarded = [&](std::size_t who, const auto& work) noexcept {
+        try {
+            work();
+        } catch (...) {
+            if (!thrown[who]) thrown[who] = std::current_exception();
+            ended = true;
+        }
+    };
+    team->each(
+        [&](int index) {
+            guarded(static_cast<std::size_t>(index), [&] {
+                std::optional<Watch::Helper> helper;
+                if (index > 0) helper.emplace(ended);
+                for (std::size_t k = next++; k < parts.size() && !ended; k = next++)
+                    parts[k].report = solve(*parts[k].system, *parts[k].points, *parts[k].solver);
+            });
+        },
+        [&] {
+            if (!ended) guarded(static_cast<std::size_t>(team->size()), [] { Watch::look(); });
+        });
+    for (const std::exception_ptr& what : thrown)
+        if (what) std::rethrow_exception(what);
 }
 
 FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
@@ -104,11 +150,14 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         part_points[row_island[point.block]].back().block = row_place[point.block];
     }
 
+    std::vector<Part> open_parts;
+    for (int island = 0; island < islands.count; ++island)
+        if (open[island])
+            open_parts.push_back({&parts[island], &part_points[island], &solver_of(first_body[island]), {}});
+    solve_all(open_parts, solve);
     FrictionReport sum;
-    for (int island = 0; island < islands.count; ++island) {
-        if (!open[island]) continue;
-        const FrictionReport report =
-            solve(parts[island], part_points[island], solver_of(first_body[island]));
+    for (const Part& part : open_parts) {
+        const FrictionReport& report = part.report;
         sum.rounds += report.rounds;
         sum.pivots += report.pivots;
         sum.sweeps += report.sweeps;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "contacts/friction_direct.hpp"
+#include "run/team.hpp"
 
 namespace spook {
 
@@ -26,13 +27,14 @@ Islands find_islands(const MixedSystem& system);
 inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
 
 /// Splits a system into its islands and solves each with a solver of its own, which keeps its analysis as long as
-/// the island does not change. Islands are done in order on one thread: equal input gives equal bits.
+/// the island does not change. Equal input gives equal bits, on however many threads islands are shared out.
 class IslandSolver {
 public:
     using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, DirectSolver&)>;
 
     double floor = 1e-12;
     int refinements = 1;
+    Team* team = nullptr;  // who else solves islands; `solve` must then be good for several at once
 
     /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and sweeps and takes the
     /// largest residual.
@@ -47,6 +49,15 @@ public:
     void be_patient(const std::map<int, Patience>& patience);
 
 private:
+    /// One island's part of a system.
+    struct Part {
+        MixedSystem* system;
+        std::vector<FrictionPoint>* points;
+        DirectSolver* solver;
+        FrictionReport report;
+    };
+    void solve_all(std::vector<Part>& parts, const Solve& solve) const;
+
     std::map<int, DirectSolver> solvers_;  // by the island's first body
 };
 

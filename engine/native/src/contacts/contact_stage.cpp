@@ -72,11 +72,12 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
       options_(options),
       joints_(std::move(joints)),
       yielding_(std::move(yielding)) {
+    if (options.threads > 1) team_ = std::make_shared<Team>(options.threads);
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
+        solver->team = team_.get();
     }
-    if (options.threads > 1) team_ = std::make_shared<Team>(options.threads);
     detection_.help(team_.get());
     sweeps_.help(team_.get());
     parting_sweeps_.help(team_.get());
@@ -96,9 +97,10 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     event_time_.assign(bodies, -1.0);
     ball_ = detection_.balls();
     swings_ = !detection_.single_points();
-    for (const auto& [a, b] : joints_)
-        for (const int body : {a, b})
-            if (body >= 0) jointed_[body] = 1;
+    for (const auto& [a, b] : joints_) {
+        if (a >= 0) jointed_[a] = 1;
+        if (b >= 0) jointed_[b] = 1;
+    }
 }
 
 double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,

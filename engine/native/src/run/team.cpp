@@ -13,7 +13,8 @@ namespace spook {
 Team::Team(int) {}
 Team::~Team() = default;
 void Team::refresh() {}
-void Team::call(Call call, const void* work) noexcept { call(work, 0); }
+void Team::begin(Call, const void*) noexcept {}
+bool Team::done() noexcept { return true; }
 void Team::meet() noexcept {}
 
 #else
@@ -59,20 +60,23 @@ void Team::refresh() {
     start();
 }
 
-void Team::call(Call call, const void* work) noexcept {
+void Team::begin(Call call, const void* work) noexcept {
+    if (size_ == 1) return;
     call_ = call;
     work_ = work;
     busy_.store(size_ - 1, std::memory_order_relaxed);
     arrived_.store(0, std::memory_order_relaxed);
     round_.fetch_add(1, std::memory_order_release);
     round_.notify_all();
-    call(work, 0);
-    for (int wait = 0;; ++wait) {
-        const int busy = busy_.load(std::memory_order_acquire);
-        if (busy == 0) return;
-        if (wait < awake) pause();
-        else busy_.wait(busy, std::memory_order_acquire);
+}
+
+bool Team::done() noexcept {
+    for (int wait = 0; wait < awake; ++wait) {
+        if (busy_.load(std::memory_order_acquire) == 0) return true;
+        pause();
     }
+    std::this_thread::yield();
+    return false;
 }
 
 void Team::serve(int part) noexcept {
@@ -81,7 +85,7 @@ void Team::serve(int part) noexcept {
         round_.wait(known, std::memory_order_acquire);
         if (ending_) return;
         call_(work_, part);
-        if (busy_.fetch_sub(1, std::memory_order_release) == 1) busy_.notify_one();
+        busy_.fetch_sub(1, std::memory_order_release);
     }
 }
 

@@ -27,7 +27,14 @@ public:
     /// Calls work(part) for every part from 0 to size() − 1, each on a thread of its own, part 0 on the caller's.
     /// Returns when all are done; what one of them throws ends the program.
     template <class Work> void each(const Work& work) {
-        call([](const void* what, int part) noexcept { (*static_cast<const Work*>(what))(part); }, &work);
+        each(work, [] {});
+    }
+
+    /// The same; `waiting` is called again and again while the caller waits for the others. It must not throw.
+    template <class Work, class Waiting> void each(const Work& work, const Waiting& waiting) {
+        begin([](const void* what, int part) noexcept { (*static_cast<const Work*>(what))(part); }, &work);
+        work(0);
+        while (!done()) waiting();
     }
 
     /// Within each(): waits until every part has come here as often.
@@ -46,7 +53,8 @@ public:
 
 private:
     using Call = void (*)(const void*, int) noexcept;
-    void call(Call call, const void* work) noexcept;
+    void begin(Call call, const void* work) noexcept;
+    bool done() noexcept;  // after a while of waiting for it
     void start();
     void serve(int part) noexcept;
 
