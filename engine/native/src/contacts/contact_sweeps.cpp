@@ -21,8 +21,8 @@ constexpr unsigned char now_hot = 2;   // and 1 in the sweep after
 constexpr double glance = 1.0 / 16.0;  // of what sweeping a contact costs: to see that it is cold
 constexpr double measuring = 0.5;      // the same: to see how far off it is
 constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are swept
-constexpr std::size_t narrow = 64;  // contacts of a level for each thread: fewer are not worth to wait for
-constexpr std::size_t narrow_due = 192;     // the same where only some of them are due
+constexpr std::size_t narrow = 32;  // contacts of a level for each thread: fewer are not worth to wait for
+constexpr std::size_t narrow_due = 96;      // the same where only some of them are due
 constexpr std::size_t worth_threads = 512;  // contacts, where nothing is waited for
 constexpr double few_left = 0.75;           // of the contacts in the list: a shorter one is made
 
@@ -93,6 +93,8 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     plain_ = true;
     done_ = 0.0;
     hot_.assign(bodies_ + 1, 0);
+    touched_.assign(bodies_ + 1, 0);
+    all_touched_ = true;
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
         int anchor = std::max(rows.first, rows.second);
@@ -155,6 +157,8 @@ int ContactSweeps::add(const SweepContact& given) {
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
         push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * rest.across);
     heat(c.first, c.second);
+    if (c.first < bodies_) touched_[c.first] = 1;
+    if (c.second < bodies_) touched_[c.second] = 1;
     link(given.first, given.second);
     return static_cast<int>(contacts_.size()) - 1;
 }
@@ -238,7 +242,10 @@ void ContactSweeps::heat(int first, int second) noexcept {
 
 void ContactSweeps::note(Part& part, const Due& due, double change, double focus) noexcept {
     part.change[due.island] = larger(part.change[due.island], change);
-    if (!(change <= focus) && spent_[due.island]) heat(due.first, due.second);
+    if (!spent_[due.island] || change == 0.0) return;
+    if (due.first < bodies_) touched_[due.first] = 1;
+    if (due.second < bodies_) touched_[due.second] = 1;
+    if (!(change <= focus)) heat(due.first, due.second);
 }
 
 /// Up to four contacts that share no moving body.
@@ -315,11 +322,12 @@ void ContactSweeps::sweep(double focus) noexcept {
              focus);
     }
     const bool plain = all && !any_spent;
+    for (const int island : roots_) all_touched_ = all_touched_ || (active_[island] && !spent_[island]);
     const auto piece = [&](Part& part, std::size_t begin, std::size_t end) {
         if (plain) solve_all(part, begin, end, focus);
         else solve_due(part, begin, end, focus);
     };
-    const std::size_t wide = parts_.size() * (plain ? narrow : narrow_due);
+    const std::size_t wide = parts_.size() * (any_spent ? narrow_due : narrow);
     const bool worth = parts_.size() > 1 && due().size() > 2 * wide * due_end().size() / 3;
     if (!worth) {
         std::size_t place = 0;
@@ -398,9 +406,13 @@ void ContactSweeps::write(MixedSystem& system) const {
 RowsResidual ContactSweeps::worst(double focus) {
     done_ += measuring * static_cast<double>(bodies_of_.size());
     std::vector<RowsResidual> found(parts_.size(), {0.0, -1});
+    all_touched_ = all_touched_ || joint_count_ > 0;  // whose rows may have moved others
+    residual_.resize(contacts_.size());
     share_out(team_, contacts_.size(), worth_threads, [&](int part, std::size_t begin, std::size_t end) {
         found[part] = worst_of(parts_[part], begin, end, focus);
     });
+    std::fill(touched_.begin(), touched_.end(), 0);
+    all_touched_ = false;
     RowsResidual worst{0.0, -1};
     for (std::size_t k = 0; k < parts_.size(); ++k) {
         for (const int contact : parts_[k].off) heat(contacts_[contact].first, contacts_[contact].second);
@@ -410,36 +422,44 @@ RowsResidual ContactSweeps::worst(double focus) {
     return worst;
 }
 
-RowsResidual ContactSweeps::worst_of(Part& part, std::size_t begin, std::size_t end, double focus) const {
+RowsResidual ContactSweeps::worst_of(Part& part, std::size_t begin, std::size_t end, double focus) {
     RowsResidual worst{0.0, -1};
     for (std::size_t k = begin; k < end; ++k) {
-        const SweptContact& c = contacts_[k];
-        const SweptRest& rest = rests_[k];
-        const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
-                       add_turn(joints_.velocity()[c.second], c.second_arm);
-        const double w = dot(c.normal, u) + rest.softness * c.impulse[0] - c.right;
-        double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
-        const double b1 = c.impulse[1], b2 = c.impulse[2];
-        const double s1 = dot(c.tangent, u) + rest.slip_softness * b1 - rest.right_along;
-        const double s2 = dot(rest.across, u) + rest.slip_softness * b2 - rest.right_across;
-        const double bound = c.friction * (model_ == FrictionModel::box ? rest.normal_before : c.impulse[0]);
-        double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
-        bool sticks = true;
-        if (model_ == FrictionModel::cone) {
-            const double reach = length(z1, z2);
-            sticks = reach <= bound;
-            if (!sticks) z1 *= bound / reach, z2 *= bound / reach;
-        } else {
-            sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
-            z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
-        }
-        if (c.friction > 0.0)
-            residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
+        const Both bodies = bodies_of_[joint_count_ + k];
+        if (all_touched_ || touched_[bodies.first] || touched_[bodies.second]) residual_[k] = residual_of(k);
+        const double residual = residual_[k];
         if (!(residual <= focus)) part.off.push_back(static_cast<int>(k));
         const bool worse = !(residual <= worst.residual) && !std::isnan(worst.residual);
         if (worse) worst = {residual, static_cast<int>(k)};
     }
     return worst;
+}
+
+/// How far a contact is from its law, as rows_residual() measures it, m/s.
+double ContactSweeps::residual_of(std::size_t k) const noexcept {
+    const SweptContact& c = contacts_[k];
+    const SweptRest& rest = rests_[k];
+    const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
+                   add_turn(joints_.velocity()[c.second], c.second_arm);
+    const double w = dot(c.normal, u) + rest.softness * c.impulse[0] - c.right;
+    double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+    const double b1 = c.impulse[1], b2 = c.impulse[2];
+    const double s1 = dot(c.tangent, u) + rest.slip_softness * b1 - rest.right_along;
+    const double s2 = dot(rest.across, u) + rest.slip_softness * b2 - rest.right_across;
+    const double bound = c.friction * (model_ == FrictionModel::box ? rest.normal_before : c.impulse[0]);
+    double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
+    bool sticks = true;
+    if (model_ == FrictionModel::cone) {
+        const double reach = length(z1, z2);
+        sticks = reach <= bound;
+        if (!sticks) z1 *= bound / reach, z2 *= bound / reach;
+    } else {
+        sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
+        z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
+    }
+    if (c.friction > 0.0)
+        residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
+    return residual;
 }
 
 }  // namespace spook

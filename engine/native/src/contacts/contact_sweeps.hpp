@@ -102,7 +102,8 @@ private:
     void solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
     void solve_due(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
     void sweep(double focus) noexcept;
-    RowsResidual worst_of(Part& part, std::size_t begin, std::size_t end, double focus) const;
+    RowsResidual worst_of(Part& part, std::size_t begin, std::size_t end, double focus);
+    double residual_of(std::size_t contact) const noexcept;
 
     Team* team_ = nullptr;
     std::vector<Part> parts_;
@@ -123,7 +124,11 @@ private:
     std::vector<char> active_, spent_;
     std::vector<double> left_;  // the last sweep's change, by root; the largest since it is spent
     std::vector<unsigned char>
-        hot_;             // bodies whose rows were changed much: 2 in this sweep, 1 in the one before
+        hot_;  // bodies whose rows were changed much: 2 in this sweep, 1 in the one before
+    // What worst() found of each contact, and whose velocities have changed since.
+    std::vector<double> residual_;
+    std::vector<unsigned char> touched_;
+    bool all_touched_ = true;
     double done_ = 0.0;   // items swept, and looked at for less
     bool swept_ = false;  // since start()
     // The order of a sweep: levels, in each of them contacts that share no moving body, and every contact in a later one
