@@ -35,7 +35,8 @@ struct Four {
         };
         for (int i = 0; i < 4; ++i)
             for (int k = 0; k < 3; ++k)
-                if (std::memcmp(&contacts[i].impulse[k], &other.contacts[i].impulse[k], sizeof(double)) != 0) return false;
+                if (std::memcmp(&contacts[i].impulse[k], &other.contacts[i].impulse[k], sizeof(double)) != 0)
+                    return false;
         return equal(velocity, other.velocity) && std::memcmp(change, other.change, sizeof change) == 0;
     }
 };
@@ -48,7 +49,7 @@ Four random_four(std::mt19937& random, bool plain) {
     Four f;
     for (int b = 0; b < bodies; ++b) {
         for (double& v : f.velocity[b]) v = one_in(6) ? 0.0 : number(random);
-        f.masses[b] = {positive(random), positive(random), 0.1 * number(random), 0.1 * number(random),
+        f.masses[b] = {positive(random), positive(random),     0.1 * number(random), 0.1 * number(random),
                        positive(random), 0.1 * number(random), positive(random)};
     }
     for (int i = 0; i < 4; ++i) {
@@ -69,8 +70,8 @@ Four random_four(std::mt19937& random, bool plain) {
         for (double& coupling : c.coupling) coupling = number(random);
         c.step = positive(random);
         if (!plain)
-            rest.right_along = number(random), rest.right_across = number(random), rest.softness = positive(random),
-            rest.slip_softness = positive(random);
+            rest.right_along = number(random), rest.right_across = number(random),
+            rest.softness = positive(random), rest.slip_softness = positive(random);
     }
     if (one_in(20)) f.velocity[random() % bodies][random() % 6] = std::numeric_limits<double>::quiet_NaN();
     if (one_in(20)) f.contacts[random() % 4].impulse[0] = std::numeric_limits<double>::infinity();
@@ -109,7 +110,8 @@ std::vector<double> heap(int threads, bool portable, FrictionModel model) {
     sweeps.start(system, model);
     const auto add = [&] {
         const int first = static_cast<int>(random() % count);
-        sweeps.add(between(first, random() % 10 == 0 ? -1 : (first + 1 + static_cast<int>(random() % 40)) % count, random));
+        sweeps.add(between(
+            first, random() % 10 == 0 ? -1 : (first + 1 + static_cast<int>(random() % 40)) % count, random));
     };
     for (int k = 0; k < all; ++k) add();
     int left = 2;
@@ -125,7 +127,8 @@ std::vector<double> heap(int threads, bool portable, FrictionModel model) {
         out.insert(out.end(), {report.residual, static_cast<double>(report.sweeps), worst.residual,
                                static_cast<double>(worst.row), sweeps.work()});
     }
-    for (int b = 0; b < count; ++b) out.insert(out.end(), sweeps.velocity(b).begin(), sweeps.velocity(b).end());
+    for (int b = 0; b < count; ++b)
+        out.insert(out.end(), sweeps.velocity(b).begin(), sweeps.velocity(b).end());
     use_portable_sweeps(false);
     return out;
 }

@@ -63,7 +63,7 @@ int main() {
         levels_wait(team);
         shares_cover(team);
 #if !defined(__wasi__) && !defined(__SANITIZE_THREAD__)  // which forbids a fork between threads
-        const pid_t child = ::fork();  // which has none of the threads
+        const pid_t child = ::fork();                    // which has none of the threads
         if (child == 0) {
             team.refresh();
             int sum = 0;
