@@ -51,11 +51,22 @@ SOFT = heap(
 SPREAD = heap(300, Box((0.4, 0.4, 0.4)), Sphere(0.2))  # towers of their own, most of the way
 SWEPT = {
     "balls": (BALLS, Method(solver="iterative", iterations=10), 25),
-    "settling": (BALLS, Method(solver="iterative", iterations=200, residual_tolerance=1e-6), 12),
+    "settling": (BALLS, Method(solver="iterative", iterations=60, residual_tolerance=1e-6), 8),
     "box friction": (BALLS, Method(solver="iterative", iterations=10, friction="box"), 15),
     "mixed": (MIXED, Method(solver="iterative", iterations=10), 15),
     "soft": (SOFT, Method(solver="iterative", iterations=10, substeps=2), 12),
     "islands": (SPREAD, Method(), 25),
+    "asleep": (
+        heap(600, Box((0.4, 0.4, 0.4))),
+        Method(solver="iterative", iterations=30, sleep_speed=0.05, sleep_after=0.1),
+        30,
+    ),
+    "rebounding": (
+        heap(600, Sphere(0.25), material=Material(friction=0.3, restitution=0.5)),
+        Method(solver="hybrid"),
+        15,
+    ),
+    "successive": (heap(300, Sphere(0.25)), Method(impacts="successive"), 10),
     "directly": (heap(600, Sphere(0.25)), Method(), 10),
 }
 
