@@ -57,9 +57,9 @@ SWEPT = {
     "soft": (SOFT, Method(solver="iterative", iterations=10, substeps=2), 12),
     "islands": (SPREAD, Method(), 25),
     "asleep": (
-        heap(600, Box((0.4, 0.4, 0.4))),
+        heap(300, Box((0.4, 0.4, 0.4))),
         Method(solver="iterative", iterations=30, sleep_speed=0.05, sleep_after=0.1),
-        30,
+        24,
     ),
     "rebounding": (
         heap(600, Sphere(0.25), material=Material(friction=0.3, restitution=0.5)),
