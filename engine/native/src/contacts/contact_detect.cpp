@@ -66,6 +66,8 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         kick_[b] = sum(free_velocity[b], velocity[b], -1.0);
         prescribed_[b] = unknown_[b] < 0 ? velocity[b] : Vec6{};
     }
+    supplies_ = conveys_ || std::any_of(prescribed_.begin(), prescribed_.end(),
+                                        [](const Vec6& v) { return v != Vec6{}; });
     std::fill(lead_.begin(), lead_.end(), 0.0);
     std::fill(event_time_.begin(), event_time_.end(), -1.0);
     std::fill(supported_.begin(), supported_.end(), 0);

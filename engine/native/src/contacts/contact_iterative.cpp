@@ -25,7 +25,7 @@ void ContactStage::hand_over() {
     const double h = options_.time_step;
     for (; handed_over_ < points_.size(); ++handed_over_) {
         Point& point = points_[handed_over_];
-        const SurfaceMaterial& material = point.material;
+        const PairMaterial& material = point.material;
         SweepContact row;
         row.first = unknown_[point.contact.first];
         row.second = unknown_[point.contact.second];

@@ -24,19 +24,21 @@ struct SurfaceMaterial {
     bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }
 };
 
+/// What two surfaces make of it: of a contact there are many, so no more than they share is in it.
+struct PairMaterial {
+    double friction = 0.0, restitution = 0.0, compliance = 0.0, damping = 0.0, slip_compliance = 0.0,
+           rolling = 0.0, torsional = 0.0;
+
+    bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }
+};
+
 /// Friction by the geometric mean, restitution, damping, rolling and torsional friction by the larger, compliances by
 /// the sum.
-inline SurfaceMaterial combined(const SurfaceMaterial& a, const SurfaceMaterial& b) noexcept {
-    return {std::sqrt(a.friction * b.friction),
-            std::max(a.restitution, b.restitution),
-            a.compliance + b.compliance,
-            std::max(a.damping, b.damping),
-            a.slip_compliance + b.slip_compliance,
-            std::max(a.rolling, b.rolling),
-            std::max(a.torsional, b.torsional),
-            {},
-            0.0,
-            {}};
+inline PairMaterial combined(const SurfaceMaterial& a, const SurfaceMaterial& b) noexcept {
+    return {std::sqrt(a.friction * b.friction),    std::max(a.restitution, b.restitution),
+            a.compliance + b.compliance,           std::max(a.damping, b.damping),
+            a.slip_compliance + b.slip_compliance, std::max(a.rolling, b.rolling),
+            std::max(a.torsional, b.torsional)};
 }
 
 }  // namespace spook

@@ -77,6 +77,7 @@ void ContactStage::hold_joints(MixedSystem& parting, double least) const {
 
 /// Whether a moving surface, or a body that moves as it is told, may do work at a contact.
 bool ContactStage::is_supplied(const Contact& contact) const {
+    if (!supplies_) return false;
     if (conveys(contact)) return true;
     for (const int b : {contact.first, contact.second}) {
         if (norm(linear(prescribed_[b])) > 0.0 || norm(angular(prescribed_[b])) > 0.0) return true;

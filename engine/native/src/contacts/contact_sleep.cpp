@@ -49,6 +49,7 @@ std::vector<int> ContactStage::touching(const std::vector<char>& stirs) const {
 }
 
 bool ContactStage::conveys(const Contact& contact) const {
+    if (!conveys_) return false;
     return norm(materials_[contact.first].surface_velocity) > 0.0 ||
            norm(materials_[contact.second].surface_velocity) > 0.0;
 }

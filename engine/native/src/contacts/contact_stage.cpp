@@ -160,7 +160,7 @@ void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
 
 /// The rows of a block that friction bounds.
 void ContactStage::add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const {
-    const SurfaceMaterial& material = point.material;
+    const PairMaterial& material = point.material;
     const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
     const bool solved = point.solved && options_.friction != FrictionModel::box;
     const double normal = solved ? point.normal : point.before;
@@ -259,7 +259,7 @@ bool ContactStage::is_pressed(const Point& point) const noexcept {
 /// The resting row of a point; the tangents' bounds are left to the friction law.
 RowBlock ContactStage::resting_row(Point& point) const {
     const double h = options_.time_step;
-    const SurfaceMaterial& material = point.material;
+    const PairMaterial& material = point.material;
     const bool turning = material.resists_turning();
     RowBlock block = row_block(point, turning ? 6 : material.friction > 0.0 ? 3 : 1);
     if (turning && !(material.friction > 0.0))

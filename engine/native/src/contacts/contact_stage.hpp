@@ -257,7 +257,7 @@ public:
 private:
     struct Point {
         Contact contact;  // of a strike: where it will touch, the gap along that normal
-        SurfaceMaterial material;
+        PairMaterial material;
         Vec3 first_arm, second_arm;      // from the centres of mass, m
         Vec3 tangent;                    // first tangent along world axes or the material's direction, unit
         double stretch[2] = {1.0, 1.0};  // of the tangents' rows: what makes an ellipse of friction a disc
@@ -401,6 +401,7 @@ private:
     std::vector<IndexPair> joints_;
     std::vector<char> jointed_;  // bodies with rows of joints
     bool conveys_ = false;       // some surface moves along itself
+    bool supplies_ = false;      // or, in this step, something that does not move by itself
     bool oriented_ = false;      // some surface has a friction that differs with the direction
     bool resists_turning_ = false;
     bool swings_ =
