@@ -124,3 +124,36 @@ def test_a_blow_whose_points_contradict_each_other_is_counted(seed: int, counted
 
     assert result.completed
     assert result.counters["unsettled_solves"] == counted
+
+
+def test_walls_that_close_in_cost_a_bounded_search() -> None:
+    """Six boxes have nowhere to go: no set of contacts obeys, and pivoting for one took 9 s a step."""
+    rough = Material(friction=0.5)
+    walls = tuple(
+        RigidBody(
+            name=name,
+            motion="kinematic",
+            shape=Box((1, 20, 20)),
+            position=(x, 0, 0),
+            velocity=(speed, 0, 0),
+            material=rough,
+        )
+        for name, x, speed in (("left", -0.5, 1.0), ("right", 3.5, -1.0))
+    )
+    boxes = tuple(
+        RigidBody(
+            name=f"box {x} {z}",
+            mass=10.0 ** (3 * ((7 * x + 3 * z) % 5 - 2)),
+            shape=Box((1, 1, 1)),
+            position=(x + 0.5, 0, z + 0.5),
+            material=rough,
+        )
+        for x in range(3)
+        for z in range(2)
+    )
+    scene = Scene(bodies=(ground(), *walls, *boxes), gravity=DOWN)
+    result = simulate(scene, time_step=1 / 60, steps=3, method=Method(solver="hybrid"))
+
+    assert result.status == "unsettled"
+    assert result.residual > 0.1
+    assert result.counters["factorisations"] < 2500

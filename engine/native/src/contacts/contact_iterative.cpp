@@ -222,7 +222,12 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     std::vector<double> share;
     if (!report.converged) {
         if (unsettled_body_ < 0) blame_sunk();
-        shorten_unsettled(system, system.rows.size(), share);
+        std::vector<char> pushes;
+        for (std::size_t k = 0; k < points_.size(); ++k) {
+            const double* z = sweeps_.impulse(static_cast<int>(k));
+            pushes.push_back(std::any_of(z, z + 3, [](double each) { return each != 0.0; }));
+        }
+        shorten_unsettled(system, system.rows.size(), pushes, share);
     }
     mark_held(system);  // by joints; of contacts those that push, or did in a blow
     for (std::size_t b = 0; b < unknown_.size(); ++b)

@@ -156,15 +156,17 @@ void ContactStage::blame(double residual, int unknown) {
 }
 
 /// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise
-/// the energy; all of it in islands that joints hold or something drives. Shortens the velocities alike.
-void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints,
+/// the energy; all of it in islands that joints hold or something drives. Shortens the velocities alike. Islands are of the
+/// points in `pushes`, as parting's are: what merely lies near pays for nobody's gain.
+void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
                                      std::vector<double>& share) const {
     const std::size_t bodies = system.mass.size();
     share.assign(bodies, 1.0);
     std::vector<Islands::Tie> ties;
     for (std::size_t k = 0; k < joints; ++k) add_ties(system.rows[k], ties);
-    for (const Point& point : points_)
-        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
+    for (std::size_t k = 0; k < points_.size(); ++k)
+        if (pushes[k])
+            ties.push_back({unknown_[points_[k].contact.first], unknown_[points_[k].contact.second]});
     const Islands islands = find_islands(static_cast<int>(bodies), ties);
     struct Sums {
         double square = 0.0, linear = 0.0, fall = 0.0;  // E₊ − E = square s² + linear s − fall
@@ -175,9 +177,11 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints,
         sums[islands.of_body[std::max(first, second)]].driven = true;
     };
     for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
-    for (const Point& point : points_)
-        if (is_supplied(point.contact) || point.material.compliance > 0.0)
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        if (pushes[k] && (is_supplied(point.contact) || point.material.compliance > 0.0))
             driven(unknown_[point.contact.first], unknown_[point.contact.second]);
+    }
     std::vector<Vec6> free = system.momentum;
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         const int u = unknown_[b];

@@ -18,7 +18,8 @@ FrictionReport sweep(const ContactOptions& o, FrictionModel model, MixedSystem& 
                      std::vector<FrictionPoint>& points, DirectSolver& solver) {
     return o.solver == SolverKind::iterative
                ? solve_iterative(island, points, model, o.iterations, o.residual_tolerance)
-               : solve_hybrid(island, points, model, solver.pivot, o.iterations, o.residual_tolerance);
+               : solve_hybrid(island, points, model, solver.pivot, solver.patience, o.iterations,
+                              o.residual_tolerance);
 }
 
 /// Whether an answer is one: an island on which next to nothing acts may have none to rounding.
@@ -337,7 +338,13 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     judge(system, friction, report);
     if (!report.converged) {
         std::vector<double> share;
-        shorten_unsettled(system, joints, share);
+        std::vector<char> pushes;
+        for (std::size_t k = joints; k < system.rows.size(); ++k) {
+            const auto& z = system.rows[k].multiplier;
+            pushes.push_back(std::any_of(z.begin(), z.begin() + system.rows[k].size,
+                                         [](double each) { return each != 0.0; }));
+        }
+        shorten_unsettled(system, joints, pushes, share);
         for (std::size_t k = joints; k < system.rows.size(); ++k)
             for (double& z : system.rows[k].multiplier)
                 z *= share[std::max(system.rows[k].first, system.rows[k].second)];

@@ -368,7 +368,8 @@ private:
     void judge_blow(const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel model);
     void blame(double residual, int unknown);
     void blame_sunk();
-    void shorten_unsettled(MixedSystem& system, std::size_t joints, std::vector<double>& share) const;
+    void shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
+                           std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
     // contact_parting.cpp
     void find_given();

@@ -21,7 +21,6 @@ constexpr double reluctance =
     0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
 constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
 constexpr int plain_rounds = 3;         // most systems settle within these
-constexpr int longest_wait = 16;        // solves
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 constexpr double fair = 1e-9;           // one that is an answer
 constexpr double near = 1e-6;           // one that is not worth another turn
@@ -165,13 +164,8 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         report.finite = pivots.finite;
         return pivots.finite;
     };
-    const int round_limit = solver.round_limit;
+    const RoundLimitKept kept(solver);
     if (effort.lost == 1) solver.round_limit = effort.pivots;  // the first guess, too
-    struct Restore {
-        PivotSolver& solver;
-        int value;
-        ~Restore() { solver.round_limit = value; }
-    } restore{solver, round_limit};
     const bool some_unknown =
         std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
     if (some_unknown) {  // no step before: the normal forces without friction are the first guess
@@ -273,20 +267,16 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 /// asked first unless they failed lately. True when they settled; else the system is as it was.
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                     DirectSolver& direct, FrictionReport& report) {
-    if (direct.patience.wait > 0) {
-        --direct.patience.wait;
-        return false;
-    }
+    if (direct.patience.waits()) return false;
     MixedSystem start = system;
     const std::vector<FrictionPoint> start_points = points;
     const FrictionReport before = report;
     const Effort& effort = system.rows.size() <= few_blocks ? small : quick;
     if (settle_by_rounds(system, points, model, direct.pivot, effort, report)) {
-        direct.patience.failures = 0;
+        direct.patience.succeeded();
         return true;
     }
-    direct.patience.wait = std::min(longest_wait, 1 << direct.patience.failures);
-    direct.patience.failures = std::min(direct.patience.failures + 1, 8);
+    direct.patience.failed();
     system = std::move(start);
     points = start_points;
     const int rounds = report.rounds, pivots = report.pivots;

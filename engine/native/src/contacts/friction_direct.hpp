@@ -7,12 +7,6 @@
 
 namespace spook {
 
-/// What the solves before tell the next one: a run that goes back must take it along.
-struct Patience {
-    int wait = 0;      // solves until pivoting is asked before Newton's method again
-    int failures = 0;  // of those attempts in a row
-};
-
 /// What direct solves of one island keep from step to step.
 struct DirectSolver {
     PivotSolver pivot;

@@ -10,6 +10,8 @@ namespace spook {
 
 namespace {
 
+constexpr int search_rounds = 200;  // of pivoting: searches that end take fewer
+
 /// One per thread: its memory outlives a solve, its values do not.
 Sweeper& sweeper() {
     static thread_local Sweeper own;
@@ -45,8 +47,11 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
 }
 
 FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                            PivotSolver& solver, int iterations, double tolerance) {
+                            PivotSolver& solver, Patience& patience, int iterations, double tolerance) {
+    if (patience.waits()) return solve_iterative(system, points, model, iterations, tolerance);
     FrictionReport report;
+    const RoundLimitKept kept(solver);
+    solver.round_limit = search_rounds;
     bool same_matrix = false;
     for (int round = 0; round < iterations; ++round) {
         for (const FrictionPoint& point : points) {
@@ -60,7 +65,16 @@ FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& poi
         report.pivots += pivots.flips;
         report.converged = pivots.converged;
         report.finite = pivots.finite;
-        if (points.empty() || !pivots.finite) return report;
+        if (!pivots.finite) return report;
+        if (!pivots.converged && rows_residual(system, {}, model, tolerance).residual > tolerance) {
+            patience.failed();
+            for (RowBlock& block : system.rows) block.multiplier.fill(0.0);  // they may be anything
+            FrictionReport swept = solve_iterative(system, points, model, iterations, tolerance);
+            swept.rounds += report.rounds, swept.pivots += report.pivots, swept.sweeps += report.sweeps;
+            return swept;
+        }
+        patience.succeeded();
+        if (points.empty()) return report;
         guess_unknown_normals(system, points);
 
         Sweeper& sweeps = sweeper();

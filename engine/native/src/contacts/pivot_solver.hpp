@@ -88,6 +88,34 @@ private:
     std::vector<Vec6> free_velocity_;  // M⁻¹ p
 };
 
+/// What the solves before tell the next one: a run that goes back must take it along. Pivoting that failed is asked again
+/// after 1, 2, 4, … and at most 16 other solves.
+struct Patience {
+    int wait = 0;      // solves until it is asked again
+    int failures = 0;  // of it in a row
+
+    /// Whether this solve is to do without.
+    bool waits() noexcept { return wait > 0 && wait-- > 0; }
+    void failed() noexcept {
+        wait = failures < 4 ? 1 << failures : 16;
+        ++failures;
+    }
+    void succeeded() noexcept { failures = 0; }
+};
+
+/// Gives a solver back the limit of rounds it had.
+class RoundLimitKept {
+public:
+    explicit RoundLimitKept(PivotSolver& solver) : solver_(solver), limit_(solver.round_limit) {}
+    RoundLimitKept(const RoundLimitKept&) = delete;
+    RoundLimitKept& operator=(const RoundLimitKept&) = delete;
+    ~RoundLimitKept() { solver_.round_limit = limit_; }
+
+private:
+    PivotSolver& solver_;
+    int limit_;
+};
+
 /// Factor of a symmetric positive definite 6×6, L D Lᵀ with D in place of L's unit diagonal, and x ← M⁻¹ x with it.
 /// No square roots: masses scaled by a power of two scale every result exactly.
 Mat6 factor_six(const Mat6& m) noexcept;
