@@ -14,6 +14,7 @@ from spook_tracker.engine import (
     JointCoordinate,
     KineticEnergy,
     Limit,
+    Load,
     Material,
     Maximum,
     Method,
@@ -243,3 +244,79 @@ def test_who_is_stopped_without_rebound_is_met_by_what_follows(psi: float, solve
 
     assert float(result["deep"]) < 1e-9
     np.testing.assert_allclose(result["v"][-1, :, 0], (0.0, 2.5 * psi), atol=1e-9)
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("kind", [Hinge, Prismatic])
+@pytest.mark.parametrize("carried", [0.0, 2.0])
+@pytest.mark.parametrize("compliance", [0.0, 1e-4])
+def test_a_stop_met_from_the_other_end_is_the_stop_met_from_afar(
+    compliance: float, carried: float, kind: type, solver: str, h: float
+) -> None:
+    """What a step leads from beside one end past the other does what it does where there is no first end: with the stop's
+    own compliance, and on a carrier that moves as it is told."""
+    turns = kind is Hinge
+    ends = []
+    for lower in (-9.0, -1e-3):
+        load = Load(
+            name="load",
+            body="slider",
+            force=(0.0 if turns else 5.0 / h, 0.0, 0.0),
+            torque=(5.0 / h if turns else 0.0, 0.0, 0.0),
+        )
+        told = {"angular_velocity" if turns else "velocity": (carried, 0.0, 0.0)}
+        carrier = RigidBody(name="carrier", motion="kinematic", position=(0.0, 0.0, 0.0), **told)
+        slider = RigidBody(
+            name="slider",
+            mass=1.0,
+            inertia=(1.0, 1.0, 1.0),
+            position=(0.0, 0.0, 0.0),
+            velocity=carrier.velocity,
+            angular_velocity=carrier.angular_velocity,
+        )
+        joint = kind(
+            name="joint",
+            between=("carrier", "slider"),
+            axis=(1.0, 0.0, 0.0),
+            compliance=0.0,
+            limit=Limit(lower=lower, upper=3e-3, compliance=compliance),
+        )
+        result = simulate(
+            Scene(bodies=(carrier, slider), constraints=(joint,), forces=(load,)),
+            time_step=h,
+            steps=8,
+            method=Method(solver=solver),
+            observe={"at": Trace(quantity=JointCoordinate("joint"))},
+        )
+        ends.append(result["at"])
+
+    assert ends[0][1] > 2.9e-3
+    np.testing.assert_allclose(ends[1], ends[0], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("range_", [1e-4, 0.02])
+def test_what_rebounds_between_near_ends_stays_between_them(range_: float, solver: str, h: float) -> None:
+    """An elastic slider at 3 m/s has come from one end to the other, and past it, long before a step is over."""
+    slider = ball("slider", (0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    guide = Prismatic(
+        name="guide",
+        between=(WORLD, "slider"),
+        axis=(1.0, 0.0, 0.0),
+        compliance=0.0,
+        limit=Limit(lower=-range_, upper=0.0, compliance=0.0, restitution=1.0),
+    )
+    result = simulate(
+        Scene(bodies=(slider,), constraints=(guide,)),
+        time_step=h,
+        steps=40,
+        method=Method(solver=solver),
+        observe={"at": Trace(quantity=JointCoordinate("guide")), "energy": Trace(quantity=KineticEnergy())},
+    )
+
+    assert result.completed
+    assert result["at"].min() > -range_ - 1e-11
+    assert result["at"].max() < 1e-11
+    assert np.diff(result["energy"]).max() <= 1e-12 * result["energy"][0]
