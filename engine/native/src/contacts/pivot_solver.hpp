@@ -95,7 +95,11 @@ struct Patience {
     int failures = 0;  // of it in a row
 
     /// Whether this solve is to do without.
-    bool waits() noexcept { return wait > 0 && wait-- > 0; }
+    bool waits() noexcept {
+        if (wait == 0) return false;
+        --wait;
+        return true;
+    }
     void failed() noexcept {
         wait = failures < 4 ? 1 << failures : 16;
         ++failures;
