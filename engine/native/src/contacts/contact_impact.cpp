@@ -289,6 +289,14 @@ double ContactStage::both_known(const Point& point) const noexcept {
     return std::max(clock_[point.contact.first], clock_[point.contact.second]);
 }
 
+/// When a point that is approached closes, s. Forces are part of the ways: what they slow closes later.
+double ContactStage::closing_time(const Point& point) const {
+    const double from = both_known(point), gap = std::max(0.0, gap_at(point, from));
+    if (gap == 0.0) return from;
+    const double speed = (gap - gap_at(point, from + options_.time_step)) / options_.time_step;
+    return from + gap / (speed > 0.0 ? speed : -point.approach);
+}
+
 /// An open point among balls that are led by successive blows is led to the time of their last one.
 void ContactStage::lead_point(Point& point) {
     for (const int body : {point.contact.first, point.contact.second})
@@ -300,9 +308,24 @@ void ContactStage::lead_point(Point& point) {
     point.contact.point.gap = std::max(0.0, gap);
 }
 
+/// Forces act on a free ball until the time it is led to, and the rest of them after it: what a fall towards a wall wins
+/// until then is lost on the way back.
+void ContactStage::lead_forces(std::size_t b, MixedSystem& system) {
+    const double lead = clock_[b] / options_.time_step;
+    if (supported_[b] || !(lead > lead_[b])) return;
+    const double part = (lead - lead_[b]) / (1.0 - lead_[b]);
+    lead_[b] = lead;
+    const Vec6 more = sum(Vec6{}, kick_[b], part);
+    velocity_[b] = sum(velocity_[b], more);
+    for (double& k : kick_[b]) k *= 1.0 - part;
+    const Mat6& mass = system.mass[unknown_[b]];
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) system.momentum[unknown_[b]][i] += mass[6 * i + j] * more[j];
+}
+
 /// Of successive blows those to be answered next: of what may meet in this step the points that are approached, and closed
 /// when the first of them is. Free balls are led there, as to the time of a single strike.
-std::vector<std::size_t> ContactStage::earliest_blows(const MixedSystem& system) {
+std::vector<std::size_t> ContactStage::earliest_blows(MixedSystem& system) {
     std::vector<Islands::Tie> ties;
     for (const RowBlock& block : system.rows) add_ties(block, ties);
     for (const Point& point : points_)
@@ -312,19 +335,19 @@ std::vector<std::size_t> ContactStage::earliest_blows(const MixedSystem& system)
     const auto is_blow = [](const Point& point) {
         return point.bounce >= 0.0 && point.approach < -point.rounding;
     };
-    std::vector<double> first(islands.count, unbounded);
-    for (const Point& point : points_) {
-        if (!is_blow(point)) continue;
-        const double from = both_known(point), gap = std::max(0.0, gap_at(point, from));
-        double& earliest = first[island_of(islands, point)];
-        earliest = std::min(earliest, from + gap / -point.approach);
+    std::vector<double> first(islands.count, unbounded), closing(points_.size(), unbounded);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        if (!is_blow(points_[k])) continue;
+        closing[k] = closing_time(points_[k]);
+        double& earliest = first[island_of(islands, points_[k])];
+        earliest = std::min(earliest, closing[k]);
     }
     std::vector<std::size_t> who;
     std::vector<char> hit(unknown_.size(), 0), balls(islands.count, 1);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
-        if (!is_blow(point) || !is_closed(point.contact, gap_at(point, first[island_of(islands, point)])))
-            continue;
+        const double now = first[island_of(islands, point)];
+        if (!is_blow(point) || (closing[k] > now && !is_closed(point.contact, gap_at(point, now)))) continue;
         who.push_back(k);
         hit[point.contact.first] = hit[point.contact.second] = 1;
     }
@@ -337,12 +360,18 @@ std::vector<std::size_t> ContactStage::earliest_blows(const MixedSystem& system)
         if (const double time = std::min(first[own], options_.time_step); hit[b] && time > clock_[b]) {
             way_[b] = way_until(b, time);
             clock_[b] = time;
+            if (balls[own]) lead_forces(b, system);
         }
         if (!balls[own]) continue;
         event_time_[b] = clock_[b];
         if (clock_[b] > 0.0) predicted_[b] = sum(Vec6{}, way_[b], 1.0 / clock_[b]);
     }
     for (Point& point : points_) lead_point(point);
+    for (const std::size_t k : who) {
+        Point& point = points_[k];
+        point.approach = relative(point, point.contact.point.normal, velocity_, false);
+        if (point.event) point.bounce = point.material.restitution;
+    }
     return who;
 }
 

@@ -123,7 +123,7 @@ public:
     /// `system` is hit that hangs together with bodies in contact; asked anew after each impact.
     bool impact_needed(const MixedSystem& system) const { return impact_needed_ || stop_is_hit(system); }
 
-    /// The part of the step's forces that acts on `body` before the impact.
+    /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
     double lead(int body) const noexcept { return lead_[body]; }
 
     /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
@@ -322,10 +322,12 @@ private:
     bool stop_is_hit(const MixedSystem& system) const;
     bool stop_comes_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     bool pass_other_ends(const MixedSystem& system, std::size_t joints);
-    std::vector<std::size_t> earliest_blows(const MixedSystem& system);
+    std::vector<std::size_t> earliest_blows(MixedSystem& system);
+    void lead_forces(std::size_t body, MixedSystem& system);
     Vec6 way_until(std::size_t body, double time) const;
     double gap_at(const Point& point, double time) const;
     double both_known(const Point& point) const noexcept;
+    double closing_time(const Point& point) const;
     void lead_point(Point& point);
     void take_part(MixedSystem& system, const std::vector<std::size_t>& who,
                    std::vector<RowBlock>& rows) const;

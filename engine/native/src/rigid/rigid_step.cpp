@@ -153,6 +153,8 @@ void RigidSystem::impact() {
     fill_momenta(false);
     contacts_->impact(mixed_);
     judge_contacts();
+    for (const int i : tied_)
+        if (contacts_->lead(i) > 0.0) share_[i] = 1.0 - contacts_->lead(i);
     take_velocities(true, [this](int k) { return !contacts_->held(k); });
     for (std::size_t k = 0; k < tied_.size(); ++k)
         if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
