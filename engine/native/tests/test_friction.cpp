@@ -1,4 +1,5 @@
 // Coulomb's law: a box on a slope in every direction, the models apart, all solvers alike, a rolling ball.
+#include <algorithm>
 #include <random>
 
 #include "contact_world.hpp"
@@ -236,9 +237,30 @@ void the_least_on_a_disc_obeys_the_law() {
     EXPECT(z1 == 0.0 && z2 == 0.0);
 }
 
+/// A row of 2 kg along x, its answer wherever it may be: the residual is how far a projection moves it.
+void a_bound_that_is_broken_is_told() {
+    MixedSystem system;
+    Mat6 mass{};
+    for (int i = 0; i < 6; ++i) mass[7 * i] = 2.0;
+    system.mass = {mass};
+    RowBlock row;
+    row.first = 0, row.first_jacobian[0] = {1, 0, 0, 0, 0, 0};
+    row.lower[0] = -1.0, row.upper[0] = 3.0;
+    system.rows = {row};
+    for (const double z : {-1e9, -5.0, -1.5, -1.0, -0.5, 0.0, 2.5, 3.0, 3.5, 9.0, 1e9})
+        for (const double w : {-20.0, -1.0, -0.1, 0.0, 0.1, 1.0, 20.0}) {
+            system.rows[0].multiplier[0] = z;
+            system.velocity = {Vec6{w, 0, 0, 0, 0, 0}};
+            const double moved = 2.0 * std::clamp(z - w * 2.0, -1.0, 3.0);
+            const double told = rows_residual(system, {}, FrictionModel::cone).residual;
+            EXPECT_NEAR(told, std::abs(2.0 * z - moved) / 4.0, 1e-12 * (1.0 + std::abs(z)));
+        }
+}
+
 }  // namespace
 
 int main() {
+    a_bound_that_is_broken_is_told();
     the_cone_is_round();
     the_least_on_a_disc_obeys_the_law();
     it_sticks_below_and_slips_above();

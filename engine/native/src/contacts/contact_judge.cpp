@@ -44,15 +44,17 @@ double nearly_own(const MixedSystem& system, const RowBlock& block, int i) {
     return own;
 }
 
-/// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds. At most
-/// |w|, so no more is asked where that is `enough`.
+/// How far z is from where one step of projection would put it, as a velocity: 0 exactly where the law holds. Within its
+/// bounds at most |w|, so no more is asked where that is `enough`.
 double bounded_residual(const MixedSystem& system, const RowBlock& block, int i, double enough) {
     const double w = row_residual(block, i, system.velocity), z = block.multiplier[i];
     if (std::abs(w) <= enough && z >= block.lower[i] && z <= block.upper[i]) return 0.0;
     const double own = nearly_own(system, block, i) + block.softness[i];
     if (!(own > 0.0)) return 0.0;
-    // z − w/own would round w away
-    return w > 0.0 ? std::min(w, own * (z - block.lower[i])) : std::min(-w, own * (block.upper[i] - z));
+    const double below = own * (block.lower[i] - z), above = own * (z - block.upper[i]);
+    if (below > 0.0) return w < 0.0 ? std::max(below, std::min(-w, -above)) : below;
+    if (above > 0.0) return w > 0.0 ? std::max(above, std::min(w, -below)) : above;
+    return w > 0.0 ? std::min(w, -below) : std::min(-w, -above);  // z − w/own would round w away
 }
 
 /// The same of a point's friction: at most its slip.

@@ -381,7 +381,10 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         ++report.rounds;
 
         int count = offenders(system, true);
-        if (count == 0 && !refined) solve_free(system, true);
+        if (count == 0 && !refined) {  // without the relief some may have no answer: then with it
+            solve_free(system, true);
+            if (offenders(system, true) > 0) solve_free(system, false);
+        }
         if (count == 0) {
             report.converged = true;
             if (tied || free_ties(system) == 0) break;
