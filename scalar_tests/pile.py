@@ -78,6 +78,11 @@ class Pile:
     depth: np.ndarray  # (steps,) deepest overlap, m
 
 
+def energy_rise(energy: np.ndarray) -> float:
+    """The largest rise in a step, over what is lost in all."""
+    return float(np.diff(energy).max() / (energy[0] - energy[-1]))
+
+
 def read(simulate: Simulate, count: int, method: Method, steps: int = STEPS, last: int = LAST) -> Pile:
     """Runs the pile; the floor's impulse is compared with the weight and the change of momentum, by Newton's law."""
     observe = {
@@ -98,7 +103,7 @@ def read(simulate: Simulate, count: int, method: Method, steps: int = STEPS, las
         overlap=float(depth[-last:].max()),
         balance_error=(carried - gained) / weight - 1.0,
         missing_load=1.0 - carried / weight,
-        energy_rise=float(np.diff(energy).max() / (energy[0] - energy[-1])),
+        energy_rise=energy_rise(energy),
         load=load,
         depth=depth,
     )

@@ -19,6 +19,7 @@ constexpr std::size_t most_beside = 32;  // bodies of a ring: where more part at
 constexpr int rings = 4;                 // of neighbours that parting sees
 constexpr double around = 4.0;           // of the deepest overlap: gaps that parting may close
 constexpr double aside = 2e-3;           // of the smaller body's radius: who parts by less pushes nobody else
+constexpr double same_place = 0.1;       // of the larger body's radius: one point, seen again
 constexpr unsigned pairs_a_look = 256;   // between two looks at the clock
 
 }  // namespace
@@ -117,6 +118,7 @@ void ContactStage::note_given() {
 void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
                                const std::function<double(int)>& moved) {
     beside_.clear();
+    seams_.clear();
     std::vector<char> reached(unknown_.size(), 0);  // in which round, from one on
     char round = 1;
     const auto reach = [&](int b) {
@@ -151,12 +153,76 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
             detection_.touch(pair, poses[a], poses[b], margin, scratch_);
             if (scratch_.empty()) continue;
             beside_.push_back(pair);
+            if (std::any_of(scratch_.begin(), scratch_.end(),
+                            [this](const Contact& c) { return is_deep(c); }))
+                seams_.push_back(pair);
             reach(a);
             reach(b);
         }
     }
-    std::sort(beside_.begin(), beside_.end());
-    beside_.erase(std::unique(beside_.begin(), beside_.end()), beside_.end());
+    for (std::vector<IndexPair>* pairs : {&beside_, &seams_}) {
+        std::sort(pairs->begin(), pairs->end());
+        pairs->erase(std::unique(pairs->begin(), pairs->end()), pairs->end());
+    }
+}
+
+/// The same pairs' points. What overlapped without points before anything was parted was let in as a seam; what overlaps
+/// since has been pushed.
+double ContactStage::find_overlaps_beside(const std::vector<Pose>& poses, double margin) {
+    double deepest = 0.0;
+    unsigned seen = 0;
+    for (const IndexPair& pair : beside_) {
+        if (++seen % pairs_a_look == 0) Watch::look();
+        scratch_.clear();
+        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
+        detection_.touch(pair, poses[a], poses[b], margin, scratch_);
+        const bool seam = std::binary_search(seams_.begin(), seams_.end(), pair);
+        for (const Contact& contact : scratch_) {
+            if (seam && is_deep(contact)) continue;
+            const double excess = -contact.point.gap - slack(contact);
+            deepest = std::max(deepest, excess);
+            if (margin > 0.0) add_lap(contact, poses, excess);
+        }
+    }
+    return deepest;
+}
+
+/// Keeps points that earlier displacements of this step have parted and the manifolds have lost since, as those of two
+/// edges when the faces beside them come down: they must not close again, or bodies would seesaw between them. Whether
+/// something overlaps where those had no point.
+bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
+    const auto order = [](const LargeArray<Point>& laps, auto& places) {
+        places.clear();
+        for (std::size_t k = 0; k < laps.size(); ++k) places.push_back({laps[k].contact.key, k});
+        std::sort(places.begin(), places.end());
+    };
+    const auto has = [this](const LargeArray<Point>& laps, const auto& places, const Contact& contact) {
+        auto at = std::lower_bound(places.begin(), places.end(), std::make_pair(contact.key, std::size_t{0}));
+        for (; at != places.end() && at->first == contact.key; ++at)  // parallel edges have one name
+            if (norm(laps[at->second].contact.point.position - contact.point.position) <
+                same_place * size(contact))
+                return true;
+        return false;
+    };
+    order(laps_, places_);
+    order(parted_, parted_places_);
+    bool fresh = false;
+    for (const Point& lap : laps_)
+        fresh = fresh || (lap.push > slack(lap.contact) && !has(parted_, parted_places_, lap.contact));
+    for (Point lap : parted_) {
+        const Contact& contact = lap.contact;
+        if (has(laps_, places_, contact)) continue;
+        for (const int b : {contact.first, contact.second}) {
+            Vec3& arm = b == contact.first ? lap.first_arm : lap.second_arm;
+            const Vec3 now = poses[b].rotation * local(lap_poses_[b].rotation, arm);
+            const Vec3 gone = poses[b].position - lap_poses_[b].position + now - arm;
+            lap.push += dot(contact.point.normal, b == contact.first ? -gone : gone);
+            arm = now;
+        }
+        lap.push = std::min(lap.push, 0.0);
+        laps_.push_back(lap);
+    }
+    return fresh;
 }
 
 ContactStage::Point& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses,
@@ -213,18 +279,9 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             if (margin > 0.0) add_lap(contact, poses, excess).parting_before = before;
         }
     }
-    if (margin == 0.0) return deepest;
     // Sweeps part once, nearly: with more rows they come less far, and the next step sees who was pushed aside.
-    if (!again && !parts_by_sweeps()) find_beside(poses, margin, moved);
-    for (const IndexPair& pair : beside_) {
-        if (++seen % pairs_a_look == 0) Watch::look();
-        scratch_.clear();
-        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-        detection_.touch(pair, poses[a], poses[b], margin, scratch_);
-        for (const Contact& contact : scratch_)  // what overlaps without points was let in as a seam
-            if (const double open = contact.point.gap + slack(contact); open > 0.0)
-                add_lap(contact, poses, -open);
-    }
+    if (!again && margin > 0.0 && !parts_by_sweeps()) find_beside(poses, margin, moved);
+    if (again || margin > 0.0) deepest = std::max(deepest, find_overlaps_beside(poses, margin));
     return deepest;
 }
 
@@ -265,6 +322,7 @@ void ContactStage::note_parted(const MixedSystem& parting, std::vector<Islands::
 
 bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses,
                         bool again) {
+    const double last = parting_.deepest;
     parting_.velocity.clear();
     parting_.deepest = find_overlaps(poses, 0.0, again);
     if (!(parting_.deepest > 0.0)) {
@@ -273,6 +331,9 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     }
     if (!again) ++counters_.corrections;
     find_overlaps(poses, around * parting_.deepest, again);
+    const bool fresh = again && keep_parted(poses);
+    if (again && !fresh && !(parting_.deepest < 0.5 * last)) return false;
+    if (!parts_by_sweeps()) parted_ = laps_, lap_poses_ = poses;
     MixedSystem& parting = parting_system_;
     parting.mass = system.mass;
     parting.momentum.assign(system.mass.size(), Vec6{});

@@ -163,7 +163,8 @@ public:
 
     /// Looks among the pairs of this step's points for overlaps with the bodies at `poses`, where the step ends, and
     /// fills parting(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
-    /// `again` when the bodies are displaced: what is linear in the displacement is not all.
+    /// `again` when the bodies are displaced: what is linear in the displacement is not all. Then it is false, too, where
+    /// the displacement before was of no use.
     bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
 
     /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse at
@@ -379,6 +380,9 @@ private:
     void find_beside(const std::vector<Pose>& poses, double margin, const std::function<double(int)>& moved);
     Point& add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
     double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
+    double find_overlaps_beside(const std::vector<Pose>& poses, double margin);
+    bool keep_parted(const std::vector<Pose>& poses);
+    bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
     double parting_speed(const Point& lap, bool again) const;
     bool part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
     bool part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
@@ -416,7 +420,8 @@ private:
     Parting parting_;
     std::vector<char> yielding_;
     std::vector<double> gives_;              // of contacts of jointed bodies, see find_gives(), 1/kg
-    LargeArray<Point> laps_;                 // points of the step's pairs where it ends
+    LargeArray<Point> laps_, parted_;        // points of the step's pairs where it ends; of all its partings
+    std::vector<Pose> lap_poses_;            // where bodies were at the last of them
     std::map<std::uint64_t, double> given_;  // by pair: overlap the scene began with, as far as it is left, m
     bool begun_ = false;                     // whether it is known
     bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly
@@ -433,7 +438,7 @@ private:
         double time;
     };
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread
-    std::vector<IndexPair> beside_;               // pairs without points, where others part
+    std::vector<IndexPair> beside_, seams_;       // pairs without points, where others part; those let in
     std::vector<IndexPair> near_;                 // where the search was widened
     std::vector<int> grown_;                      // whom it was widened for
     std::vector<char> supported_;                 // bodies with a closed contact
@@ -446,11 +451,11 @@ private:
     std::vector<double> clock_;  // of successive blows: up to when a body's way in the step is known, s
     std::vector<Vec6> way_;      // and that way, m and rad
     LargeArray<Point> points_, strikes_;
-    std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
-    std::vector<Touch> touches_;                                 // of the last step until the end of solve()
-    std::vector<Touch> kept_;                                    // of sleepers
-    std::vector<char> asleep_;                                   // by body; empty while none has slept
-    std::vector<int> roused_;                                    // sleepers met in this step
+    std::vector<std::pair<std::uint64_t, std::size_t>> places_, parted_places_;  // of points, by key
+    std::vector<Touch> touches_;           // of the last step until the end of solve()
+    std::vector<Touch> kept_;              // of sleepers
+    std::vector<char> asleep_;             // by body; empty while none has slept
+    std::vector<int> roused_;              // sleepers met in this step
     std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
     std::vector<char> held_;               // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
