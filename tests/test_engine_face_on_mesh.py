@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.campaign import TENTS
 from spook_tracker.engine import (
     Box,
     ContactPoints,
@@ -12,19 +13,9 @@ from spook_tracker.engine import (
     Method,
     RigidBody,
     Scene,
-    TriangleMesh,
     start,
 )
 
-TENTS = TriangleMesh(
-    tuple((float(x), float(y), 0.05 * ((x + y) % 2)) for x in range(9) for y in range(9)),
-    tuple(
-        face
-        for x in range(8)
-        for y in range(8)
-        for face in ((9 * x + y, 9 * x + y + 9, 9 * x + y + 10), (9 * x + y, 9 * x + y + 10, 9 * x + y + 1))
-    ),
-)
 HEAP = (  # mass, place, turn, velocity, angular velocity of three boxes that come to rest
     (
         0.678538,
