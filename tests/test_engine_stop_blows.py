@@ -320,3 +320,37 @@ def test_what_rebounds_between_near_ends_stays_between_them(range_: float, solve
     assert result["at"].min() > -range_ - 1e-11
     assert result["at"].max() < 1e-11
     assert np.diff(result["energy"]).max() <= 1e-12 * result["energy"][0]
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize("seed", range(8))
+def test_blows_without_end_beside_a_stop_add_no_energy(seed: int, solver: str) -> None:
+    """A light slider between its elastic stop and heavy balls that come on: over a hundred blows in a step, the last of which
+    answers all at once. The stop is not to rebound once more after it."""
+    rng, h = np.random.default_rng(seed), STEPS[0]
+    elastic = Material(restitution=1.0)
+    bodies = [ball("slider", (0, 0, 0), (-1.0, 0, 0), mass=10.0 ** rng.uniform(-3.0, -1.0), material=elastic)]
+    place = 0.2
+    for k in range(2 + seed % 2):
+        place += 10.0 ** rng.uniform(-6.0, -3.0)
+        speed, mass = -rng.uniform(1.0, 4.0), 10.0 ** rng.uniform(1.0, 3.0)
+        bodies.append(ball(f"b{k}", (place, 0, 0), (speed, 0, 0), mass=mass, material=elastic))
+        place += 0.2
+    guide = Prismatic(
+        name="guide",
+        between=(WORLD, "slider"),
+        axis=(1.0, 0.0, 0.0),
+        compliance=0.0,
+        limit=Limit(lower=-(10.0 ** rng.uniform(-6.0, -2.0)), upper=9.0, compliance=0.0, restitution=1.0),
+    )
+    result = simulate(
+        Scene(bodies=tuple(bodies), constraints=(guide,)),
+        time_step=h,
+        steps=8,
+        method=Method(solver=solver, impacts="successive"),
+        observe={"energy": Trace(quantity=KineticEnergy())},
+    )
+
+    assert result.completed
+    assert result.counters["impacts"] > 100
+    assert np.diff(result["energy"]).max() <= 1e-12 * result["energy"][0]
