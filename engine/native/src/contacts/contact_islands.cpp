@@ -143,7 +143,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     }
     for (FrictionPoint& point : points) {
         if (!open[row_island[point.block]]) {
-            point.normal = system.rows[point.block].multiplier[0];
+            if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
             continue;
         }
         part_points[row_island[point.block]].push_back(point);

@@ -163,8 +163,9 @@ void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
 void ContactStage::add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const {
     const PairMaterial& material = point.material;
     const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
-    const bool solved = point.solved && options_.friction != FrictionModel::box;
-    const double normal = solved ? point.normal : point.before;
+    double normal = point.before;
+    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? point.guessed : normal;
+    else if (point.solved) normal = point.normal;
     if (material.friction > 0.0) {
         friction.push_back({block, material.friction, soft, normal});
         friction.back().stretched = point.is_stretched();
@@ -313,6 +314,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         report = run(system, friction, resting_solver_, options_.friction, late ? &answered : nullptr);
         report.rounds += before.rounds, report.sweeps += before.sweeps;
         report.converged = report.converged && before.converged;  // islands may have been left as they were
+        for (const FrictionPoint& point : friction) points_[point.block - joints].guessed = point.normal;
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();

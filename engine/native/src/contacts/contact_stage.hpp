@@ -271,6 +271,7 @@ private:
         double bounce = -1.0;            // psi' if the point takes part in the impact, else −1
         double rounding = 0.0;           // approaches slower than this are none, m/s
         double before = -1.0;            // normal impulse of the step before, −1 if the point is new
+        double guessed = -1.0;           // and what the box takes in its stead, −1 if it has not yet
         double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
         double parting_before = 0.0, pressed_before = 0.0;
         bool solved = false;    // in an earlier round of this step: these start the next

@@ -228,7 +228,8 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
                 if (law.moved) same_matrix = false;
             }
             used[k] = point.normal;
-            given[k] = point.normal = now;
+            given[k] = now;
+            if (model != FrictionModel::box) point.normal = now;
         }
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
         const bool is_answer = report.residual <= accepted && report.converged;

@@ -32,7 +32,7 @@ struct DirectSolver {
 /// beyond 1e-6 of the speeds (up to 24 blocks: 1e-9) to 100 sweeps and Newton's method again, and up to 24 blocks to a
 /// few rounds more, which share loads evenly. The best within 1e-4 of the speeds is the answer, and converged within
 /// 1e-9; else sweeps finish.
-/// On return FrictionPoint::normal is the normal impulse.
+/// On return FrictionPoint::normal is the normal impulse; for the box it stays what bounds friction.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);
 

@@ -42,7 +42,8 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
     if (system.rows.empty()) report.residual = 0.0;
     report.converged = report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
-    for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
+    for (FrictionPoint& point : points)
+        if (model != FrictionModel::box) point.normal = system.rows[point.block].multiplier[0];
     return report;
 }
 

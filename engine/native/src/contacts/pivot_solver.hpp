@@ -30,7 +30,8 @@ struct PivotReport {
 /// gradients with the factor as preconditioner. That gives the solution of least norm among equals, weighted by
 /// (G M⁻¹ Gᵀ)ᵢᵢ, and changes no equation. A factor 1e-6 is small enough for a few rounds and large enough that the
 /// rounding of gaps, divided by it, stays out of the loads. Rows that rest at zero with nothing to spare are freed
-/// once before the search ends, or which of the equal answers it is would hang on where it began.
+/// once before the search ends, or which of the equal answers it is would hang on where it began. What only the relieved
+/// matrix has an answer to, as rows that say nearly the same between tight bounds, keeps the relief in it.
 class PivotSolver {
 public:
     double floor = 1e-12;  // of BlockLdlt::factor
