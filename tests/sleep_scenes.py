@@ -73,5 +73,13 @@ def held(built: Scene, method: Method, steps: int = 0, **observe: Any) -> Run:
     return run
 
 
+def wakes_as_a_whole(run: Run, count: int, steps: int) -> bool:
+    """`count` bodies sleep, and within so many steps from the start all wake in one."""
+    assert asleep(run) == count
+    while asleep(run) == count and run.steps < steps:
+        run.step()
+    return asleep(run) == 0
+
+
 def same(a: Any, b: Any) -> bool:
     return all(np.array_equal(a[name], b[name]) for name in a)

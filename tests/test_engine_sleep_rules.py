@@ -39,6 +39,7 @@ from tests.sleep_scenes import (
     held,
     scene,
     sleepy,
+    wakes_as_a_whole,
 )
 
 AT_ONCE = {"sleep_after": TIME_STEP}  # one step at rest is enough: what moves in it must be seen in it
@@ -172,11 +173,7 @@ def test_wires_and_springs_that_pull_aside_tie_sleepers(kind: str) -> None:
             for k in range(2)
         )
         built = Scene(bodies=(*bodies, ball), forces=springs)
-    run = held(built, sleepy(), 60)
-    assert asleep(run) == 3
-    while asleep(run) == 3 and run.steps < 120:
-        run.step()
-    assert asleep(run) == 0
+    assert wakes_as_a_whole(held(built, sleepy(), 60), 3, 120)
 
 
 def test_who_was_woken_is_at_rest_no_sooner_than_anybody() -> None:

@@ -42,6 +42,7 @@ from tests.sleep_scenes import (
     scene,
     sleepy,
     stack,
+    wakes_as_a_whole,
 )
 
 
@@ -172,11 +173,7 @@ def test_springs_and_distances_tie_sleepers() -> None:
             name="ball", mass=1.0, shape=Sphere(0.2), position=(-4.0, 0.0, 0.5), velocity=(4.0, 0.0, 0.0)
         )
         built = Scene(bodies=(a, b, ball), **tie)
-        run = held(built, sleepy(), 40)
-        assert asleep(run) == 2
-        while asleep(run) == 2 and run.steps < 60:
-            run.step()
-        assert asleep(run) == 0
+        assert wakes_as_a_whole(held(built, sleepy(), 40), 2, 60)
 
 
 def test_what_follows_the_time_or_floats_stays_awake() -> None:

@@ -21,7 +21,7 @@ struct FrictionPoint {
     double coefficient = 0.0;    // mu
     double slip_softness = 0.0;  // gamma / h, of both tangent rows
     double normal =
-        -1.0;  // nu of the step before; then, but for the box, of this step, N s; negative: unknown
+        -1.0;  // nu of the step before, N s; negative: unknown; then, but for the box, of this one
     int row = 1, size = 2;  // which rows: two obey a disc (or box), one an interval
     bool stretched =
         false;  // the two rows differ in scale: their own part is solved exactly, not by projection

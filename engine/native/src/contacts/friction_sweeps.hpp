@@ -15,8 +15,8 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
 
 /// Alternates direct solves of joints and normals, friction held, with sweeps over friction, the rest held,
 /// until the normal forces and the friction change by less than `tolerance` [m/s] or after `iterations` rounds. Rows that
-/// contradict each other, as between walls that close in, have no direct solve: where 200 rounds of pivoting have found
-/// none to `tolerance`, all rows are swept, and for some solves after that at once.
+/// contradict each other, as between walls that close in, have no direct solve: where pivoting has found none to
+/// `tolerance`, all rows are swept, and for some solves after that at once.
 FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                             PivotSolver& solver, Patience& patience, int iterations, double tolerance);
 

@@ -52,8 +52,7 @@ void RigidSystem::note_begin() {
 }
 
 /// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first
-/// order, and turns bring other points down. By sweeps once: a thousand spheres are then within a micrometre, and the
-/// rest is the next step's.
+/// order, and turns bring other points down. By sweeps once, and the rest is the next step's.
 void RigidSystem::part_overlaps() {
     const int most = contacts_->parts_by_sweeps() ? 1 : most_partings;
     for (int round = 0; round < most; ++round) {
