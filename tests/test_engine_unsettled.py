@@ -20,6 +20,7 @@ from spook_tracker.engine import (
     Scene,
     Sphere,
     simulate,
+    start,
 )
 from spook_tracker.scalar_tests import pile
 from spook_tracker.scalar_tests.beam.scene import scene as beam
@@ -127,8 +128,8 @@ def test_a_blow_whose_points_contradict_each_other_is_counted(seed: int, counted
     assert result.counters["unsettled_solves"] == counted
 
 
-def test_walls_that_close_in_cost_a_bounded_search() -> None:
-    """Six boxes have nowhere to go: no set of contacts obeys, and pivoting for one had no end."""
+def walls_that_close_in() -> Scene:
+    """Six boxes with nowhere to go: no set of contacts obeys."""
     rough = Material(friction=0.5)
     walls = tuple(
         RigidBody(
@@ -152,12 +153,33 @@ def test_walls_that_close_in_cost_a_bounded_search() -> None:
         for x in range(3)
         for z in range(2)
     )
-    scene = Scene(bodies=(ground(), *walls, *boxes), gravity=DOWN)
-    result = simulate(scene, time_step=1 / 60, steps=3, method=Method(solver="hybrid"))
+    return Scene(bodies=(ground(), *walls, *boxes), gravity=DOWN)
+
+
+def test_walls_that_close_in_cost_a_bounded_search() -> None:
+    """Pivoting for one had no end."""
+    method = Method(solver="hybrid")
+    result = simulate(walls_that_close_in(), time_step=1 / 60, steps=3, method=method)
 
     assert result.status == "unsettled"
     assert result.residual > 0.1
     assert result.counters["factorisations"] < 2500
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("saved", [1, 2, 3])
+def test_a_search_that_was_given_up_is_given_up_again_after_going_back(saved: int, threads: int) -> None:
+    """What failed is not asked again for some solves, and a run that goes back has to know for how many."""
+    method = Method(solver="hybrid", threads=threads)
+    with start(walls_that_close_in(), time_step=1 / 60, method=method) as run:
+        run.step(saved)
+        snapshot = run.save()
+        run.step(5 - saved)
+        first = run.state
+        run.restore(snapshot)
+        run.step(5 - saved)
+
+        assert all(np.array_equal(first[name], place) for name, place in run.state.items())
 
 
 @pytest.mark.parametrize("seed", range(20))
