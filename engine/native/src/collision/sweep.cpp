@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/advance.hpp"
 #include "collision/bounds.hpp"
 #include "collision/cylinder.hpp"
 #include "collision/frustum.hpp"
@@ -208,19 +209,6 @@ double turning_speed(const Mover& mover, Vec3 n, double far) noexcept {
     return rate * turning_arm(mover.shape, mover.part);
 }
 
-/// How fast points of a mover that turns come along `n` at most, m/s, in the time `left` from where it is at `time`: those
-/// of now, and what the turn can add to any of them.
-double nearing_speed(const Mover& mover, Vec3 n, double time, double left, double far) noexcept {
-    const bool box = mover.shape.kind == ShapeKind::box;
-    if (!box && mover.shape.kind != ShapeKind::hull) return turning_speed(mover, n, far);
-    const Pose body = mover.body_at(time), at = placed(body, mover.part);
-    const Vec3 way = cross(n, mover.spin);  // n · (w × r) = r · (n × w)
-    const double reach =
-        box ? box_reach(mover.shape, at, way) : farthest(*mover.shape.hull, local(at.rotation, way));
-    return dot(way, at.position - body.position) + reach +
-           norm(way) * norm(mover.spin) * turning_arm(mover.shape, mover.part) * left;
-}
-
 }  // namespace
 
 double first_touch(const Mover& first, const Mover& second, double duration, double slop) noexcept {
@@ -231,25 +219,24 @@ double first_touch(const Mover& first, const Mover& second, double duration, dou
     const Vec3 approach = second.velocity - first.velocity;
     double time = 0.0;
     constexpr int rounds = 200;  // a factor of two each where a round surface is met at a slant
-    constexpr int patient = 32;  // of them, before corners are looked at one by one
     for (int round = 0; round < rounds; ++round) {
         const Separation apart = separation(first.shape, first.at(time), second.shape, second.at(time));
         const double turning =
             turning_speed(first, apart.normal, first_far) + turning_speed(second, apart.normal, second_far);
         const double closing = dot(apart.normal, approach), left = duration - time;
-        double speed = std::max(0.0, closing) + turning;
-        if (round >= patient) {  // what turns away beside a surface would never get past it
-            const double nearing = closing + nearing_speed(first, -apart.normal, time, left, first_far) +
-                                   nearing_speed(second, apart.normal, time, left, second_far);
-            speed = std::min(speed, std::max(0.0, nearing));
-        }
+        const double speed = std::max(0.0, closing) + turning;
         if (apart.gap <= -0.5 * slop) {
             const double back =
                 closing > 0.0 ? apart.gap / closing : 0.0;  // negative: to where the gap is zero
             return std::max(0.0, -back < 0.1 * duration ? time + back : time);
         }
         if (!(speed * left > apart.gap + slop)) return -1.0;
-        time += (apart.gap + slop) / speed;
+        double until = (apart.gap + slop) / speed;
+        if (round > 0 && turning > 0.0) {  // what turns away beside a surface would never get past it
+            until = std::max(until, parted_for(first, second, apart.normal, time, left, slop));
+            if (until >= left) return -1.0;
+        }
+        time += until;
     }
     return time;  // so slow an approach at a slant that it counts as touching
 }
