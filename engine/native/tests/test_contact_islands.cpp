@@ -20,7 +20,8 @@ void static_bodies_join_nothing() {
     MixedSystem system;
     system.mass.resize(6);
     system.rows = {tie(0, -1), tie(4, 1), tie(-1, 1), tie(3, -1)};
-    const Islands islands = find_islands(system);
+    IslandFinder finder;
+    const Islands& islands = finder.find(system);
     EXPECT(islands.count == 3);
     EXPECT((islands.of_body == std::vector<int>{0, 1, -1, 2, 1, -1}));
 }

@@ -73,7 +73,8 @@ void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& 
         mass_factor_[b] = factor_six(system.mass[b]);
         mass_inverse_[b] = inverse_six(mass_factor_[b]);
     }
-    std::vector<const FrictionPoint*> friction(system.rows.size(), nullptr);
+    std::vector<const FrictionPoint*>& friction = friction_;
+    friction.assign(system.rows.size(), nullptr);
     for (const FrictionPoint& point : points) friction[point.block] = &point;
     units_.clear();
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
@@ -103,10 +104,10 @@ void ConeNewton::connect() {
     const int bodies = static_cast<int>(mass_factor_.size());
     // The order of elimination follows from this system alone: a run that goes back must round as it did.
     if (bodies != bodies_ || pairs_ != needed_) {
-        std::vector<BlockEdge> edges;
-        for (const auto& [a, b] : needed_) edges.push_back({a, b});
+        edges_.clear();
+        for (const auto& [a, b] : needed_) edges_.push_back({a, b});
         bodies_ = -1;  // until the analysis is whole
-        matrix_.analyse(bodies, edges);
+        matrix_.analyse(bodies, edges_);
         pairs_ = needed_;
         bodies_ = bodies;
     }

@@ -84,7 +84,9 @@ private:
 
     BlockLu matrix_;
     std::vector<std::pair<int, int>> pairs_, needed_;  // analysed, and those of this system
+    std::vector<BlockEdge> edges_;                     // those needed
     int bodies_ = -1;
+    std::vector<const FrictionPoint*> friction_;  // of each block, while units are read
     std::vector<ConeUnit> units_;
     std::vector<Mat6> mass_factor_, mass_inverse_;
     std::vector<Vec6> velocity_, change_, image_;

@@ -1,6 +1,7 @@
 // The contact stage's first part: which points are closed, which pairs will meet, and when.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "collision/sweep.hpp"
 #include "contacts/contact_geometry.hpp"
@@ -131,7 +132,11 @@ void ContactStage::find_open_again() {
     });
     const auto old = static_cast<std::ptrdiff_t>(open_.size());
     look_at(near_);
-    std::inplace_merge(open_.begin(), open_.begin() + old, open_.end(), in_order);
+    merged_.clear();
+    merged_.reserve(open_.capacity());
+    std::merge(open_.begin(), open_.begin() + old, open_.begin() + old, open_.end(),
+               std::back_inserter(merged_), in_order);
+    open_.swap(merged_);
 }
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
@@ -176,7 +181,9 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
             if (!scratch_.empty() || solids) open_.push_back(open);
             continue;
         }
-        std::stable_sort(scratch_.begin(), scratch_.end(), by_key);
+        for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
+            for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)
+                std::swap(scratch_[at], scratch_[at - 1]);
         for (const Contact& contact : scratch_) {
             if (!reachable(contact)) continue;
             add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);

@@ -1,7 +1,6 @@
 // The contact stage's second part: blows.
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "contacts/contact_geometry.hpp"
@@ -25,9 +24,9 @@ constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not 
 int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }
 
 /// Of each island's bodies, J.
-std::vector<double> kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity,
-                                   const Islands& islands) {
-    std::vector<double> energy(islands.count, 0.0);
+void find_kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity, const Islands& islands,
+                         std::vector<double>& energy) {
+    energy.assign(islands.count, 0.0);
     for (std::size_t b = 0; b < velocity.size(); ++b) {
         if (islands.of_body[b] < 0) continue;
         for (int i = 0; i < 6; ++i) {
@@ -36,15 +35,17 @@ std::vector<double> kinetic_energy(const MixedSystem& system, const std::vector<
             energy[islands.of_body[b]] += 0.5 * momentum * velocity[b][i];
         }
     }
-    return energy;
 }
 
 /// In islands whose energy rises, velocities between the plastic ones and those of Newton's law that keep it; `share` is
 /// how much of the latter.
-void blend(MixedSystem& newton, const MixedSystem& plastic, const Islands& islands,
-           const std::vector<double>& limit, const std::vector<char>& rises, std::vector<double>& share) {
-    std::vector<double> low(islands.count, 0.0), high(islands.count, 1.0);
-    std::vector<Vec6> mixed = newton.velocity;
+void blend(BlowArrays& blow, const Islands& islands) {
+    MixedSystem& newton = blow.hit;
+    const MixedSystem& plastic = blow.plastic;
+    const std::vector<char>& rises = blow.rises;
+    std::vector<double>&low = blow.low, &high = blow.high, &energy = blow.energy;
+    low.assign(islands.count, 0.0), high.assign(islands.count, 1.0);
+    std::vector<Vec6>& mixed = blow.mixed = newton.velocity;
     const auto mix = [&](const auto& of_island) {
         for (std::size_t b = 0; b < mixed.size(); ++b) {
             const int island = islands.of_body[b];
@@ -56,14 +57,14 @@ void blend(MixedSystem& newton, const MixedSystem& plastic, const Islands& islan
     };
     for (int halving = 0; halving < 50; ++halving) {
         mix([&](int k) { return 0.5 * (low[k] + high[k]); });
-        const std::vector<double> energy = kinetic_energy(newton, mixed, islands);
+        find_kinetic_energy(newton, mixed, islands, energy);
         for (int k = 0; k < islands.count; ++k)
-            (energy[k] <= limit[k] ? low[k] : high[k]) = 0.5 * (low[k] + high[k]);
+            (energy[k] <= blow.limit[k] ? low[k] : high[k]) = 0.5 * (low[k] + high[k]);
     }
     mix([&](int k) { return low[k]; });
     newton.velocity = mixed;
     for (int k = 0; k < islands.count; ++k)
-        if (rises[k]) share[k] = low[k];
+        if (rises[k]) blow.share[k] = low[k];
 }
 
 /// Whether some contact is approached after a solve: where many rows of a few bodies say the same, elimination may find
@@ -94,14 +95,17 @@ Vec3 impulse_of(const RowBlock& block) {
 /// softness, which hit_exactly() takes back.
 void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
                               const std::vector<std::size_t>& who) const {
-    std::map<std::pair<int, int>, int> shared;  // points by bodies: those of compounds do not come together
+    std::vector<std::pair<int, int>>& pairs = arrays_.blow.pairs;  // points of compounds do not come together
     const auto pair = [&](std::size_t k) {
         const Contact& contact = points_[k].contact;
         return std::pair{contact.first, contact.second};
     };
-    for (const std::size_t k : who) ++shared[pair(k)];
+    pairs.clear();
+    for (const std::size_t k : who) pairs.push_back(pair(k));
+    std::sort(pairs.begin(), pairs.end());
     for (std::size_t j = 0; j < who.size(); ++j) {
-        if (shared[pair(who[j])] <= determined) continue;
+        const auto [first, last] = std::equal_range(pairs.begin(), pairs.end(), pair(who[j]));
+        if (last - first <= determined) continue;
         RowBlock& block = hit.rows[joints + j];
         block.softness[0] = blow_give * own_inertia(hit, block, 0);
     }
@@ -111,7 +115,7 @@ void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
 /// (the proximal point algorithm, Rockafellar 1976). Rows that contradict each other keep some: the solve is unsettled.
 void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                                FrictionModel model) {
-    const std::vector<FrictionPoint> fresh = friction;
+    const std::vector<FrictionPoint>& fresh = arrays_.blow.first_friction = friction;
     FrictionReport report = run(hit, friction, impact_solver_, model);
     if (report.converged && is_broken(hit, joints)) {
         for (std::size_t k = joints; k < hit.rows.size(); ++k) {
@@ -124,8 +128,8 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
         report = run(hit, friction, impact_solver_, model);
     }
     bool settled = report.converged;
-    std::vector<double> asked;
-    std::vector<char> answered(hit.rows.size(), 1);
+    std::vector<double>& asked = filled(arrays_.blow.asked, 0);
+    std::vector<char>& answered = filled<char>(arrays_.blow.answered, hit.rows.size(), 1);
     double fastest = 0.0;
     bool soft = false;
     for (std::size_t k = joints; k < hit.rows.size(); ++k) {
@@ -174,12 +178,12 @@ bool ContactStage::find_left_out(const std::vector<Vec6>& velocity) {
 }
 
 /// What hangs together by rows of joints, of which `system` has so many, and by the step's points.
-Islands ContactStage::hanging(const MixedSystem& system, std::size_t joints) const {
-    std::vector<Islands::Tie> ties;
-    for (std::size_t k = 0; k < joints; ++k) add_ties(system.rows[k], ties);
+const Islands& ContactStage::hanging(const MixedSystem& system, std::size_t joints) const {
+    arrays_.hanging.begin(static_cast<int>(system.mass.size()));
+    for (std::size_t k = 0; k < joints; ++k) arrays_.hanging.tie(system.rows[k]);
     for (const Point& point : points_)
-        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
-    return find_islands(static_cast<int>(system.mass.size()), ties);
+        arrays_.hanging.tie(unknown_[point.contact.first], unknown_[point.contact.second]);
+    return arrays_.hanging.find();
 }
 
 int ContactStage::island_of(const Islands& islands, const Point& point) const noexcept {
@@ -198,8 +202,8 @@ bool ContactStage::stop_is_hit(const MixedSystem& system) const {
     const auto hit = [this](const RowBlock& block) { return is_hit(block); };
     if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
     if (impact_rounds_ > most_rounds(points_.size())) return false;
-    const Islands islands = hanging(system, system.rows.size());
-    std::vector<char> touched(islands.count, 0);
+    const Islands& islands = hanging(system, system.rows.size());
+    std::vector<char>& touched = filled(arrays_.blow.touched, islands.count);
     for (const Point& point : points_) touched[island_of(islands, point)] = 1;
     return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
@@ -234,11 +238,12 @@ bool ContactStage::pass_other_ends(const MixedSystem& system, std::size_t joints
 void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& who,
                              std::vector<RowBlock>& rows) const {
     if (system.rows.empty()) return;
-    const Islands islands = hanging(system, system.rows.size());
+    const Islands& islands = hanging(system, system.rows.size());
     const auto island = [&](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
-    std::vector<char> touched(islands.count, 0), struck(islands.count, 0);
+    std::vector<char>&touched = filled(arrays_.blow.touched, islands.count),
+    &struck = filled(arrays_.blow.struck, islands.count);
     for (const Point& point : points_) touched[island_of(islands, point)] = 1;
     for (const std::size_t k : who) struck[island_of(islands, points_[k])] = 1;
     for (const RowBlock& block : system.rows)
@@ -325,25 +330,26 @@ void ContactStage::lead_forces(std::size_t b, MixedSystem& system) {
 
 /// Of successive blows those to be answered next: of what may meet in this step the points that are approached, and closed
 /// when the first of them is. Free balls are led there, as to the time of a single strike.
-std::vector<std::size_t> ContactStage::earliest_blows(MixedSystem& system) {
-    std::vector<Islands::Tie> ties;
-    for (const RowBlock& block : system.rows) add_ties(block, ties);
+void ContactStage::find_earliest_blows(MixedSystem& system, std::vector<std::size_t>& who) {
+    arrays_.hanging.begin(static_cast<int>(system.mass.size()));
+    for (const RowBlock& block : system.rows) arrays_.hanging.tie(block);
     for (const Point& point : points_)
-        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
-    for (const OpenPair& open : open_) ties.push_back({unknown_[open.first], unknown_[open.second]});
-    const Islands islands = find_islands(static_cast<int>(system.mass.size()), ties);
+        arrays_.hanging.tie(unknown_[point.contact.first], unknown_[point.contact.second]);
+    for (const OpenPair& open : open_) arrays_.hanging.tie(unknown_[open.first], unknown_[open.second]);
+    const Islands& islands = arrays_.hanging.find();
     const auto is_blow = [](const Point& point) {
         return point.bounce >= 0.0 && point.approach < -point.rounding;
     };
-    std::vector<double> first(islands.count, unbounded), closing(points_.size(), unbounded);
+    std::vector<double>&first = filled(arrays_.blow.first, islands.count, unbounded),
+    &closing = filled(arrays_.blow.closing, points_.size(), unbounded);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         if (!is_blow(points_[k])) continue;
         closing[k] = closing_time(points_[k]);
         double& earliest = first[island_of(islands, points_[k])];
         earliest = std::min(earliest, closing[k]);
     }
-    std::vector<std::size_t> who;
-    std::vector<char> hit(unknown_.size(), 0), balls(islands.count, 1);
+    std::vector<char>&hit = arrays_.blow.is_hit, &balls = arrays_.blow.balls;
+    hit.assign(unknown_.size(), 0), balls.assign(islands.count, 1);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         const double now = first[island_of(islands, point)];
@@ -372,7 +378,6 @@ std::vector<std::size_t> ContactStage::earliest_blows(MixedSystem& system) {
         point.approach = relative(point, point.contact.point.normal, velocity_, false);
         if (point.event) point.bounce = point.material.restitution;
     }
-    return who;
 }
 
 void ContactStage::impact(MixedSystem& system) {
@@ -383,17 +388,19 @@ void ContactStage::impact(MixedSystem& system) {
     sunk_ = false;
     const bool successive =
         options_.impacts == ImpactOrder::successive && impact_rounds_ <= most_rounds(points_.size());
-    std::vector<std::size_t> who;
-    if (successive) who = earliest_blows(system);
+    BlowArrays& blow = arrays_.blow;
+    std::vector<std::size_t>& who = filled(blow.who, 0);
+    if (successive) find_earliest_blows(system, who);
     for (std::size_t k = 0; !successive && k < points_.size(); ++k)
         if (points_[k].bounce >= 0.0) who.push_back(k);
-    MixedSystem hit;
+    MixedSystem& hit = blow.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
+    hit.rows.clear(), hit.velocity.clear();
     take_part(system, who, hit.rows);
     const std::size_t joints = hit.rows.size();
-    std::vector<FrictionPoint> friction;
-    std::vector<std::size_t> pushed;  // rows against what moves as it is told, or along itself
+    std::vector<FrictionPoint>& friction = filled(blow.friction, 0);
+    std::vector<std::size_t>& pushed = filled(blow.pushed, 0);
     for (const std::size_t k : who) {
         const Point& point = points_[k];
         RowBlock block = row_block(point, point.material.friction > 0.0 ? 3 : 1);
@@ -408,35 +415,33 @@ void ContactStage::impact(MixedSystem& system) {
         }
         hit.rows.push_back(block);
     }
-    std::vector<Vec6> before = hit.momentum;
+    std::vector<Vec6>& before = blow.before = hit.momentum;
     for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
     // No step before has anything to say about a blow: the box takes this one's own normal impulses.
     const FrictionModel model =
         options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
     share_blow(hit, joints, who);
-    const MixedSystem start = hit;
-    const std::vector<FrictionPoint> fresh = friction;
+    blow.start = hit, blow.fresh = friction;
     hit_exactly(hit, joints, friction, model);
 
-    const Islands islands = find_islands(hit);
+    const Islands& islands = arrays_.hanging.find(hit);
     const auto island = [&islands](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
-    const std::vector<double> limit = kinetic_energy(hit, before, islands),
-                              energy = kinetic_energy(hit, hit.velocity, islands);
-    std::vector<double> share(islands.count, 1.0);  // of Newton's law, the rest plastic
-    std::vector<char> rises(islands.count, 0);
-    for (int k = 0; k < islands.count; ++k) rises[k] = energy[k] > limit[k] * (1.0 + gain);
+    find_kinetic_energy(hit, before, islands, blow.limit);
+    find_kinetic_energy(hit, hit.velocity, islands, blow.energy);
+    std::vector<double>& share = filled(blow.share, islands.count, 1.0);  // of Newton's law, the rest plastic
+    std::vector<char>& rises = filled(blow.rises, islands.count);
+    for (int k = 0; k < islands.count; ++k) rises[k] = blow.energy[k] > blow.limit[k] * (1.0 + gain);
     for (const std::size_t k : pushed) rises[island(hit.rows[k])] = 0;
-    MixedSystem plastic;
+    MixedSystem& plastic = blow.plastic;
     if (std::find(rises.begin(), rises.end(), 1) != rises.end()) {
-        plastic = start;
-        std::vector<FrictionPoint> plastic_friction = fresh;
+        plastic = blow.start, blow.plastic_friction = blow.fresh;
         for (std::size_t k = 0; k < joints; ++k)
             if (RowBlock& block = plastic.rows[k]; block.stop.row >= 0) block.right[block.stop.row] = 0.0;
         for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
-        hit_exactly(plastic, joints, plastic_friction, model);
-        blend(hit, plastic, islands, limit, rises, share);
+        hit_exactly(plastic, joints, blow.plastic_friction, model);
+        blend(blow, islands);
     }
     system.velocity = hit.velocity;
     mark_held(hit);
@@ -461,7 +466,7 @@ void ContactStage::impact(MixedSystem& system) {
 void ContactStage::after_impact(const MixedSystem& system) {
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0 && held_[unknown_[b]]) velocity_[b] = system.velocity[unknown_[b]];
-    std::vector<Vec6> next = velocity_;
+    std::vector<Vec6>& next = arrays_.blow.next = velocity_;
     for (std::size_t b = 0; b < next.size(); ++b)
         if (unknown_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], kick_[b]);
     changed_.assign(next.size(), 1);

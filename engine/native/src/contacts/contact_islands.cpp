@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <deque>
-#include <exception>
-#include <numeric>
 #include <optional>
-#include <utility>
+#include <span>
 
 #include "run/watch.hpp"
 
@@ -18,55 +15,19 @@ constexpr std::size_t few_blocks = 48;  // blocks in all: not worth other thread
 
 }  // namespace
 
-void add_ties(const RowBlock& block, std::vector<Islands::Tie>& ties) {
-    ties.push_back({block.first, block.second});
-    for (const Beyond& other : block.beyond)
-        ties.push_back({std::max(block.first, block.second), other.body});
-}
-
-Islands find_islands(const MixedSystem& system) {
-    std::vector<Islands::Tie> ties;
-    ties.reserve(system.rows.size());
-    for (const RowBlock& block : system.rows) add_ties(block, ties);
-    return find_islands(static_cast<int>(system.mass.size()), ties);
-}
-
-Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties) {
-    std::vector<int> parent(bodies);
-    std::iota(parent.begin(), parent.end(), 0);
-    auto root = [&](int b) {
-        while (parent[b] != b) b = parent[b] = parent[parent[b]];
-        return b;
-    };
-    std::vector<char> has_rows(bodies, 0);
-    for (const auto [first, second] : ties) {
-        if (first >= 0) has_rows[first] = 1;
-        if (second >= 0) has_rows[second] = 1;
-        if (first < 0 || second < 0) continue;
-        const int a = root(first), b = root(second);
-        parent[std::max(a, b)] = std::min(a, b);  // the root is the island's first body
-    }
-    Islands islands;
-    islands.of_body.assign(bodies, -1);
-    for (int b = 0; b < bodies; ++b) {
-        if (!has_rows[b]) continue;
-        const int r = root(b);
-        islands.of_body[b] = r == b ? islands.count++ : islands.of_body[r];
-    }
-    return islands;
-}
-
 /// Islands one after the other; on several threads each takes the next one that nobody has.
-void IslandSolver::solve_all(std::vector<Part>& parts, const Solve& solve) const {
+void IslandSolver::solve_all(const Solve& solve) {
+    const std::vector<Own*>& parts = open_parts_;
     std::size_t rows = 0;
-    for (const Part& part : parts) rows += part.system->rows.size();
+    for (const Own* part : parts) rows += part->system.rows.size();
     if (team == nullptr || parts.size() == 1 || rows < few_blocks) {
-        for (Part& part : parts) part.report = solve(*part.system, *part.points, *part.solver);
+        for (Own* part : parts) part->report = solve(part->system, part->points, part->solver);
         return;
     }
     std::atomic<std::size_t> next{0};
     std::atomic<bool> ended{false};
-    std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(team->size()) + 1);
+    std::vector<std::exception_ptr>& thrown = thrown_;
+    thrown.assign(static_cast<std::size_t>(team->size()) + 1, nullptr);
     const auto guarded = [&](std::size_t who, const auto& work) noexcept {
         try {
             work();
@@ -81,7 +42,7 @@ void IslandSolver::solve_all(std::vector<Part>& parts, const Solve& solve) const
                 std::optional<Watch::Helper> helper;
                 if (index > 0) helper.emplace(ended);
                 for (std::size_t k = next++; k < parts.size() && !ended; k = next++)
-                    parts[k].report = solve(*parts[k].system, *parts[k].points, *parts[k].solver);
+                    parts[k]->report = solve(parts[k]->system, parts[k]->points, parts[k]->solver);
             });
         },
         [&] {
@@ -91,26 +52,20 @@ void IslandSolver::solve_all(std::vector<Part>& parts, const Solve& solve) const
         if (what) std::rethrow_exception(what);
 }
 
-FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
-                                 const std::vector<char>* answered) {
-    const Islands islands = find_islands(system);
-    auto solver_of = [&](int first_body) -> DirectSolver& {
-        DirectSolver& solver = solvers_[first_body];
-        solver.pivot.floor = floor;
-        solver.pivot.refinements = refinements;
-        return solver;
-    };
-    if (islands.count <= 1) return solve(system, points, solver_of(0));
-    std::vector<char> open(islands.count, answered == nullptr);
-    for (std::size_t k = 0; answered && k < system.rows.size(); ++k)
-        if (!(*answered)[k]) open[islands.of_body[std::max(system.rows[k].first, system.rows[k].second)]] = 1;
+IslandSolver::Own& IslandSolver::own_of(int first_body) {
+    Own& own = own_[first_body];
+    own.solver.pivot.floor = floor;
+    own.solver.pivot.refinements = refinements;
+    return own;
+}
 
+/// Fills the parts of open islands. Bodies without rows fly freely.
+void IslandSolver::take_apart(MixedSystem& system, const Islands& islands,
+                              std::vector<FrictionPoint>& points) {
     const int bodies = static_cast<int>(system.mass.size());
-    std::vector<MixedSystem> parts(islands.count);
-    std::vector<std::vector<FrictionPoint>> part_points(islands.count);
-    std::vector<int> first_body(islands.count, -1), place(bodies, -1), row_island(system.rows.size()),
-        row_place(system.rows.size());
-    std::deque<std::vector<Beyond>> beyond;  // with the places of their bodies
+    parts_.assign(islands.count, nullptr);
+    open_parts_.clear();
+    place_.resize(bodies);
     system.velocity.resize(bodies);
     for (int b = 0; b < bodies; ++b) {
         const int island = islands.of_body[b];
@@ -119,45 +74,96 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
             solve_six(factor_six(system.mass[b]), system.velocity[b]);
             continue;
         }
-        if (!open[island]) continue;
-        if (first_body[island] < 0) first_body[island] = b;
-        place[b] = static_cast<int>(parts[island].mass.size());
-        parts[island].mass.push_back(system.mass[b]);
-        parts[island].momentum.push_back(system.momentum[b]);
-        parts[island].velocity.push_back(system.velocity[b]);
+        if (!open_[island]) continue;
+        Own*& part = parts_[island];
+        if (part == nullptr) {
+            part = &own_of(b);
+            open_parts_.push_back(part);
+            part->points.clear();
+            part->system.mass.clear(), part->system.momentum.clear();
+            part->system.velocity.clear(), part->system.rows.clear();
+        }
+        place_[b] = static_cast<int>(part->system.mass.size());
+        part->system.mass.push_back(system.mass[b]);
+        part->system.momentum.push_back(system.momentum[b]);
+        part->system.velocity.push_back(system.velocity[b]);
     }
+    row_island_.resize(system.rows.size());
+    row_place_.resize(system.rows.size());
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         const int island = islands.of_body[std::max(block.first, block.second)];
-        row_island[k] = island;
-        if (!open[island]) continue;
-        row_place[k] = static_cast<int>(parts[island].rows.size());
-        parts[island].rows.push_back(block);
-        RowBlock& copy = parts[island].rows.back();
-        if (copy.first >= 0) copy.first = place[copy.first];
-        if (copy.second >= 0) copy.second = place[copy.second];
-        if (copy.beyond.empty()) continue;
-        std::vector<Beyond>& own = beyond.emplace_back(copy.beyond.begin(), copy.beyond.end());
-        for (Beyond& other : own) other.body = place[other.body];
-        copy.beyond = own;
+        row_island_[k] = island;
+        if (!open_[island]) continue;
+        std::vector<RowBlock>& rows = parts_[island]->system.rows;
+        row_place_[k] = static_cast<int>(rows.size());
+        rows.push_back(block);
+        if (block.first >= 0) rows.back().first = place_[block.first];
+        if (block.second >= 0) rows.back().second = place_[block.second];
     }
+    for (Own* part : open_parts_) copy_rows(*part);
     for (FrictionPoint& point : points) {
-        if (!open[row_island[point.block]]) {
+        const int island = row_island_[point.block];
+        if (!open_[island]) {
             if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
             continue;
         }
-        part_points[row_island[point.block]].push_back(point);
-        part_points[row_island[point.block]].back().block = row_place[point.block];
+        parts_[island]->points.push_back(point);
+        parts_[island]->points.back().block = row_place_[point.block];
     }
+}
 
-    std::vector<Part> open_parts;
-    for (int island = 0; island < islands.count; ++island)
-        if (open[island])
-            open_parts.push_back({&parts[island], &part_points[island], &solver_of(first_body[island]), {}});
-    solve_all(open_parts, solve);
+/// Gives a part its own list of the bodies beyond the first two of its rows.
+void IslandSolver::copy_rows(Own& own) const {
+    std::size_t count = 0;
+    for (const RowBlock& block : own.system.rows) count += block.beyond.size();
+    own.beyond.resize(count);
+    auto at = own.beyond.begin();
+    for (RowBlock& block : own.system.rows) {
+        if (block.beyond.empty()) continue;
+        const auto begin = at;
+        for (const Beyond& other : block.beyond) *at++ = {place_[other.body], other.jacobian};
+        block.beyond = {begin, at};
+    }
+}
+
+/// Takes over what the parts have found.
+void IslandSolver::put_together(MixedSystem& system, const Islands& islands,
+                                std::vector<FrictionPoint>& points) {
+    for (std::size_t b = 0; b < system.mass.size(); ++b)
+        if (const int island = islands.of_body[b]; island >= 0 && open_[island])
+            system.velocity[b] = parts_[island]->system.velocity[place_[b]];
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        if (!open_[row_island_[k]]) continue;
+        const int first = system.rows[k].first, second = system.rows[k].second;
+        const std::span<const Beyond> others = system.rows[k].beyond;
+        system.rows[k] = parts_[row_island_[k]]->system.rows[row_place_[k]];
+        system.rows[k].first = first;
+        system.rows[k].second = second;
+        system.rows[k].beyond = others;
+    }
+    next_.assign(islands.count, 0);
+    for (FrictionPoint& point : points) {
+        const int island = row_island_[point.block], block = point.block;
+        if (!open_[island]) continue;
+        point = parts_[island]->points[next_[island]++];
+        point.block = block;
+    }
+}
+
+FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
+                                 const std::vector<char>* answered) {
+    const Islands& islands = finder_.find(system);
+    if (islands.count <= 1) return solve(system, points, own_of(0).solver);
+    open_.assign(islands.count, answered == nullptr);
+    for (std::size_t k = 0; answered && k < system.rows.size(); ++k)
+        if (!(*answered)[k])
+            open_[islands.of_body[std::max(system.rows[k].first, system.rows[k].second)]] = 1;
+    take_apart(system, islands, points);
+    solve_all(solve);
     FrictionReport sum;
-    for (const Part& part : open_parts) {
-        const FrictionReport& report = part.report;
+    for (const Own* part : open_parts_) {
+        const FrictionReport& report = part->report;
         sum.rounds += report.rounds;
         sum.pivots += report.pivots;
         sum.sweeps += report.sweeps;
@@ -165,42 +171,24 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         sum.converged = sum.converged && report.converged;
         sum.finite = sum.finite && report.finite;
     }
-    for (int b = 0; b < bodies; ++b)
-        if (islands.of_body[b] >= 0 && open[islands.of_body[b]])
-            system.velocity[b] = parts[islands.of_body[b]].velocity[place[b]];
-    for (std::size_t k = 0; k < system.rows.size(); ++k) {
-        if (!open[row_island[k]]) continue;
-        const int first = system.rows[k].first, second = system.rows[k].second;
-        const std::span<const Beyond> others = system.rows[k].beyond;
-        system.rows[k] = parts[row_island[k]].rows[row_place[k]];
-        system.rows[k].first = first;
-        system.rows[k].second = second;
-        system.rows[k].beyond = others;
-    }
-    std::vector<std::size_t> next(islands.count, 0);
-    for (FrictionPoint& point : points) {
-        const int island = row_island[point.block], block = point.block;
-        if (!open[island]) continue;
-        point = part_points[island][next[island]++];
-        point.block = block;
-    }
+    put_together(system, islands, points);
     return sum;
 }
 
-std::map<int, Patience> IslandSolver::patience() const {
-    std::map<int, Patience> found;
-    for (const auto& [body, solver] : solvers_) found[body] = solver.patience;
-    return found;
+void IslandSolver::patience(PatienceOf& found) const {
+    found.clear();
+    for (const auto& [body, own] : own_) found.emplace_back(body, own.solver.patience);
 }
 
-void IslandSolver::be_patient(const std::map<int, Patience>& patience) {
-    for (auto& [body, solver] : solvers_) solver.patience = {};
-    for (const auto& [body, known] : patience) solvers_[body].patience = known;
+void IslandSolver::be_patient(const PatienceOf& patience) {
+    for (auto& [body, own] : own_) own.solver.patience = {};
+    for (const auto& [body, known] : patience) own_[body].solver.patience = known;
 }
 
 BlockLdlt::Counters IslandSolver::counters() const noexcept {
     BlockLdlt::Counters sum;
-    for (const auto& [body, solver] : solvers_) {
+    for (const auto& [body, own] : own_) {
+        const DirectSolver& solver = own.solver;
         const BlockLdlt::Counters more = solver.pivot.counters();
         sum.factorisations += more.factorisations + solver.newton.factorisations();
         sum.block_operations += more.block_operations + solver.newton.block_operations();

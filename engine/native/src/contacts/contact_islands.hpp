@@ -1,33 +1,22 @@
 // Bodies that hang together by rows are solved together, the others apart.
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "contacts/friction_direct.hpp"
+#include "contacts/islands.hpp"
 #include "run/team.hpp"
 
 namespace spook {
 
-/// Island of each body of the system: islands are numbered by their first body's index, upwards from 0; a body
-/// without rows has −1. Ends that do not move (−1 in a row) join nothing, so bodies on the same ground stay apart.
-struct Islands {
-    struct Tie {
-        int first, second;
-    };
-    std::vector<int> of_body;
-    int count = 0;
-};
-/// A tie per block of rows, and one for each body beyond its first two: one of the first two always moves by itself.
-void add_ties(const RowBlock& block, std::vector<Islands::Tie>& ties);
-Islands find_islands(int bodies, const std::vector<Islands::Tie>& ties);
-Islands find_islands(const MixedSystem& system);
-
 inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
 
-/// Splits a system into its islands and solves each with a solver of its own, which keeps its analysis as long as
-/// the island does not change. Equal input gives equal bits, on however many threads islands are shared out.
+/// Splits a system into its islands and solves each with a solver and arrays of its own, which are kept from solve to
+/// solve, and the solver's analysis as long as the island does not change. Equal input gives equal bits, on however many threads islands are shared out.
 class IslandSolver {
 public:
     using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, DirectSolver&)>;
@@ -45,20 +34,33 @@ public:
     BlockLdlt::Counters counters() const noexcept;
 
     /// Of every island, by its first body.
-    std::map<int, Patience> patience() const;
-    void be_patient(const std::map<int, Patience>& patience);
+    using PatienceOf = std::vector<std::pair<int, Patience>>;
+    void patience(PatienceOf& found) const;
+    void be_patient(const PatienceOf& patience);
 
 private:
-    /// One island's part of a system.
-    struct Part {
-        MixedSystem* system;
-        std::vector<FrictionPoint>* points;
-        DirectSolver* solver;
+    /// What an island has from solve to solve: its solver, its part of the system, and what became of it.
+    struct Own {
+        DirectSolver solver;
+        MixedSystem system;
+        std::vector<FrictionPoint> points;
+        std::vector<Beyond> beyond;  // of its rows, with the places of their bodies
         FrictionReport report;
     };
-    void solve_all(std::vector<Part>& parts, const Solve& solve) const;
+    Own& own_of(int first_body);
+    void take_apart(MixedSystem& system, const Islands& islands, std::vector<FrictionPoint>& points);
+    void copy_rows(Own& own) const;
+    void put_together(MixedSystem& system, const Islands& islands, std::vector<FrictionPoint>& points);
+    void solve_all(const Solve& solve);
 
-    std::map<int, DirectSolver> solvers_;  // by the island's first body
+    std::map<int, Own> own_;  // by the island's first body
+    IslandFinder finder_;
+    // Of one run:
+    std::vector<char> open_;                           // islands to be solved
+    std::vector<Own*> parts_, open_parts_;             // of each island, null where it is not; of those alone
+    std::vector<int> place_, row_island_, row_place_;  // of bodies and rows in their island's part
+    std::vector<std::size_t> next_;
+    std::vector<std::exception_ptr> thrown_;
 };
 
 }  // namespace spook

@@ -86,6 +86,19 @@ bool ContactStage::find_more() {
     return true;
 }
 
+/// Touches by key; those of one key as they came.
+void ContactStage::order_touches() {
+    const auto in_order = [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; };
+    if (std::is_sorted(touches_.begin(), touches_.end(), in_order)) return;
+    places_.clear();
+    for (std::size_t k = 0; k < touches_.size(); ++k) places_.emplace_back(touches_[k].contact.key, k);
+    std::sort(places_.begin(), places_.end());
+    unordered_.clear();
+    unordered_.reserve(touches_.capacity());
+    for (const auto& [key, place] : places_) unordered_.push_back(touches_[place]);
+    touches_.swap(unordered_);
+}
+
 /// Hands the points found since `known` to the sweeps, with what they did in the step before.
 void ContactStage::take_in(std::size_t known) {
     counters_.contacts += points_.size() - known;
@@ -123,22 +136,23 @@ bool ContactStage::is_settled(MixedSystem& system) {
 }
 
 /// The islands of the points, and which of them have points from `known` on: no solve has answered those yet.
-ContactStage::Unanswered ContactStage::find_unanswered(std::size_t bodies, std::size_t known) const {
-    std::vector<Islands::Tie> ties;
-    ties.reserve(points_.size());
+const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies, std::size_t known) {
+    arrays_.hanging.begin(static_cast<int>(bodies));
     for (const Point& point : points_)
-        ties.push_back({unknown_[point.contact.first], unknown_[point.contact.second]});
-    const Islands islands = find_islands(static_cast<int>(bodies), ties);
-    Unanswered found;
+        arrays_.hanging.tie(unknown_[point.contact.first], unknown_[point.contact.second]);
+    const Islands& islands = arrays_.hanging.find();
+    Unanswered& found = unanswered_;
     found.open.assign(islands.count, 0);
-    std::vector<std::size_t> points(islands.count, 0);
-    for (std::size_t k = 0; k < ties.size(); ++k) {
-        found.island.push_back(islands.of_body[std::max(ties[k].first, ties[k].second)]);
-        ++points[found.island[k]];
+    found.points.assign(islands.count, 0);
+    found.island.clear();
+    found.largest = 0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        found.island.push_back(island_of(islands, points_[k]));
+        ++found.points[found.island[k]];
         if (k >= known) found.open[found.island[k]] = 1;
     }
     for (int k = 0; k < islands.count; ++k)
-        if (found.open[k]) found.largest = std::max(found.largest, points[k]);
+        if (found.open[k]) found.largest = std::max(found.largest, found.points[k]);
     return found;
 }
 
@@ -163,7 +177,7 @@ void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
     std::fill(sinking_.begin(), sinking_.end(), 0.0);
     if (!report.finite) return;
     foreseen_ = true;
-    const Unanswered islands = find_unanswered(system.mass.size(), known);
+    const Unanswered& islands = find_unanswered(system.mass.size(), known);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         if (!islands.open[islands.island[k]]) continue;
         Point& point = points_[k];
@@ -219,10 +233,12 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     if (left) return true;
     counters_.unsettled += !report.converged;
 
-    std::vector<double> share;
+    std::vector<double>& share = arrays_.share;
+    share.clear();
     if (!report.converged) {
         if (unsettled_body_ < 0) blame_sunk();
-        std::vector<char> pushes;
+        std::vector<char>& pushes = arrays_.pushes;
+        pushes.clear();
         for (std::size_t k = 0; k < points_.size(); ++k) {
             const double* z = sweeps_.impulse(static_cast<int>(k));
             pushes.push_back(std::any_of(z, z + 3, [](double each) { return each != 0.0; }));
@@ -248,8 +264,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;
     }
     if (report.finite) correct_events(system);
-    std::stable_sort(touches_.begin(), touches_.end(),
-                     [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; });
+    order_touches();
     return report.finite;
 }
 

@@ -164,17 +164,14 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
                                      std::vector<double>& share) const {
     const std::size_t bodies = system.mass.size();
     share.assign(bodies, 1.0);
-    std::vector<Islands::Tie> ties;
-    for (std::size_t k = 0; k < joints; ++k) add_ties(system.rows[k], ties);
+    arrays_.shortened.begin(static_cast<int>(bodies));
+    for (std::size_t k = 0; k < joints; ++k) arrays_.shortened.tie(system.rows[k]);
     for (std::size_t k = 0; k < points_.size(); ++k)
         if (pushes[k])
-            ties.push_back({unknown_[points_[k].contact.first], unknown_[points_[k].contact.second]});
-    const Islands islands = find_islands(static_cast<int>(bodies), ties);
-    struct Sums {
-        double square = 0.0, linear = 0.0, fall = 0.0;  // E₊ − E = square s² + linear s − fall
-        bool driven = false;
-    };
-    std::vector<Sums> sums(islands.count);
+            arrays_.shortened.tie(unknown_[points_[k].contact.first], unknown_[points_[k].contact.second]);
+    const Islands& islands = arrays_.shortened.find();
+    std::vector<EnergySums>& sums = arrays_.sums;
+    sums.assign(islands.count, {});
     const auto driven = [&](int first, int second) {
         sums[islands.of_body[std::max(first, second)]].driven = true;
     };
@@ -184,14 +181,15 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
         if (pushes[k] && (is_supplied(point.contact) || point.material.compliance > 0.0))
             driven(unknown_[point.contact.first], unknown_[point.contact.second]);
     }
-    std::vector<Vec6> free = system.momentum;
+    std::vector<Vec6>& free = arrays_.free_velocity;
+    free = system.momentum;
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         const int u = unknown_[b];
         if (u < 0 || islands.of_body[u] < 0) continue;
         solve_six(factor_six(system.mass[u]), free[u]);
         const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
                    kick = sum(free[u], velocity_[b], -1.0);
-        Sums& own = sums[islands.of_body[u]];
+        EnergySums& own = sums[islands.of_body[u]];
         for (int i = 0; i < 6; ++i)
             for (int j = 0; j < 6; ++j) {
                 const double m = system.mass[u][6 * i + j];

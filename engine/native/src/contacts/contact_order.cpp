@@ -34,10 +34,11 @@ void ContactStage::find_events() {
     for (const auto& [a, b] : joints_)
         if (a >= 0 && b >= 0) join(a, b);
 
-    std::vector<std::size_t> members(unknown_.size(), 0);
-    std::vector<std::uint64_t> struck(unknown_.size(), 0);  // the pair of the island's strike, plus one
-    std::vector<char> plain(unknown_.size(), 1), bouncy(unknown_.size(), 0);
-    std::vector<double> when(unknown_.size(), -1.0);
+    auto& [members, struck, plain, bouncy, when, speed] = arrays_.events;
+    members.assign(unknown_.size(), 0);
+    struck.assign(unknown_.size(), 0);
+    plain.assign(unknown_.size(), 1), bouncy.assign(unknown_.size(), 0);
+    when.assign(unknown_.size(), -1.0);
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0) {
             const int island = root(static_cast<int>(b));
@@ -61,7 +62,7 @@ void ContactStage::find_events() {
     }
     // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
     // others will: bodies led to an event's time would not be where such rows expect them.
-    std::vector<double> speed(unknown_.size(), 0.0);
+    speed.assign(unknown_.size(), 0.0);
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         double& fastest = speed[unknown_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
         fastest = std::max(fastest, norm(linear(predicted_[b])));
@@ -98,6 +99,7 @@ void ContactStage::order_points() {
         for (std::size_t k = 0; k < points_.size(); ++k) places_[k] = {points_[k].contact.key, k};
         std::sort(places_.begin(), places_.end());
         strikes_.clear();
+        strikes_.reserve(points_.capacity());
         for (const auto& [key, place] : places_) strikes_.push_back(points_[place]);
         points_.swap(strikes_);
     }

@@ -1,5 +1,6 @@
 // The contact stage's last part: which bodies overlap where the step ends, and by which displacements they part.
 #include <algorithm>
+#include <functional>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
@@ -42,14 +43,14 @@ double ContactStage::pressed(const MixedSystem& system, const Point& point) cons
 
 /// What a contact yields, 1/kg, per moving body on either side. A light body that is jointed to a heavy one, or touches
 /// one, must not be what gives way in its stead: a contact that is soft against the heavier side lifts nothing.
-std::vector<double> ContactStage::find_gives(const MixedSystem& parting) const {
-    const Islands hanging = find_islands(parting);
-    std::vector<double> mass(hanging.count, 0.0), give(parting.mass.size(), 0.0);
+void ContactStage::find_gives(const MixedSystem& parting) {
+    const Islands& hanging = arrays_.hanging.find(parting);
+    std::vector<double>&mass = arrays_.island_mass, &give = gives_;
+    mass.assign(hanging.count, 0.0), give.assign(parting.mass.size(), 0.0);
     for (std::size_t b = 0; b < give.size(); ++b)
         if (hanging.of_body[b] >= 0) mass[hanging.of_body[b]] += parting.mass[b][0];
     for (std::size_t b = 0; b < give.size(); ++b)
         give[b] = contact_give / (hanging.of_body[b] >= 0 ? mass[hanging.of_body[b]] : parting.mass[b][0]);
-    return give;
 }
 
 double ContactStage::give_of(const Contact& contact, const std::vector<double>& gives) const noexcept {
@@ -100,17 +101,18 @@ void ContactStage::find_given() {
 /// Takes down what is left of it, at most what it was.
 void ContactStage::note_given() {
     if (given_.empty()) return;
-    std::map<std::uint64_t, double> left;
+    DepthOfPair& left = arrays_.left;
+    left.clear();
     for (const Touch& touch : kept_)
         if (const auto given = given_.find(touch.contact.key >> feature_bits); given != given_.end())
-            left.insert(*given);
+            left[given->first] = given->second;
     for (const Point& lap : laps_) {
         const auto given = given_.find(lap.contact.key >> feature_bits);
         if (!(lap.push > 0.0) || given == given_.end()) continue;
         double& depth = left[given->first];
         depth = std::max(depth, std::min(lap.push, given->second));
     }
-    given_ = std::move(left);
+    given_ = left;
 }
 
 /// Pairs without points, near enough to what parts, or to who that pushes, to be pushed into each other: one neighbour
@@ -119,7 +121,8 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
                                const std::function<double(int)>& moved) {
     beside_.clear();
     seams_.clear();
-    std::vector<char> reached(unknown_.size(), 0);  // in which round, from one on
+    std::vector<char>& reached = arrays_.reached;  // in which round, from one on
+    reached.assign(unknown_.size(), 0);
     char round = 1;
     const auto reach = [&](int b) {
         if (reached[b] || unknown_[b] < 0) return;
@@ -243,7 +246,7 @@ ContactStage::Point& ContactStage::add_lap(const Contact& contact, const std::ve
 double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin, bool again) {
     laps_.clear();
     const std::vector<double>& radius = detection_.radius();
-    const std::function<double(int)> moved = [&](int b) {
+    const auto moved = [&](int b) {
         double turned = 0.0;
         for (int i = 0; i < 9; ++i)
             turned = std::max(turned, std::abs(poses[b].rotation.m[i] - poses_[b].rotation.m[i]));
@@ -280,7 +283,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
         }
     }
     // Sweeps part once, nearly: with more rows they come less far, and the next step sees who was pushed aside.
-    if (!again && margin > 0.0 && !parts_by_sweeps()) find_beside(poses, margin, moved);
+    if (!again && margin > 0.0 && !parts_by_sweeps()) find_beside(poses, margin, std::cref(moved));
     if (again || margin > 0.0) deepest = std::max(deepest, find_overlaps_beside(poses, margin));
     return deepest;
 }
@@ -296,15 +299,15 @@ double ContactStage::parting_speed(const Point& lap, bool again) const {
 
 /// Who is to be seen as one: contacts that pushed aside are given; contacts that push, whose laws a turn of some of
 /// their bodies would break, joints and the ground are added.
-void ContactStage::note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties) {
+void ContactStage::note_parted(const MixedSystem& parting) {
     for (const Touch& touch : touches_)
         if (touch.normal > 0.0 || touch.impact > 0.0)
-            ties.push_back({unknown_[touch.contact.first], unknown_[touch.contact.second]});
-    for (const RowBlock& block : parting.rows) add_ties(block, ties);
+            arrays_.parted.tie(unknown_[touch.contact.first], unknown_[touch.contact.second]);
+    for (const RowBlock& block : parting.rows) arrays_.parted.tie(block);
     parting_.velocity = parting.velocity;
-    parting_.islands = find_islands(static_cast<int>(parting.mass.size()), ties);
+    parting_.islands = arrays_.parted.find();
     parting_.grounded.assign(parting_.islands.count, 0);
-    for (const auto [first, second] : ties) {
+    for (const auto [first, second] : arrays_.parted.ties()) {
         const int body = std::max(first, second);
         if (std::min(first, second) < 0 && body >= 0) parting_.grounded[parting_.islands.of_body[body]] = 1;
     }
@@ -340,22 +343,22 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     parting.rows.assign(system.rows.begin(), system.rows.begin() + static_cast<std::ptrdiff_t>(joints));
     gives_.clear();
     if (joints > 0) {
-        gives_ = find_gives(parting);
+        find_gives(parting);
         double least = unbounded;
         for (const Point& lap : laps_) least = std::min(least, give_of(lap.contact, gives_));
         hold_joints(parting, least);
     }
-    std::vector<Islands::Tie> ties;
-    if (!(parts_by_sweeps() ? part_by_sweeps(parting, ties, again) : part_directly(parting, ties, again)))
-        return false;
-    note_parted(parting, ties);
+    arrays_.parted.begin(static_cast<int>(parting.mass.size()));
+    if (!(parts_by_sweeps() ? part_by_sweeps(parting, again) : part_directly(parting, again))) return false;
+    note_parted(parting);
     if (!again) note_given();
     return true;
 }
 
-bool ContactStage::part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again) {
+bool ContactStage::part_directly(MixedSystem& parting, bool again) {
     const std::size_t joints = parting.rows.size();
-    std::vector<char> answered(joints, 1);  // where nothing overlaps, nothing is displaced
+    std::vector<char>& answered = arrays_.answered;
+    answered.assign(joints, 1);  // where nothing overlaps, nothing is displaced
     for (const Point& lap : laps_) {
         answered.push_back(!(parting_speed(lap, again) > 0.0));
         RowBlock block = row_block(lap, 1);
@@ -369,12 +372,12 @@ bool ContactStage::part_directly(MixedSystem& parting, std::vector<Islands::Tie>
     if (!run(parting, none, parting_solver_, options_.friction, &answered).finite) return false;
     for (std::size_t k = joints; k < parting.rows.size(); ++k)
         if (parting.rows[k].multiplier[0] != 0.0)
-            ties.push_back({parting.rows[k].first, parting.rows[k].second});
+            arrays_.parted.tie(parting.rows[k].first, parting.rows[k].second);
     parting.rows.resize(joints);
     return true;
 }
 
-bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again) {
+bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
     parting_sweeps_.start_beside(sweeps_, parting, options_.friction);
     for (const Point& lap : laps_) {
         SweepContact row;
@@ -402,7 +405,7 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie
             std::lower_bound(touches_.begin(), touches_.end(), contact.key,
                              [](const Touch& t, std::uint64_t key) { return t.contact.key < key; });
         if (touch != touches_.end() && touch->contact.key == contact.key) touch->parting = impulse;
-        if (impulse != 0.0) ties.push_back({unknown_[contact.first], unknown_[contact.second]});
+        if (impulse != 0.0) arrays_.parted.tie(unknown_[contact.first], unknown_[contact.second]);
     }
     return true;
 }

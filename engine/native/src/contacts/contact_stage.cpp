@@ -42,15 +42,16 @@ bool is_finite(const MixedSystem& system) {
 /// rubbing turn it alike, more of them go in circles, and a direct solve costs little.
 FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, double enough,
                               MixedSystem& island, std::vector<FrictionPoint>& points, DirectSolver& solver) {
-    MixedSystem start = island;
-    std::vector<FrictionPoint> fresh = points;
+    static thread_local MixedSystem start;  // their memory outlives a solve
+    static thread_local std::vector<FrictionPoint> fresh;
+    start = island, fresh = points;
     FrictionReport report = sweep(o, model, island, points, solver);
     if (!report.finite || report.converged) return report;
     const double left = rows_residual(island, points, model).residual;
     if (!(left > enough)) return report;
     const FrictionReport direct = solve_friction_direct(start, fresh, model, solver);
     if (direct.finite && is_finite(start) && rows_residual(start, fresh, model).residual < left) {
-        island = std::move(start), points = std::move(fresh);
+        island = start, points = fresh;
         for (const FrictionPoint& point : points)  // what is left is the direct solver's own
             for (int i = point.row; i < point.row + point.size; ++i)
                 island.rows[point.block].softness[i] = point.slip_softness;
@@ -185,16 +186,14 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
     const bool exact = &islands == &impact_solver_ || by_rows_;
     const double enough = exact ? o.residual_tolerance : o.unsettled_residual;
     const bool foreseen = foreseen_ && &islands == &resting_solver_;
-    const FrictionReport report = islands.run(
-        system, points,
-        [&o, model, enough, foreseen](MixedSystem& island, std::vector<FrictionPoint>& own,
-                                      DirectSolver& solver) {
-            solver.foreseen = foreseen;
-            if (o.solver == SolverKind::direct) return solve_friction_direct(island, own, model, solver);
-            if (island.rows.size() > few_rows) return sweep(o, model, island, own, solver);
-            return sweep_or_solve(o, model, enough, island, own, solver);
-        },
-        answered);
+    const auto solve = [&o, model, enough, foreseen](MixedSystem& island, std::vector<FrictionPoint>& own,
+                                                     DirectSolver& solver) {
+        solver.foreseen = foreseen;
+        if (o.solver == SolverKind::direct) return solve_friction_direct(island, own, model, solver);
+        if (island.rows.size() > few_rows) return sweep(o, model, island, own, solver);
+        return sweep_or_solve(o, model, enough, island, own, solver);
+    };
+    const FrictionReport report = islands.run(system, points, std::cref(solve), answered);
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;
     counters_.sweeps += report.sweeps;
@@ -290,10 +289,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         const bool finite = solve_by_sweeps(system, left);
         if (!left) return finite;
     }
-    std::vector<FrictionPoint> friction;
-    std::vector<Vec6> next;
+    std::vector<FrictionPoint>& friction = arrays_.friction;
+    std::vector<Vec6>& next = next_;
     FrictionReport report;
-    std::vector<char> answered;  // per row: the round before found it an answer
+    std::vector<char>& answered = arrays_.answered;
     for (int round = 0;; ++round) {
         system.rows.resize(joints);
         friction.clear();
@@ -339,8 +338,9 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     mark_held(system);  // the last round may have brought rows to bodies that had none
     judge(system, friction, report);
     if (!report.converged) {
-        std::vector<double> share;
-        std::vector<char> pushes;
+        std::vector<double>& share = arrays_.share;
+        std::vector<char>& pushes = arrays_.pushes;
+        pushes.clear();
         for (std::size_t k = joints; k < system.rows.size(); ++k) {
             const auto& z = system.rows[k].multiplier;
             pushes.push_back(std::any_of(z.begin(), z.begin() + system.rows[k].size,

@@ -51,12 +51,12 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <vector>
 
 #include "collision/detection.hpp"
 #include "collision/sweep.hpp"
+#include "contacts/contact_arrays.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_material.hpp"
 #include "contacts/contact_sweeps.hpp"
@@ -212,21 +212,16 @@ public:
         std::vector<Touch> touches, kept;
         std::vector<char> asleep;
         ContactCounters counters;
-        std::map<int, Patience> resting, impact, parting;
-        std::map<std::uint64_t, double> given;
+        IslandSolver::PatienceOf resting, impact, parting;
+        DepthOfPair given;
         bool begun = false, by_rows = false;
     };
-    Memory memory() const {
-        return {touches_,
-                kept_,
-                asleep_,
-                counters_,
-                resting_solver_.patience(),
-                impact_solver_.patience(),
-                parting_solver_.patience(),
-                given_,
-                begun_,
-                by_rows_};
+    void keep(Memory& memory) const {
+        memory.touches = touches_, memory.kept = kept_, memory.asleep = asleep_, memory.counters = counters_;
+        resting_solver_.patience(memory.resting);
+        impact_solver_.patience(memory.impact);
+        parting_solver_.patience(memory.parting);
+        memory.given = given_, memory.begun = begun_, memory.by_rows = by_rows_;
     }
     void remember(const Memory& memory) {
         touches_ = memory.touches, counters_ = memory.counters;
@@ -318,13 +313,13 @@ private:
                     bool only_prescribed) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
                        FrictionModel model, const std::vector<char>* answered = nullptr);
-    Islands hanging(const MixedSystem& system, std::size_t joints) const;
+    const Islands& hanging(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
     bool is_hit(const RowBlock& block) const noexcept;
     bool stop_is_hit(const MixedSystem& system) const;
     bool stop_comes_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     bool pass_other_ends(const MixedSystem& system, std::size_t joints);
-    std::vector<std::size_t> earliest_blows(MixedSystem& system);
+    void find_earliest_blows(MixedSystem& system, std::vector<std::size_t>& who);
     void lead_forces(std::size_t body, MixedSystem& system);
     Vec6 way_until(std::size_t body, double time) const;
     double gap_at(const Point& point, double time) const;
@@ -357,11 +352,13 @@ private:
     bool solve_by_sweeps(MixedSystem& system, bool& left);
     void foresee(MixedSystem& system, std::size_t known, int round);
     struct Unanswered {
-        std::vector<int> island;  // of each point
-        std::vector<char> open;   // islands to be solved
-        std::size_t largest = 0;  // points of one of those
+        std::vector<int> island;          // of each point
+        std::vector<char> open;           // islands to be solved
+        std::vector<std::size_t> points;  // of each
+        std::size_t largest = 0;          // points of one of those
     };
-    Unanswered find_unanswered(std::size_t bodies, std::size_t known) const;
+    const Unanswered& find_unanswered(std::size_t bodies, std::size_t known);
+    void order_touches();
     bool find_more();
     void take_in(std::size_t known);
     void note_sinking();
@@ -385,12 +382,12 @@ private:
     bool keep_parted(const std::vector<Pose>& poses);
     bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
     double parting_speed(const Point& lap, bool again) const;
-    bool part_directly(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
-    bool part_by_sweeps(MixedSystem& parting, std::vector<Islands::Tie>& ties, bool again);
-    std::vector<double> find_gives(const MixedSystem& parting) const;
+    bool part_directly(MixedSystem& parting, bool again);
+    bool part_by_sweeps(MixedSystem& parting, bool again);
+    void find_gives(const MixedSystem& parting);
     double give_of(const Contact& contact, const std::vector<double>& gives) const noexcept;
     void hold_joints(MixedSystem& parting, double least) const;
-    void note_parted(const MixedSystem& parting, std::vector<Islands::Tie>& ties);
+    void note_parted(const MixedSystem& parting);
     bool is_supplied(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
     double explained_depth(const Point& point) const noexcept;
@@ -420,15 +417,19 @@ private:
     MixedSystem parting_system_;
     Parting parting_;
     std::vector<char> yielding_;
-    std::vector<double> gives_;              // of contacts of jointed bodies, see find_gives(), 1/kg
-    LargeArray<Point> laps_, parted_;        // points of the step's pairs where it ends; of all its partings
-    std::vector<Pose> lap_poses_;            // where bodies were at the last of them
-    std::map<std::uint64_t, double> given_;  // by pair: overlap the scene began with, as far as it is left, m
-    bool begun_ = false;                     // whether it is known
+    std::vector<double> gives_;        // of contacts of jointed bodies, see find_gives(), 1/kg
+    LargeArray<Point> laps_, parted_;  // points of the step's pairs where it ends; of all its partings
+    std::vector<Pose> lap_poses_;      // where bodies were at the last of them
+    DepthOfPair given_;                // by pair: overlap the scene began with, as far as it is left, m
+    bool begun_ = false;               // whether it is known
     bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly
     std::vector<Vec6> next_;     // velocities between sweeps, per body of the scene
     std::vector<char> changed_;  // who has another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
+    Unanswered unanswered_;
+    std::vector<Touch> unordered_;
+    LargeArray<OpenPair> merged_;
+    mutable ContactArrays arrays_;  // what is in them is of one call
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with

@@ -405,11 +405,11 @@ void ContactSweeps::write(MixedSystem& system) const {
 
 RowsResidual ContactSweeps::worst(double focus) {
     done_ += measuring * static_cast<double>(bodies_of_.size());
-    std::vector<RowsResidual> found(parts_.size(), {0.0, -1});
     all_touched_ = all_touched_ || joint_count_ > 0;  // whose rows may have moved others
     residual_.resize(contacts_.size());
+    for (Part& part : parts_) part.worst = {0.0, -1};
     share_out(team_, contacts_.size(), worth_threads, [&](int part, std::size_t begin, std::size_t end) {
-        found[part] = worst_of(parts_[part], begin, end, focus);
+        parts_[part].worst = worst_of(parts_[part], begin, end, focus);
     });
     std::fill(touched_.begin(), touched_.end(), 0);
     all_touched_ = false;
@@ -417,7 +417,8 @@ RowsResidual ContactSweeps::worst(double focus) {
     for (std::size_t k = 0; k < parts_.size(); ++k) {
         for (const int contact : parts_[k].off) heat(contacts_[contact].first, contacts_[contact].second);
         parts_[k].off.clear();
-        if (!(found[k].residual <= worst.residual) && !std::isnan(worst.residual)) worst = found[k];
+        const RowsResidual& found = parts_[k].worst;
+        if (!(found.residual <= worst.residual) && !std::isnan(worst.residual)) worst = found;
     }
     return worst;
 }

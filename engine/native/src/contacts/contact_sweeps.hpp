@@ -95,6 +95,7 @@ private:
         std::vector<double> change;  // by root
         std::vector<const Due*> picked;
         std::vector<int> off;  // contacts that worst() found far off
+        RowsResidual worst;    // of its share
         SweptContact none{};   // fills a group
     };
     void note(Part& part, const Due& due, double change, double focus) noexcept;

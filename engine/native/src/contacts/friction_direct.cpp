@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "contacts/friction_acceleration.hpp"
 #include "contacts/friction_sweeps.hpp"
@@ -38,6 +37,30 @@ constexpr Effort quick{4, 4, 1};         // what rests or moves on as it did is 
 constexpr Effort small{12, 20, 1};       // nine systems in ten of few blocks settle
 constexpr Effort polish{6, 8, 1, true};  // after Newton's method
 
+/// What rounds change of a system.
+struct Answer {
+    std::vector<RowBlock> rows;
+    std::vector<Vec6> velocity;
+    std::vector<FrictionPoint> points;
+    FrictionReport report;
+};
+
+/// What a solve needs besides what it gives. One per thread: its memory outlives a solve, its values do not.
+struct Work {
+    MixedSystem start, best;  // as it was, and the best end of Newton's method
+    std::vector<FrictionPoint> start_points, swept_points;
+    Answer answer;
+    Acceleration acceleration;
+    std::vector<Mat6> mass_factor;
+    std::vector<Vec6> free_velocity, missing;
+    std::vector<double> scale, used, given;
+};
+
+Work& work() {
+    static thread_local Work own;
+    return own;
+}
+
 void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexcept {
     for (int i = point.row; i < point.row + point.size; ++i) {
         block.lower[i] = -bound;
@@ -47,7 +70,8 @@ void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexc
 
 /// Turns first tangents along the slip that would be without any constraint force.
 void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPoint>& points) {
-    std::vector<Vec6> free_velocity = system.momentum;
+    std::vector<Vec6>& free_velocity = work().free_velocity;
+    free_velocity = system.momentum;
     for (std::size_t b = 0; b < system.mass.size(); ++b)
         solve_six(factor_six(system.mass[b]), free_velocity[b]);
     for (const FrictionPoint& point : points) {
@@ -118,15 +142,16 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
         solve_six(factor_six(start.mass[b]), v);
         speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
     }
-    std::vector<FrictionPoint> swept_points = points;
+    std::vector<FrictionPoint>& swept_points = work().swept_points;
+    swept_points = points;
     const FrictionReport sweeps = solve_iterative(start, swept_points, model, 1000, 1e-10 * speed);
     report.sweeps += sweeps.sweeps;
     report.finite = report.finite || sweeps.finite;
     if (!sweeps.converged && report.residual <= poor) return;
     report.converged = sweeps.converged;
     report.residual = sweeps.residual;
-    system = std::move(start);
-    points = std::move(swept_points);
+    system = start;
+    points = swept_points;
 }
 
 /// Whether the system is one for Newton's method on the cone.
@@ -177,8 +202,10 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             for (int i = point.row; i < point.row + point.size; ++i)
                 system.rows[point.block].state[i] = RowState::free;
     }
-    std::vector<Mat6> mass_factor;
-    std::vector<double> scale(points.size(), 1.0);
+    std::vector<Mat6>& mass_factor = work().mass_factor;
+    std::vector<double>& scale = work().scale;
+    mass_factor.clear();
+    scale.assign(points.size(), 1.0);
     if (model == FrictionModel::cone) {
         if (!effort.near) turn_along_predicted_slip(system, points);
         for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
@@ -188,22 +215,19 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     if (effort.near) start_near(system, points, scale);
 
     bool same_matrix = false;
-    Acceleration acceleration;
+    Acceleration& acceleration = work().acceleration;
+    acceleration.begin();
     double accepted = settled;
     int lost = 0;
-    struct Answer {  // what rounds change of a system
-        std::vector<RowBlock> rows;
-        std::vector<Vec6> velocity;
-        std::vector<FrictionPoint> points;
-        FrictionReport report;
-    };
-    std::optional<Answer> answer;  // accepted; the next round may find it to rounding
-    std::vector<double> used(points.size()), given(points.size());
+    Answer& answer = work().answer;
+    bool answered = false;  // accepted; the next round may find it to rounding
+    std::vector<double>&used = work().used, &given = work().given;
+    used.resize(points.size()), given.resize(points.size());
     if (model == FrictionModel::cone) solver.round_limit = effort.pivots;
     for (int round = 0; round < effort.rounds; ++round) {
         for (const FrictionPoint& point : points)
             bound_rows(system.rows[point.block], point, point.coefficient * std::max(0.0, point.normal));
-        if (!solve(same_matrix) && !answer) return false;
+        if (!solve(same_matrix) && !answered) return false;
         same_matrix = true;
 
         // Contradicting rigid contacts leave residuals that no round removes: ask less after 25 rounds.
@@ -234,17 +258,21 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
         const bool is_answer = report.residual <= accepted && report.converged;
         if (is_answer && report.residual <= exact) return true;
-        if (answer && !(is_answer && report.residual <= falling * answer->report.residual)) {
-            if (!is_answer || report.residual > answer->report.residual) {
+        if (answered && !(is_answer && report.residual <= falling * answer.report.residual)) {
+            if (!is_answer || report.residual > answer.report.residual) {
                 const int rounds = report.rounds, pivots = report.pivots;
-                system.rows = std::move(answer->rows), system.velocity = std::move(answer->velocity);
-                points = std::move(answer->points);
-                report = answer->report;
+                system.rows = answer.rows, system.velocity = answer.velocity;
+                points = answer.points;
+                report = answer.report;
                 report.rounds = rounds, report.pivots = pivots;
             }
             return true;
         }
-        if (is_answer) answer.emplace(Answer{system.rows, system.velocity, points, report});
+        if (is_answer) {
+            answered = true;
+            answer.rows = system.rows, answer.velocity = system.velocity;
+            answer.points = points, answer.report = report;
+        }
         lost = report.converged ? 0 : lost + 1;
         if (lost >= effort.lost) break;
         if (points.empty() || model == FrictionModel::box) {
@@ -252,12 +280,12 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             break;
         }
         if (round < plain_rounds) continue;
-        const std::vector<double> next = acceleration.next(used, given);
+        const std::vector<double>& next = acceleration.next(used, given);
         for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
     }
-    if (answer) {  // the last round's
-        points = std::move(answer->points);
-        report = answer->report;
+    if (answered) {  // the last round's
+        points = answer.points;
+        report = answer.report;
         return true;
     }
     report.converged = false;
@@ -269,8 +297,9 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                     DirectSolver& direct, FrictionReport& report) {
     if (direct.patience.waits()) return false;
-    MixedSystem start = system;
-    const std::vector<FrictionPoint> start_points = points;
+    MixedSystem& start = work().start;
+    std::vector<FrictionPoint>& start_points = work().start_points;
+    start = system, start_points = points;
     const FrictionReport before = report;
     const Effort& effort = system.rows.size() <= few_blocks ? small : quick;
     if (settle_by_rounds(system, points, model, direct.pivot, effort, report)) {
@@ -278,7 +307,7 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
         return true;
     }
     direct.patience.failed();
-    system = std::move(start);
+    system = start;
     points = start_points;
     const int rounds = report.rounds, pivots = report.pivots;
     report = before;
@@ -292,8 +321,9 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
 /// poor, and the system as it was.
 bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                      DirectSolver& direct, FrictionReport& report) {
-    MixedSystem start = system, best;
-    const std::vector<FrictionPoint> start_points = points;
+    MixedSystem &start = work().start, &best = work().best;
+    std::vector<FrictionPoint>& start_points = work().start_points;
+    start = system, start_points = points;
     report.residual = unbounded;
     const bool few = start.rows.size() <= few_blocks;
     for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : near)); ++turn) {
@@ -305,11 +335,10 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
             best = system;
         }
     }
-    system = std::move(best);
+    system = best;
     for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
     report.converged = report.residual <= fair;
     if (!points.empty() && few) {
-        MixedSystem newton = system;
         FrictionReport polished;
         const bool settled = settle_by_rounds(system, points, model, direct.pivot, polish, polished);
         report.rounds += polished.rounds;
@@ -319,12 +348,12 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
             report.converged = true;
             return true;
         }
-        system = std::move(newton);
+        system = best;
         points = start_points;
         for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
     }
     if (report.residual <= poor) return true;
-    system = std::move(start);
+    system = start;
     points = start_points;
     return false;
 }
@@ -342,7 +371,8 @@ bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& po
             largest = std::max(largest, std::abs(block.multiplier[i]));
         }
     if (largest == 0.0) return false;
-    std::vector<Vec6> missing = system.momentum;  // p + Gᵀ z − M v
+    std::vector<Vec6>& missing = work().missing;  // p + Gᵀ z − M v
+    missing = system.momentum;
     double speed = 0.0;
     for (std::size_t b = 0; b < missing.size(); ++b)
         for (int a = 0; a < 6; ++a) {
@@ -369,7 +399,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
                                      FrictionModel model, DirectSolver& direct, int max_rounds) {
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
-    MixedSystem start;
+    MixedSystem& start = work().start;
     const Effort patient{max_rounds};
     if (is_for_newton(system, points, model)) {
         const bool near_none = direct.foreseen && system.rows.size() > few_blocks;
@@ -378,6 +408,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
         start = system;
         report.residual = unbounded;
     } else {
+        start.rows.clear();
         if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
                                            [](const RowBlock& block) { return block.lower[0] == 0.0; }))
             start = system;

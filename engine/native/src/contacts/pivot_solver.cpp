@@ -43,43 +43,65 @@ void solve_six(const Mat6& l, Vec6& x) noexcept {
         for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
 }
 
-bool PivotSolver::analyse(const MixedSystem& system) {
-    const int bodies = static_cast<int>(system.mass.size());
-    std::vector<Pattern> pattern(system.rows.size());
-    for (std::size_t k = 0; k < pattern.size(); ++k)
-        pattern[k] = {system.rows[k].first, system.rows[k].second, system.rows[k].size};
-    std::vector<int> beyond;
-    for (std::size_t k = 0; k < pattern.size(); ++k)
-        for (const Beyond& other : system.rows[k].beyond)
-            beyond.push_back(static_cast<int>(k)), beyond.push_back(other.body);
-    if (bodies == bodies_ && pattern == pattern_ && beyond == beyond_) return false;
+/// Whether the system's blocks tie the bodies they tied when it was analysed.
+bool PivotSolver::is_known(const MixedSystem& system) const noexcept {
+    if (static_cast<int>(system.mass.size()) != bodies_ || system.rows.size() != pattern_.size())
+        return false;
+    std::size_t beyond = 0;
+    for (std::size_t k = 0; k < pattern_.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        if (pattern_[k] != Pattern{block.first, block.second, block.size}) return false;
+        for (const Beyond& other : block.beyond) {
+            if (beyond == beyond_.size() || beyond_[beyond] != static_cast<int>(k) ||
+                beyond_[beyond + 1] != other.body)
+                return false;
+            beyond += 2;
+        }
+    }
+    return beyond == beyond_.size();
+}
 
-    std::vector<int> sizes(bodies, 6);
-    std::vector<std::uint8_t> is_constraint(bodies, 0);
-    std::vector<BlockEdge> edges;
-    first_edge_.assign(pattern.size(), -1);
-    second_edge_.assign(pattern.size(), -1);
-    for (std::size_t k = 0; k < pattern.size(); ++k) {
+bool PivotSolver::analyse(const MixedSystem& system) {
+    if (is_known(system)) return false;
+    static thread_local struct {  // its memory outlives an analysis
+        std::vector<int> sizes;
+        std::vector<std::uint8_t> is_constraint;
+        std::vector<BlockEdge> edges;
+    } graph;
+    auto& [sizes, is_constraint, edges] = graph;
+    const int bodies = static_cast<int>(system.mass.size());
+    bodies_ = -1;  // until the analysis is whole
+    pattern_.clear();
+    beyond_.clear();
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        pattern_.push_back({block.first, block.second, block.size});
+        for (const Beyond& other : block.beyond)
+            beyond_.push_back(static_cast<int>(k)), beyond_.push_back(other.body);
+    }
+    sizes.assign(bodies, 6);
+    is_constraint.assign(bodies, 0);
+    edges.clear();
+    first_edge_.assign(pattern_.size(), -1);
+    second_edge_.assign(pattern_.size(), -1);
+    for (std::size_t k = 0; k < pattern_.size(); ++k) {
         const int block = bodies + static_cast<int>(k);
-        sizes.push_back(pattern[k].size);
+        sizes.push_back(pattern_[k].size);
         is_constraint.push_back(1);
-        if (pattern[k].first >= 0)
-            first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
-        if (pattern[k].second >= 0)
-            second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
+        if (pattern_[k].first >= 0)
+            first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern_[k].first, block});
+        if (pattern_[k].second >= 0)
+            second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern_[k].second, block});
     }
     beyond_edge_.clear();
-    for (std::size_t k = 0; k < beyond.size(); k += 2) {
+    for (std::size_t k = 0; k < beyond_.size(); k += 2) {
         beyond_edge_.push_back(static_cast<int>(edges.size()));
-        edges.push_back({beyond[k + 1], bodies + beyond[k]});
+        edges.push_back({beyond_[k + 1], bodies + beyond_[k]});
     }
-    bodies_ = -1;  // until the analysis is whole
     matrix_.analyse(sizes, edges, is_constraint);
     ++analyses_;
     last_ = {};
     bodies_ = bodies;
-    pattern_ = std::move(pattern);
-    beyond_ = std::move(beyond);
     factored_ = false;
     solution_.assign(matrix_.unknowns(), 0.0);
     residual_.assign(matrix_.unknowns(), 0.0);

@@ -48,6 +48,7 @@ public:
     std::uint64_t analyses() const noexcept { return analyses_; }
 
 private:
+    bool is_known(const MixedSystem& system) const noexcept;
     bool analyse(const MixedSystem& system);
     void measure(const MixedSystem& system);
     bool factor(const MixedSystem& system);

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "linear/pieces.hpp"
 
@@ -13,7 +14,35 @@ namespace {
 
 constexpr std::int64_t operations_a_piece = 50'000;  // of blocks: some milliseconds
 
+/// CSR lists of small numbers: counted, then filled.
+struct Buckets {
+    std::vector<std::int64_t> start;  // of each list in `items`
+    std::vector<int> items;
+    void count(std::size_t lists) { start.assign(lists + 2, 0); }
+    void seen(std::int64_t list) noexcept { ++start[list + 2]; }
+    void ready() {
+        for (std::size_t k = 2; k < start.size(); ++k) start[k] += start[k - 1];
+        items.resize(static_cast<std::size_t>(start.back()));
+    }
+    void put(std::int64_t list, int item) noexcept { items[start[list + 1]++] = item; }
+    std::span<const int> operator[](std::int64_t list) const noexcept {
+        return {items.data() + start[list], static_cast<std::size_t>(start[list + 1] - start[list])};
+    }
+};
+
 }  // namespace
+
+/// What an analysis needs besides what it gives. One per thread: its memory outlives an analysis, its values do not.
+struct BlockLdlt::Analysis {
+    Ordering ordering;
+    std::vector<int> position;           // of blocks in the order of elimination
+    std::vector<std::int64_t> touched;   // by which column first: pivot blocks, then rows
+    std::vector<std::int64_t> block_at;  // of the same, in work_
+    std::vector<std::int64_t> edge_of, next, rooms, sizes;
+    std::vector<int> vacant, behind;  // the last place of each size that is free, and the one below it
+    std::vector<std::uint8_t> flags;
+    Buckets buckets;
+};
 
 void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
                         std::span<const std::uint8_t> is_constraint, bool thin_constraints) {
@@ -49,19 +78,21 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
     }
     values_.assign(at, 0.0);
 
-    const Ordering ordering = order_blocks(size_, edges_, is_constraint_);
-    order_ = ordering.order;
-    place_columns(ordering);
+    static thread_local Analysis analysis;
+    order_blocks(size_, edges_, is_constraint_, analysis.ordering);
+    order_ = analysis.ordering.order;
+    analysis.position.resize(count);
+    for (int k = 0; k < count; ++k) analysis.position[order_[k]] = k;
+    place_columns(analysis);
     scale_.assign(unknowns_, 0.0);
     residual_.assign(unknowns_, 0.0);
     counters_ = {};
 }
 
-void BlockLdlt::place_columns(const Ordering& ordering) {
+void BlockLdlt::place_columns(Analysis& analysis) {
     const int count = block_count();
-    std::vector<int> position(count);
-    for (int k = 0; k < count; ++k) position[order_[k]] = k;
-
+    const Ordering& ordering = analysis.ordering;
+    const std::vector<int>& position = analysis.position;
     columns_.resize(count);
     row_size_.resize(ordering.column_rows.size());
     row_offset_.resize(ordering.column_rows.size());
@@ -100,7 +131,8 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
 
     // Blocks are numbered: pivot blocks in order of elimination, then the rows. Each is touched first by its own
     // column, or by the first one that updates it.
-    std::vector<std::int64_t> touched(count + ordering.column_rows.size());
+    std::vector<std::int64_t>& touched = analysis.touched;
+    touched.resize(count + ordering.column_rows.size());
     for (int k = 0; k < count; ++k) {
         touched[k] = k;
         for (std::int64_t r = ordering.column_start[k]; r < ordering.column_start[k + 1]; ++r)
@@ -126,36 +158,53 @@ void BlockLdlt::place_columns(const Ordering& ordering) {
             }
         }
     }
-    std::vector<std::int64_t> block_at(touched.size());
-    place_work(touched, block_at);
-    for (std::int64_t& target : targets_) target = block_at[target];
-    place_loads(ordering, touched, block_at);
+    place_work(analysis);
+    for (std::int64_t& target : targets_) target = analysis.block_at[target];
+    place_loads(analysis);
 }
 
-void BlockLdlt::place_work(const std::vector<std::int64_t>& touched, std::vector<std::int64_t>& block_at) {
+/// Columns take the places of those of their size that are done.
+void BlockLdlt::place_work(Analysis& analysis) {
     const int count = block_count();
-    std::vector<std::vector<int>> born(count);
+    const std::vector<std::int64_t>& touched = analysis.touched;
+    std::vector<std::int64_t>& block_at = analysis.block_at;
+    std::vector<std::int64_t>&rooms = analysis.rooms, &sizes = analysis.sizes;
+    Buckets& born = analysis.buckets;
+    block_at.resize(touched.size());
+    rooms.resize(count);
+    born.count(count);
+    std::vector<std::int64_t>& first = analysis.next;
+    first.resize(count);
     for (int k = 0; k < count; ++k) {
-        std::int64_t first = touched[k];
-        for (std::int64_t r = columns_[k].first_row; r < columns_[k].first_row + columns_[k].row_count; ++r)
-            first = std::min(first, touched[count + r]);
-        born[first].push_back(k);
+        const kernel::Column& column = columns_[k];
+        first[k] = touched[k];
+        rooms[k] = column.size * column.size;
+        for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
+            first[k] = std::min(first[k], touched[count + r]);
+            rooms[k] += column.size * row_size_[r];
+        }
+        born.seen(first[k]);
     }
-    std::map<std::int64_t, std::vector<std::int64_t>> vacant;  // by size
+    born.ready();
+    for (int k = 0; k < count; ++k) born.put(first[k], k);
+    sizes = rooms;
+    std::sort(sizes.begin(), sizes.end());
+    sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
+    const auto vacant = [&](int column) -> int& {
+        return analysis.vacant[std::lower_bound(sizes.begin(), sizes.end(), rooms[column]) - sizes.begin()];
+    };
+    analysis.vacant.assign(sizes.size(), -1);
+    analysis.behind.resize(count);
     std::int64_t end = 0;
     for (int k = 0; k < count; ++k) {
         for (int c : born[k]) {
             kernel::Column& column = columns_[c];
-            std::int64_t room = column.size * column.size;
-            for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r)
-                room += column.size * row_size_[r];
-            std::vector<std::int64_t>& free = vacant[room];
-            if (free.empty()) {
+            if (int& free = vacant(c); free < 0) {
                 column.work = end;
-                end += room;
+                end += rooms[c];
             } else {
-                column.work = free.back();
-                free.pop_back();
+                column.work = columns_[free].work;
+                free = analysis.behind[free];
             }
             block_at[c] = column.work;
             std::int64_t at = column.work + column.size * column.size;
@@ -164,24 +213,20 @@ void BlockLdlt::place_work(const std::vector<std::int64_t>& touched, std::vector
                 at += column.size * row_size_[r];
             }
         }
-        const kernel::Column& done = columns_[k];
-        std::int64_t room = done.size * done.size;
-        for (std::int64_t r = done.first_row; r < done.first_row + done.row_count; ++r)
-            room += done.size * row_size_[r];
-        vacant[room].push_back(done.work);
+        analysis.behind[k] = std::exchange(vacant(k), k);
     }
     work_.assign(end, 0.0);
 }
 
-void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int64_t>& touched,
-                            const std::vector<std::int64_t>& block_at) {
+void BlockLdlt::place_loads(Analysis& analysis) {
     const int count = block_count();
-    std::vector<int> position(count);
-    for (int k = 0; k < count; ++k) position[order_[k]] = k;
-    const std::size_t rows = ordering.column_rows.size();
+    const Ordering& ordering = analysis.ordering;
+    const std::vector<int>& position = analysis.position;
+    const std::vector<std::int64_t>&touched = analysis.touched, &block_at = analysis.block_at;
 
     // The edge that a block of the factor comes from; the rest is fill.
-    std::vector<std::int64_t> edge_of(rows, -1);
+    std::vector<std::int64_t>& edge_of = analysis.edge_of;
+    edge_of.assign(ordering.column_rows.size(), -1);
     for (std::size_t e = 0; e < edges_.size(); ++e) {
         const auto [i, j] = edges_[e];
         const bool later = position[i] > position[j];
@@ -194,14 +239,16 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
         if (edge >= 0) throw std::invalid_argument("block LDLT: two edges join the same pair of blocks");
         edge = static_cast<std::int64_t>(e);
     }
-    find_raw(position);
-    std::vector<std::uint8_t> raw(count, 0);
+    find_raw(analysis);
+    std::vector<std::uint8_t>& raw = analysis.flags;
+    raw.assign(count, 0);
     for (int block : raw_blocks_) raw[block] = 1;
 
     load_start_.assign(count + 1, 0);
     for (std::int64_t column : touched) ++load_start_[column + 1];
     for (int k = 0; k < count; ++k) load_start_[k + 1] += load_start_[k];
-    std::vector<std::int64_t> next(load_start_.begin(), load_start_.end() - 1);
+    std::vector<std::int64_t>& next = analysis.next;
+    next.assign(load_start_.begin(), load_start_.end() - 1);
     loads_.resize(touched.size());
     for (int block = 0; block < count; ++block) {
         const auto n = static_cast<std::uint8_t>(size_[block]);
@@ -233,21 +280,29 @@ void BlockLdlt::place_loads(const Ordering& ordering, const std::vector<std::int
         }
 }
 
-void BlockLdlt::find_raw(const std::vector<int>& position) {
+void BlockLdlt::find_raw(Analysis& analysis) {
     // A constraint eliminated before all its bodies has no Schur complement to measure its pivot by.
     const int count = block_count();
+    const std::vector<int>& position = analysis.position;
     raw_blocks_.clear();
     raw_edges_.clear();
     raw_start_.assign(1, 0);
-    std::vector<std::uint8_t> early_body(count, 0);
+    std::vector<std::uint8_t>& early_body = analysis.flags;
+    early_body.assign(count, 0);
     for (const auto& [i, j] : edges_) {
         const int constraint = is_constraint_[i] ? i : j, body = is_constraint_[i] ? j : i;
         if (position[body] < position[constraint]) early_body[constraint] = 1;
     }
-    std::vector<std::vector<int>> raw(count);
-    for (std::size_t e = 0; e < edges_.size(); ++e)
-        for (int block : {edges_[e].first, edges_[e].second})
-            if (is_constraint_[block] && !early_body[block]) raw[block].push_back(static_cast<int>(e));
+    Buckets& raw = analysis.buckets;
+    raw.count(count);
+    const auto each = [&](const auto& take) {
+        for (std::size_t e = 0; e < edges_.size(); ++e)
+            for (int block : {edges_[e].first, edges_[e].second})
+                if (is_constraint_[block] && !early_body[block]) take(block, static_cast<int>(e));
+    };
+    each([&](int block, int) { raw.seen(block); });
+    raw.ready();
+    each([&](int block, int edge) { raw.put(block, edge); });
     for (int i = 0; i < count; ++i) {
         if (raw[i].empty()) continue;
         raw_blocks_.push_back(i);

@@ -14,7 +14,7 @@ namespace spook {
 /// Factors [[M, Gᵀ], [G, −Sig]]: blocks of bodies have positive pivots, blocks of constraints negative ones.
 ///
 /// analyse() once per topology, then fill diagonal() and coupling(), factor() and solve() each step; nothing is
-/// allocated after analyse(). Vectors are in the caller's block order, at offset(i). Results depend on the input
+/// allocated after analyse(), which keeps the memory it had. Vectors are in the caller's block order, at offset(i). Results depend on the input
 /// only, not on the instruction set.
 class BlockLdlt {
 public:
@@ -71,11 +71,11 @@ public:
     void clear_counters() noexcept { counters_ = {}; }
 
 private:
-    void place_columns(const Ordering& ordering);
-    void place_work(const std::vector<std::int64_t>& touched, std::vector<std::int64_t>& block_at);
-    void place_loads(const Ordering& ordering, const std::vector<std::int64_t>& touched,
-                     const std::vector<std::int64_t>& block_at);
-    void find_raw(const std::vector<int>& position);
+    struct Analysis;
+    void place_columns(Analysis& analysis);
+    void place_work(Analysis& analysis);
+    void place_loads(Analysis& analysis);
+    void find_raw(Analysis& analysis);
     void raw_scales();
     void refine(const double* rhs, double* x, int refinements);
     bool factor_with(double floor, double* x);

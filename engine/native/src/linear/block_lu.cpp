@@ -82,12 +82,21 @@ bool invert(double* a) noexcept {
     return true;
 }
 
+/// What an analysis needs besides what it gives; its memory outlives it.
+struct Analysis {
+    Ordering ordering;
+    std::vector<int> sizes;
+    std::vector<std::uint8_t> is_constraint;
+};
+
 }  // namespace
 
 void BlockLu::analyse(int blocks, std::span<const BlockEdge> edges) {
-    const std::vector<int> sizes(blocks, 6);
-    const std::vector<std::uint8_t> is_constraint(blocks, 0);
-    const Ordering ordering = order_blocks(sizes, edges, is_constraint);
+    static thread_local Analysis analysis;
+    analysis.sizes.assign(blocks, 6);
+    analysis.is_constraint.assign(blocks, 0);
+    order_blocks(analysis.sizes, edges, analysis.is_constraint, analysis.ordering);
+    const Ordering& ordering = analysis.ordering;
     order_ = ordering.order;
     column_start_ = ordering.column_start;
     position_.resize(blocks);

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <functional>
-#include <queue>
+#include <iterator>
 #include <tuple>
+#include <utility>
 
 #include "linear/pieces.hpp"
 
@@ -16,78 +17,130 @@ constexpr std::int64_t kRawPenalty = 36;
 constexpr std::int64_t kDraggedRows = 6;
 constexpr std::size_t orders_a_piece = 64;  // blocks
 
+/// Short lists side by side in one array: one that outgrows its room gets another behind the rest.
+class Lists {
+public:
+    void reset(int count) {
+        numbers_.clear();
+        lists_.assign(count, {});
+    }
+    /// Room for so many in a list that is empty.
+    void reserve(int list, int room) {
+        lists_[list] = {numbers_.size(), 0, room};
+        numbers_.resize(numbers_.size() + room);
+    }
+    std::span<int> operator[](int list) noexcept {
+        return {numbers_.data() + lists_[list].at, static_cast<std::size_t>(lists_[list].size)};
+    }
+    std::span<const int> operator[](int list) const noexcept {
+        return {numbers_.data() + lists_[list].at, static_cast<std::size_t>(lists_[list].size)};
+    }
+    void push_back(int list, int number) {
+        List& own = lists_[list];
+        if (own.size == own.room) {
+            const List old = own;
+            reserve(list, std::max(4, 2 * old.room));
+            std::copy_n(numbers_.begin() + static_cast<std::ptrdiff_t>(old.at), old.size,
+                        numbers_.begin() + static_cast<std::ptrdiff_t>(own.at));
+            own.size = old.size;
+        }
+        numbers_[own.at + own.size++] = number;
+    }
+    void assign(int list, const std::vector<int>& numbers) {
+        const int size = static_cast<int>(numbers.size());
+        if (size > lists_[list].room) reserve(list, size + size / 2);
+        std::copy(numbers.begin(), numbers.end(),
+                  numbers_.begin() + static_cast<std::ptrdiff_t>(lists_[list].at));
+        lists_[list].size = size;
+    }
+    void shorten(int list, std::ptrdiff_t size) noexcept { lists_[list].size = static_cast<int>(size); }
+
+private:
+    struct List {
+        std::size_t at = 0;
+        int size = 0, room = 0;
+    };
+    std::vector<int> numbers_;
+    std::vector<List> lists_;
+};
+
+/// Its memory outlives an ordering, its values do not.
 class Elimination {
 public:
-    Elimination(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                std::span<const std::uint8_t> is_constraint)
-        : sizes_(sizes),
-          is_constraint_(is_constraint),
-          count_(static_cast<int>(sizes.size())),
-          neighbours_(sizes.size()),
-          regions_(sizes.size()),
-          degree_(sizes.size(), 0),
-          stamp_(sizes.size(), 0),
-          parent_(sizes.size()),
-          budget_(sizes.size(), 0),
-          gone_(sizes.size(), 0) {
-        std::vector<int> counts(sizes.size(), 0);
-        for (const BlockEdge& edge : edges) ++counts[edge.first], ++counts[edge.second];
-        for (int i = 0; i < count_; ++i) neighbours_[i].reserve(counts[i]), parent_[i] = i;
-        for (const BlockEdge& edge : edges) {
-            neighbours_[edge.first].push_back(edge.second);
-            neighbours_[edge.second].push_back(edge.first);
-        }
-        for (int i = 0; i < count_; ++i) {
-            auto& list = neighbours_[i];
-            std::sort(list.begin(), list.end());
-            list.erase(std::unique(list.begin(), list.end()), list.end());
-            for (int j : list) degree_[i] += sizes_[j];
-        }
-        for (int i = 0; i < count_; ++i) push(i);
-    }
-
-    Ordering run() {
-        Ordering result;
-        result.order.reserve(count_);
-        result.column_start.reserve(count_ + 1);
-        result.column_start.push_back(0);
+    void run(std::span<const int> sizes, std::span<const BlockEdge> edges,
+             std::span<const std::uint8_t> is_constraint, Ordering& result) {
+        begin(sizes, edges, is_constraint);
+        result.order.clear();
+        result.column_rows.clear();
+        result.column_start.assign(1, 0);
         while (!queue_.empty()) {
-            const auto [key, block, stamp] = queue_.top();
-            queue_.pop();
+            std::pop_heap(queue_.begin(), queue_.end(), std::greater<>{});
+            const auto [key, block, stamp] = queue_.back();
+            queue_.pop_back();
             if (gone_[block] || stamp != stamp_[block]) continue;
             eliminate(block, result);
             if (result.order.size() % orders_a_piece == 0) end_piece();
         }
-        std::vector<int> position(count_);
+        std::vector<int>& position = parent_;
         for (int k = 0; k < count_; ++k) position[result.order[k]] = k;
         for (int k = 0; k < count_; ++k)
             std::sort(result.column_rows.begin() + result.column_start[k],
                       result.column_rows.begin() + result.column_start[k + 1],
                       [&](int a, int b) { return position[a] < position[b]; });
-        return result;
     }
 
 private:
     using Entry = std::tuple<std::int64_t, int, int>;  // key, block, stamp
+
+    void begin(std::span<const int> sizes, std::span<const BlockEdge> edges,
+               std::span<const std::uint8_t> is_constraint) {
+        sizes_ = sizes;
+        is_constraint_ = is_constraint;
+        count_ = static_cast<int>(sizes.size());
+        degree_.assign(sizes.size(), 0);
+        stamp_.assign(sizes.size(), 0);
+        parent_.resize(sizes.size());
+        budget_.assign(sizes.size(), 0);
+        gone_.assign(sizes.size(), 0);
+        queue_.clear();
+        regions_.reset(count_);
+        neighbours_.reset(count_);
+        for (const BlockEdge& edge : edges) ++stamp_[edge.first], ++stamp_[edge.second];
+        for (int i = 0; i < count_; ++i) neighbours_.reserve(i, std::exchange(stamp_[i], 0)), parent_[i] = i;
+        for (const BlockEdge& edge : edges) {
+            neighbours_.push_back(edge.first, edge.second);
+            neighbours_.push_back(edge.second, edge.first);
+        }
+        for (int i = 0; i < count_; ++i)
+            for (int j : sort_unique(neighbours_, i)) degree_[i] += sizes_[j];
+        for (int i = 0; i < count_; ++i) push(i);
+    }
 
     int find(int i) {
         while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
         return i;
     }
 
-    void keep_live(std::vector<int>& list) const {
-        list.erase(std::remove_if(list.begin(), list.end(), [&](int j) { return gone_[j] != 0; }),
-                   list.end());
+    static std::span<int> sort_unique(Lists& lists, int list) {
+        const std::span<int> numbers = lists[list];
+        std::sort(numbers.begin(), numbers.end());
+        lists.shorten(list, std::unique(numbers.begin(), numbers.end()) - numbers.begin());
+        return lists[list];
+    }
+
+    std::span<int> keep_live(int block) {
+        const std::span<int> list = neighbours_[block];
+        neighbours_.shorten(block, std::remove_if(list.begin(), list.end(), [&](int j) {
+                                       return gone_[j] != 0;
+                                   }) - list.begin());
+        return neighbours_[block];
     }
 
     /// Degrees of freedom left in the eliminated regions next to a block; compresses its list of regions.
     std::int64_t budget_at(int block) {
-        auto& list = regions_[block];
-        for (int& region : list) region = find(region);
-        std::sort(list.begin(), list.end());
-        list.erase(std::unique(list.begin(), list.end()), list.end());
+        for (int& region : regions_[block]) region = find(region);
         std::int64_t sum = 0;
-        for (int region : list) sum += budget_[region];
+        for (int region : sort_unique(regions_, block)) sum += budget_[region];
         return sum;
     }
 
@@ -116,15 +169,18 @@ private:
         } else {
             key += 1;  // at equal cost a constraint first: it turns two bodies into one, without cancellation
         }
-        queue_.emplace(key, block, ++stamp_[block]);
+        queue_.emplace_back(key, block, ++stamp_[block]);
+        std::push_heap(queue_.begin(), queue_.end(), std::greater<>{});
     }
 
     void eliminate(int block, Ordering& result) {
-        auto& around = neighbours_[block];
         gone_[block] = 1;
-        keep_live(around);
+        const std::span<const int> live = keep_live(block);
         result.order.push_back(block);
-        result.column_rows.insert(result.column_rows.end(), around.begin(), around.end());
+        result.column_rows.insert(result.column_rows.end(), live.begin(), live.end());
+        // Lists move when others grow: these are the same blocks, and stay.
+        const std::span<const int> around(result.column_rows.data() + result.column_start.back(),
+                                          live.size());
         result.column_start.push_back(static_cast<std::int64_t>(result.column_rows.size()));
 
         budget_at(block);
@@ -133,45 +189,43 @@ private:
             budget_[block] += budget_[region];
             parent_[region] = block;
         }
-        std::vector<int>().swap(regions_[block]);
 
         for (int other : around) {
-            regions_[other].push_back(block);
+            regions_.push_back(other, block);
             if (around.size() == 1) {  // nothing is filled in, and a hub's list is not walked for every leaf
                 degree_[other] -= sizes_[block];
             } else {
-                auto& list = neighbours_[other];
-                keep_live(list);
+                const std::span<const int> list = keep_live(other);
                 merged_.clear();
                 std::set_union(list.begin(), list.end(), around.begin(), around.end(),
                                std::back_inserter(merged_));
                 merged_.erase(std::lower_bound(merged_.begin(), merged_.end(), other));
-                list.assign(merged_.begin(), merged_.end());
+                neighbours_.assign(other, merged_);
                 degree_[other] = 0;
-                for (int j : list) degree_[other] += sizes_[j];
+                for (int j : merged_) degree_[other] += sizes_[j];
             }
         }
         for (int other : around) push(other);
-        std::vector<int>().swap(around);
     }
 
     std::span<const int> sizes_;
     std::span<const std::uint8_t> is_constraint_;
-    int count_;
-    std::vector<std::vector<int>> neighbours_, regions_;
+    int count_ = 0;
+    Lists neighbours_, regions_;
     std::vector<std::int64_t> degree_;
     std::vector<int> stamp_, parent_;
     std::vector<std::int64_t> budget_;
     std::vector<std::uint8_t> gone_;
     std::vector<int> merged_;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
+    std::vector<Entry> queue_;  // a heap, the least first
 };
 
 }  // namespace
 
-Ordering order_blocks(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                      std::span<const std::uint8_t> is_constraint) {
-    return Elimination(sizes, edges, is_constraint).run();
+void order_blocks(std::span<const int> sizes, std::span<const BlockEdge> edges,
+                  std::span<const std::uint8_t> is_constraint, Ordering& result) {
+    static thread_local Elimination elimination;
+    elimination.run(sizes, edges, is_constraint, result);
 }
 
 }  // namespace spook

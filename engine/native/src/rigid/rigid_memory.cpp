@@ -14,7 +14,7 @@ void RigidSystem::keep(Memory& memory) const {
     memory.redundancy = redundant_.memory();
     memory.live = live_, memory.joints = joints_.states, memory.mixed = mixed_;
     memory.breaks = joints_.breaks;
-    if (contacts_) memory.contacts = contacts_->memory();
+    if (contacts_) contacts_->keep(memory.contacts);
     if (!stiff_) return;
     memory.jacobians.clear();
     const auto blocks = joints_.blocks();

@@ -118,8 +118,9 @@ double RigidSystem::fundable(int island) const {
 /// Who belongs to which island, and how far its joints are from where they hold.
 void RigidSystem::gather_islands() {
     const Islands& islands = parting_->islands;
-    parted_.resize(islands.count);
-    parted_blocks_.resize(islands.count);
+    const auto count = static_cast<std::size_t>(islands.count);
+    if (parted_.size() < count)
+        parted_.resize(count), parted_blocks_.resize(count);  // lists keep their memory
     for (std::vector<int>& members : parted_) members.clear();
     for (std::vector<int>& blocks : parted_blocks_) blocks.clear();
     for (std::size_t k = 0; k < tied_.size(); ++k)
@@ -143,24 +144,25 @@ void RigidSystem::gather_islands() {
 /// Leads bodies that the scene has put beyond their joints' limits a part of the way back, at the rate of the limit's
 /// row: by positions, with all other rows where they are.
 void RigidSystem::lead_back() {
-    std::vector<Islands::Tie> ties;
     const auto blocks = joints_.blocks();
+    arrays_.finder.begin(static_cast<int>(tied_.size()));
     for (std::size_t k = 0; k < blocks.size(); ++k)
-        ties.push_back({mixed_.rows[k].first, mixed_.rows[k].second});
+        arrays_.finder.tie(mixed_.rows[k].first, mixed_.rows[k].second);
     for (std::size_t k = 0; k < blocks.size(); ++k)
         for (int body : joints_.others(static_cast<int>(k)))
-            if (slot_[body] >= 0) ties.push_back({mixed_.rows[k].first, slot_[body]});
-    leading_.islands = spook::find_islands(static_cast<int>(tied_.size()), ties);
+            if (slot_[body] >= 0) arrays_.finder.tie(mixed_.rows[k].first, slot_[body]);
+    leading_.islands = arrays_.finder.find();
     const std::size_t islands = static_cast<std::size_t>(leading_.islands.count);
     leading_.velocity.assign(tied_.size(), Vec6{});
     leading_.grounded.assign(islands, 0);
     leading_.supplied.assign(islands, 1);
     parting_ = &leading_;
     gather_islands();
-    std::vector<char> beyond(islands, 0);
+    std::vector<char>& beyond = arrays_.beyond;
+    beyond.assign(islands, 0);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         if (rests(static_cast<int>(k))) continue;
-        const auto [first, second] = ties[k];
+        const int first = mixed_.rows[k].first, second = mixed_.rows[k].second;
         const int island = leading_.islands.of_body[std::max(first, second)];
         if (std::min(first, second) < 0) leading_.grounded[island] = 1;
         int row = 0;
@@ -224,7 +226,8 @@ bool RigidSystem::part_island(int island, double share) {
 bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks) {
     if (own_blocks.empty()) return true;
     const auto blocks = joints_.blocks();
-    std::vector<int> place(tied_.size(), -1);
+    std::vector<int>& place = arrays_.place;
+    place.assign(tied_.size(), -1);
     MixedSystem& system = holding_;
     system.mass.clear();
     for (std::size_t i = 0; i < members.size(); ++i) {
@@ -233,7 +236,8 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
     }
     system.rows.resize(own_blocks.size());
     holding_beyond_.resize(blocks.size());
-    const LargeArray<JointSet::State> states = joints_.states;
+    LargeArray<JointSet::State>& states = arrays_.joint_states;
+    states = joints_.states;
     double last = 0.0;
     for (int round = 0; round < most_rounds; ++round) {
         double worst = 0.0;

@@ -230,12 +230,12 @@ void RigidSystem::fall_asleep() {
         some = some || sleep.quiet[i] == sleep_rules_.after;
     }
     if (!some) return;
-    std::vector<Islands::Tie> ties;
+    arrays_.finder.begin(bodies());
     std::vector<char> kept_up(constants_.size(), 0);
     const auto tie = [&](int a, int b) {
         for (const auto& [one, other] : {IndexPair{a, b}, IndexPair{b, a}})
             if (stirs(other)) kept_up[one] = 1;
-        ties.push_back({constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1});
+        arrays_.finder.tie(constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1);
     };
     for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
     for (const ContactStage::Touch& touch : contacts_->touches()) {
@@ -243,8 +243,8 @@ void RigidSystem::fall_asleep() {
         if (contacts_->conveys(touch.contact))
             kept_up[touch.contact.first] = kept_up[touch.contact.second] = 1;
     }
-    for (const int i : tied_) ties.push_back({i, i});
-    const Islands islands = spook::find_islands(bodies(), ties);
+    for (const int i : tied_) arrays_.finder.tie(i, i);
+    const Islands& islands = arrays_.finder.find();
     std::vector<char> awake(static_cast<std::size_t>(islands.count), 0);
     for (const int i : tied_)
         if (sleep.quiet[i] < sleep_rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;

@@ -204,8 +204,8 @@ bool RigidSystem::solve_joints() {
 /// Joints that sweeps have left further off than the method allows are solved directly where few hang together, and from
 /// then on wherever sweeps do not settle: what many of these leave adds up.
 bool RigidSystem::settle_joints() {
-    std::optional<Islands> islands;
-    std::vector<std::size_t> rows;  // of each island
+    const Islands* islands = nullptr;
+    std::vector<std::size_t>& rows = arrays_.rows;
     while (true) {
         const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
         live_.by_rows = live_.by_rows || worst.residual > tolerated_by_sweeps();
@@ -214,16 +214,18 @@ bool RigidSystem::settle_joints() {
             return islands->of_body[std::max(block.first, block.second)];
         };
         if (!islands) {
-            islands = spook::find_islands(mixed_);
+            islands = &arrays_.finder.find(mixed_);
             rows.assign(islands->count, 0);
             for (const RowBlock& block : mixed_.rows) ++rows[island(block)];
         }
         const int own = island(mixed_.rows[worst.row]);
         if (rows[own] > few_rows) return true;
         rows[own] = few_rows + 1;  // once
-        std::vector<char> answered;
+        std::vector<char>& answered = arrays_.answered;
+        answered.clear();
         for (const RowBlock& block : mixed_.rows) answered.push_back(island(block) != own);
-        IslandSolver direct;
+        IslandSolver& direct = arrays_.joint_solver;
+        direct.be_patient({});
         direct.floor = method_.floor, direct.refinements = method_.refinements;
         std::vector<FrictionPoint> none;
         const FrictionReport report = direct.run(

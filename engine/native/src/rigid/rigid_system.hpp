@@ -20,6 +20,7 @@
 #include "rigid/locked_tree.hpp"
 #include "rigid/plane_step.hpp"
 #include "rigid/sleep.hpp"
+#include "rigid/step_arrays.hpp"
 #include "run/quantities.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
@@ -444,6 +445,7 @@ private:
     std::vector<double> overstep_;                          // per row of joints, before
     std::vector<std::size_t> overstep_at_;                  // per block
     MixedSystem holding_;
+    StepArrays arrays_;  // what is in them is of one call
     PivotSolver holding_pivot_;
     SleepRules sleep_rules_;
     struct Place {

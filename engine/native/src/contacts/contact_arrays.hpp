@@ -1,0 +1,87 @@
+// Arrays that the contact stage fills anew in each step, kept for their memory.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "contacts/friction_point.hpp"
+#include "contacts/islands.hpp"
+#include "contacts/pivot_system.hpp"
+
+namespace spook {
+
+/// An array that is used again, with so many of `value` in it.
+template <class T> std::vector<T>& filled(std::vector<T>& array, std::size_t count, T value = {}) {
+    array.assign(count, value);
+    return array;
+}
+
+/// A depth [m] by pair of colliders, in one array.
+class DepthOfPair {
+public:
+    using Item = std::pair<std::uint64_t, double>;
+    using Iterator = std::vector<Item>::const_iterator;
+    bool empty() const noexcept { return items_.empty(); }
+    void clear() noexcept { items_.clear(); }
+    Iterator end() const noexcept { return items_.end(); }
+    Iterator find(std::uint64_t pair) const noexcept {
+        const auto at = std::lower_bound(items_.begin(), items_.end(), pair, before);
+        return at != items_.end() && at->first == pair ? at : items_.end();
+    }
+    bool contains(std::uint64_t pair) const noexcept { return find(pair) != end(); }
+    double at(std::uint64_t pair) const noexcept { return find(pair)->second; }
+    double& operator[](std::uint64_t pair) {
+        auto at = std::lower_bound(items_.begin(), items_.end(), pair, before);
+        if (at == items_.end() || at->first != pair) at = items_.insert(at, {pair, 0.0});
+        return at->second;
+    }
+
+private:
+    static bool before(const Item& item, std::uint64_t pair) noexcept { return item.first < pair; }
+    std::vector<Item> items_;
+};
+
+/// Of the search for strikes that act at their own time; by an island's first body.
+struct EventSearch {
+    std::vector<std::size_t> members;
+    std::vector<std::uint64_t> struck;  // the pair of the island's strike, plus one
+    std::vector<char> plain, bouncy;
+    std::vector<double> when, speed;
+};
+
+/// Of one blow; energies, shares and flags by island.
+struct BlowArrays {
+    MixedSystem hit, start, plastic;
+    std::vector<FrictionPoint> friction, fresh, plastic_friction, first_friction;
+    std::vector<std::size_t> who, pushed;  // points; rows against what moves as it is told, or along itself
+    std::vector<std::pair<int, int>> pairs;
+    std::vector<Vec6> before, mixed, next;
+    std::vector<double> limit, energy, share, low, high, asked, first, closing;
+    std::vector<char> rises, answered, touched, struck, balls, is_hit;  // the last by body
+};
+
+struct EnergySums {
+    double square = 0.0, linear = 0.0, fall = 0.0;  // E₊ − E = square s² + linear s − fall
+    bool driven = false;
+};
+
+struct ContactArrays {
+    EventSearch events;
+    BlowArrays blow;
+    // Of a solve:
+    std::vector<FrictionPoint> friction;
+    std::vector<char> answered;       // per row: the round before found it an answer
+    std::vector<char> pushes;         // see shorten_unsettled()
+    std::vector<double> share;        // per moving body
+    std::vector<EnergySums> sums;     // by island
+    std::vector<Vec6> free_velocity;  // per moving body
+    std::vector<char> reached;        // bodies, see find_beside()
+    std::vector<double> island_mass;  // kg
+    DepthOfPair left;                 // see note_given()
+    // Who hangs together by rows of joints and points; in what parts; where a solve is shortened.
+    IslandFinder hanging, parted, shortened;
+};
+
+}  // namespace spook
