@@ -13,6 +13,11 @@ constexpr std::size_t few = 32;    // below, a grid costs more than comparing al
 constexpr int most_levels = 31;    // what is larger than the cells of the last is compared with all
 constexpr std::size_t many = 512;  // worth several threads
 constexpr double furthest = 1e9;   // cells from the origin; what lies further counts as there
+constexpr double fatness = 0.1;    // of the cells of level 0: by so much bounds are enlarged on every side,
+constexpr double fast = 1.0;       //   but for those that got further out than this part of it in one call
+constexpr double loose = 4.0;      // times that much: bounds as far inside theirs get new ones
+constexpr std::size_t few_of = 2;  // who escape are searched for alone up to one in so many
+constexpr int most_coarse = 8;     // of them that are to be compared with all
 
 std::int32_t coordinate(double x, double size) noexcept {
     return static_cast<std::int32_t>(std::floor(std::clamp(x / size, -furthest, furthest)));
@@ -20,18 +25,46 @@ std::int32_t coordinate(double x, double size) noexcept {
 
 }  // namespace
 
-/// A little more than the median of all edges, so that most bounds fit the smallest cells.
-double BroadPhase::choose_size(const std::vector<Bounds>& bounds) {
-    extents_.clear();
-    for (const Bounds& b : bounds) {
-        const Vec3 edge = b.high - b.low;
-        const bool valid = b.low.x <= b.high.x && b.low.y <= b.high.y && b.low.z <= b.high.z;
-        extents_.push_back(valid ? std::max({edge.x, edge.y, edge.z}) : -1.0);
+/// Who is no longer within its enlarged bounds, or far within, gets others.
+void BroadPhase::find_escaped(const std::vector<Bounds>& bounds) {
+    escaped_.clear();
+    const double inside = loose * fatness * size_;
+    const auto stays = [inside](double low, double high, double fat_low, double fat_high) {
+        return fat_low <= low && low <= high && high <= fat_high && !(low - fat_low > inside) &&
+               !(fat_high - high > inside);
+    };
+    for (std::size_t i = 0; i < bounds.size(); ++i) {
+        const Bounds &own = bounds[i], &fat = fat_[i];
+        if (stays(own.low.x, own.high.x, fat.low.x, fat.high.x) &&
+            stays(own.low.y, own.high.y, fat.low.y, fat.high.y) &&
+            stays(own.low.z, own.high.z, fat.low.z, fat.high.z))
+            continue;
+        escaped_.push_back(static_cast<int>(i));
+        const Vec3 down = fat.low - own.low, up = own.high - fat.high;
+        fatten(i, own, std::max({down.x, down.y, down.z, up.x, up.y, up.z}));
     }
+}
+
+/// Larger bounds; none for who has got so far out that it would leave them in the next call.
+void BroadPhase::fatten(std::size_t i, const Bounds& bounds, double out) {
+    const double by = fatness * size_, more = out <= fast * by ? by : 0.0;
+    fat_[i] = {bounds.low - Vec3{more, more, more}, bounds.high + Vec3{more, more, more}};
+}
+
+/// The largest edge, m; negative if it overlaps nothing.
+double BroadPhase::extent(std::size_t i) const noexcept {
+    const Bounds& b = fat_[i];
+    const Vec3 edge = b.high - b.low;
+    const bool valid = b.low.x <= b.high.x && b.low.y <= b.high.y && b.low.z <= b.high.z;
+    return valid ? std::max({edge.x, edge.y, edge.z}) : -1.0;
+}
+
+/// A little more than the median of all edges, so that most bounds fit the smallest cells.
+double BroadPhase::choose_size() {
     std::vector<double>& sorted = sorted_;
     sorted.clear();
-    for (const double extent : extents_)
-        if (extent > 0.0 && std::isfinite(extent)) sorted.push_back(extent);
+    for (std::size_t i = 0; i < fat_.size(); ++i)
+        if (const double own = extent(i); own > 0.0 && std::isfinite(own)) sorted.push_back(own);
     if (sorted.empty()) return 1.0;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
@@ -58,25 +91,26 @@ std::size_t BroadPhase::bucket(const Cell& cell) const noexcept {
     return static_cast<std::size_t>((mixed ^ mixed >> 29) & (begin_.size() - 2));
 }
 
-void BroadPhase::fill_cells(const std::vector<Bounds>& bounds) {
-    const std::size_t count = bounds.size();
-    size_ = choose_size(bounds);
+/// Finds the cell of one; its level, too, which is beyond the last for what is too large for any cell.
+int BroadPhase::place(std::size_t i) {
+    cells_[i].level = -1;
+    const double own = extent(i);
+    if (own < 0.0) return -1;
+    const int level = level_of(own, size_);
+    if (level <= most_levels) cells_[i] = cell_at(fat_[i], level);
+    return level;
+}
+
+/// Lists who lies in which cell.
+void BroadPhase::fill_cells() {
+    const std::size_t count = cells_.size();
     levels_ = 0;
-    everywhere_.clear();
-    cells_.resize(count);
     begin_.assign(std::bit_ceil(2 * count) + 1, 0);
     std::size_t placed = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        cells_[i].level = -1;
-        if (extents_[i] < 0.0) continue;
-        const int level = level_of(extents_[i], size_);
-        if (level > most_levels) {
-            everywhere_.push_back(static_cast<int>(i));
-            continue;
-        }
-        cells_[i] = cell_at(bounds[i], level);
-        levels_ |= 1u << level;
-        ++begin_[bucket(cells_[i]) + 1];
+    for (const Cell& cell : cells_) {
+        if (cell.level < 0) continue;
+        levels_ |= 1u << cell.level;
+        ++begin_[bucket(cell) + 1];
         ++placed;
     }
     for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
@@ -87,14 +121,14 @@ void BroadPhase::fill_cells(const std::vector<Bounds>& bounds) {
 }
 
 /// All partners of i of its own level, each pair once, and of coarser ones.
-void BroadPhase::search(const std::vector<Bounds>& bounds, int i, std::vector<IndexPair>& found) const {
-    const Bounds own = bounds[i];
+void BroadPhase::search(int i, std::vector<IndexPair>& found) const {
+    const Bounds own = fat_[i];
     const auto look = [&](const Cell& cell, bool later_only) {
         const std::size_t k = bucket(cell);
         for (int e = begin_[k]; e < begin_[k + 1]; ++e) {
             const Entry& entry = entries_[e];
             if (!(entry.cell == cell) || (later_only && entry.index <= i)) continue;
-            if (overlap(own, bounds[entry.index]))
+            if (overlap(own, fat_[entry.index]))
                 found.emplace_back(std::min(i, entry.index), std::max(i, entry.index));
         }
     };
@@ -129,6 +163,84 @@ void BroadPhase::sort_pairs(std::size_t count, std::vector<IndexPair>& out) {
     }
 }
 
+/// All partners of one that has escaped; of another that has, too, the one of lower index finds the other.
+void BroadPhase::find_partners(int i, std::vector<IndexPair>& found) const {
+    const Bounds own = fat_[i];
+    const auto meet = [&](int j) {
+        if (j == i || (has_escaped_[j] && j < i) || !overlap(own, fat_[j])) return;
+        found.emplace_back(std::min(i, j), std::max(i, j));
+    };
+    const Cell home = cells_[i];
+    if (home.level < 0) return;
+    for (const int j : everywhere_) meet(j);
+    if ((levels_ & ((1u << home.level) - 1)) != 0) {  // too many smaller cells
+        for (std::size_t j = 0; j < fat_.size(); ++j)
+            if (cells_[j].level >= 0) meet(static_cast<int>(j));
+        return;
+    }
+    for (std::uint32_t left = levels_ >> home.level; left != 0; left &= left - 1) {
+        const Cell there = cell_at(own, home.level + std::countr_zero(left));
+        for (int n = 0; n < 27; ++n) {
+            const Cell cell{there.x + n % 3 - 1, there.y + n / 3 % 3 - 1, there.z + n / 9 - 1, there.level};
+            const std::size_t k = bucket(cell);
+            for (int e = begin_[k]; e < begin_[k + 1]; ++e)
+                if (entries_[e].cell == cell) meet(entries_[e].index);
+        }
+    }
+}
+
+/// Brings the pairs up to date where few have escaped; false if all are to be searched for.
+bool BroadPhase::follow(Team* team) {
+    bool moved = false;
+    has_escaped_.assign(fat_.size(), 0);
+    for (const int i : escaped_) {
+        has_escaped_[i] = 1;
+        const Cell before = cells_[i];
+        if (place(static_cast<std::size_t>(i)) > most_levels) return false;
+        moved = moved || !(cells_[i] == before);
+    }
+    for (const int i : everywhere_)
+        if (has_escaped_[i]) return false;
+    if (moved) fill_cells();
+    const auto coarse = [this](int i) {
+        return cells_[i].level > 0 && (levels_ & ((1u << cells_[i].level) - 1)) != 0;
+    };
+    if (std::count_if(escaped_.begin(), escaped_.end(), coarse) > most_coarse) return false;
+    for (auto& found : found_) found.clear();
+    share_out(team, escaped_.size(), many, [&](int part, std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) find_partners(escaped_[k], found_[part]);
+    });
+    sort_pairs(fat_.size(), new_pairs_);
+    std::erase_if(pairs_, [this](const IndexPair& pair) {
+        return has_escaped_[pair.first] != 0 || has_escaped_[pair.second] != 0;
+    });
+    merged_.resize(pairs_.size() + new_pairs_.size());
+    std::merge(pairs_.begin(), pairs_.end(), new_pairs_.begin(), new_pairs_.end(), merged_.begin());
+    pairs_.assign(merged_.begin(), merged_.end());
+    return true;
+}
+
+/// Searches for all pairs.
+void BroadPhase::rebuild(Team* team) {
+    const int count = static_cast<int>(fat_.size());
+    size_ = choose_size();
+    everywhere_.clear();
+    cells_.resize(fat_.size());
+    for (int i = 0; i < count; ++i)
+        if (place(static_cast<std::size_t>(i)) > most_levels) everywhere_.push_back(i);
+    fill_cells();
+    for (auto& found : found_) found.clear();
+    share_out(team, fat_.size(), many, [&](int part, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (cells_[i].level >= 0) search(static_cast<int>(i), found_[part]);
+    });
+    for (const int i : everywhere_)
+        for (int j = 0; j < count; ++j)
+            if (j != i && (j > i || cells_[j].level >= 0) && overlap(fat_[i], fat_[j]))
+                found_[0].emplace_back(std::min(i, j), std::max(i, j));
+    sort_pairs(fat_.size(), pairs_);
+}
+
 void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out,
                                    Team* team) {
     out.clear();
@@ -139,18 +251,19 @@ void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vecto
                 if (overlap(bounds[i], bounds[j])) out.emplace_back(i, j);
         return;
     }
-    fill_cells(bounds);
     found_.resize(team != nullptr ? static_cast<std::size_t>(team->size()) : 1);
-    for (auto& found : found_) found.clear();
-    share_out(team, bounds.size(), many, [&](int part, std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-            if (cells_[i].level >= 0) search(bounds, static_cast<int>(i), found_[part]);
-    });
-    for (const int i : everywhere_)
-        for (int j = 0; j < count; ++j)
-            if (j != i && (j > i || cells_[j].level >= 0) && overlap(bounds[i], bounds[j]))
-                found_[0].emplace_back(std::min(i, j), std::max(i, j));
-    sort_pairs(bounds.size(), out);
+    const bool known = fat_.size() == bounds.size();
+    if (known) {
+        find_escaped(bounds);
+    } else {
+        fat_ = bounds;
+        size_ = choose_size();
+        for (std::size_t i = 0; i < bounds.size(); ++i) fatten(i, bounds[i], 0.0);
+    }
+    if (!known || escaped_.size() > bounds.size() / few_of || (!escaped_.empty() && !follow(team)))
+        rebuild(team);
+    for (const IndexPair& pair : pairs_)
+        if (overlap(bounds[pair.first], bounds[pair.second])) out.push_back(pair);
 }
 
 }  // namespace spook

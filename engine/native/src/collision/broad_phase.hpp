@@ -15,7 +15,11 @@ using IndexPair = std::pair<int, int>;
 /// Finds overlapping bounds in time proportional to their number and that of the pairs. Each lies, by its centre, in
 /// a cell of a grid whose cells are at least as large as it is: the cells of level 0 hold most, those of each further
 /// level are twice as large. Two that overlap are then in neighbouring cells of the coarser one's level. The cells are
-/// found by hashing. Built anew in each call, which costs less than what hangs on the pairs; memory is kept.
+/// found by hashing.
+///
+/// What is searched for are pairs of bounds that have been made a little larger, and those are kept from call to call:
+/// who stays within its own costs nothing but a look, who leaves is searched for anew, and all are where many leave.
+/// What is told is the same in any case: the pairs that overlap, in order.
 class BroadPhase {
 public:
     /// Replaces `out` by all pairs (i, j), i < j, of overlapping bounds, in ascending order. Bounds with a coordinate
@@ -32,17 +36,27 @@ private:
         Cell cell;
         int index;
     };
-    double choose_size(const std::vector<Bounds>& bounds);
+    void find_escaped(const std::vector<Bounds>& bounds);
+    void fatten(std::size_t i, const Bounds& bounds, double out);
+    bool follow(Team* team);
+    void rebuild(Team* team);
+    double choose_size();
     static int level_of(double extent, double size) noexcept;
     Cell cell_at(const Bounds& b, int level) const noexcept;
     std::size_t bucket(const Cell& cell) const noexcept;
-    void fill_cells(const std::vector<Bounds>& bounds);
-    void search(const std::vector<Bounds>& bounds, int i, std::vector<IndexPair>& found) const;
+    double extent(std::size_t i) const noexcept;
+    int place(std::size_t i);
+    void fill_cells();
+    void find_partners(int i, std::vector<IndexPair>& found) const;
+    void search(int i, std::vector<IndexPair>& found) const;
     void sort_pairs(std::size_t count, std::vector<IndexPair>& out);
 
-    double size_ = 1.0;            // of the cells of level 0, m
-    std::uint32_t levels_ = 0;     // those that hold something, a bit each
-    std::vector<double> extents_;  // largest edge of each, m; negative if it overlaps nothing
+    std::vector<Bounds> fat_;                            // of each, larger than its own
+    std::vector<int> escaped_;                           // who has left them since the last call
+    std::vector<char> has_escaped_;                      // of each
+    std::vector<IndexPair> pairs_, new_pairs_, merged_;  // of those bounds; of who has escaped; scratch
+    double size_ = 1.0;                                  // of the cells of level 0, m
+    std::uint32_t levels_ = 0;                           // those that hold something, a bit each
     std::vector<double> sorted_;
     std::vector<int> everywhere_;                // those too large for any cell
     std::vector<Cell> cells_;                    // of each
