@@ -26,6 +26,36 @@ void static_bodies_join_nothing() {
     EXPECT((islands.of_body == std::vector<int>{0, 1, -1, 2, 1, -1}));
 }
 
+/// Ties come, go and stay: the islands are those that one who knows nothing finds, and more ties are no reason to search.
+void islands_follow_their_ties() {
+    constexpr int bodies = 60;
+    IslandFinder kept;
+    std::vector<Islands::Tie> ties;
+    unsigned state = 1;
+    const auto random = [&](int count) {
+        state = 1664525u * state + 1013904223u;
+        return static_cast<int>((state >> 8) % static_cast<unsigned>(count));
+    };
+    const auto find = [&](IslandFinder& finder) -> const Islands& {
+        finder.begin(bodies);
+        for (const auto [first, second] : ties) finder.tie(first, second);
+        return finder.find();
+    };
+    for (int turn = 0; turn < 400; ++turn) {
+        const bool goes = turn % 5 == 4 && !ties.empty();
+        if (goes) ties.erase(ties.begin() + random(static_cast<int>(ties.size())));
+        else if (turn % 5 != 0)
+            ties.insert(ties.begin() + random(static_cast<int>(ties.size()) + 1),
+                        {random(bodies + 1) - 1, random(bodies)});
+        IslandFinder fresh;
+        const long before = kept.searches();
+        const Islands &known = find(kept), &anew = find(fresh);
+        EXPECT(known.count == anew.count && known.of_body == anew.of_body);
+        EXPECT(goes || turn % 60 == 0 || kept.searches() == before);
+        if (turn % 60 == 59) ties.clear();
+    }
+}
+
 ContactWorld two_stacks(double distance) {
     const SurfaceMaterial m{0.4, 0.3, 0.0, 0.075, 0.0};
     std::vector<ContactBody> bodies{{Primitive::plane({0, 0, 1}), 0.0, {}, {}, {}, {}, {}, m}};
@@ -93,6 +123,7 @@ void answered_islands_are_left_as_they_are() {
 
 int main() {
     static_bodies_join_nothing();
+    islands_follow_their_ties();
     answered_islands_are_left_as_they_are();
     far_stacks_do_not_know_each_other();
     return report();

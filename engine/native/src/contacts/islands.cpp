@@ -21,31 +21,59 @@ const Islands& IslandFinder::find(const MixedSystem& system) {
     return find();
 }
 
-const Islands& IslandFinder::find() {
-    if (bodies_ == told_ && known_ == ties_) return islands_;
-    ++searches_;
-    known_ = ties_, bodies_ = told_;
-    parent_.resize(bodies_);
-    std::iota(parent_.begin(), parent_.end(), 0);
+/// Whether all ties that were known have been told, in their order; more_ are the others.
+bool IslandFinder::only_more() {
+    more_.clear();
+    if (bodies_ != told_) return false;
+    std::size_t known = 0;
+    for (const Islands::Tie tie : ties_)
+        if (known < known_.size() && known_[known] == tie) ++known;
+        else more_.push_back(tie);
+    return known == known_.size();
+}
+
+/// Whether a tie changes who hangs together.
+bool IslandFinder::join(Islands::Tie tie) {
     const auto root = [this](int b) {
         while (parent_[b] != b) b = parent_[b] = parent_[parent_[b]];
         return b;
     };
-    has_rows_.assign(bodies_, 0);
-    for (const auto [first, second] : ties_) {
-        if (first >= 0) has_rows_[first] = 1;
-        if (second >= 0) has_rows_[second] = 1;
-        if (first < 0 || second < 0) continue;
-        const int a = root(first), b = root(second);
-        parent_[std::max(a, b)] = std::min(a, b);  // the root is the island's first body
+    bool changes = false;
+    for (const int b : {tie.first, tie.second}) {
+        if (b < 0) continue;
+        changes = changes || !has_rows_[b];
+        has_rows_[b] = 1;
     }
+    if (tie.first < 0 || tie.second < 0) return changes;
+    const int a = root(tie.first), b = root(tie.second);
+    parent_[std::max(a, b)] = std::min(a, b);  // the root is the island's first body
+    return changes || a != b;
+}
+
+void IslandFinder::number() {
     islands_.of_body.assign(bodies_, -1);
     islands_.count = 0;
     for (int b = 0; b < bodies_; ++b) {
         if (!has_rows_[b]) continue;
-        const int r = root(b);
+        int r = b;
+        while (parent_[r] != r) r = parent_[r];
         islands_.of_body[b] = r == b ? islands_.count++ : islands_.of_body[r];
     }
+}
+
+const Islands& IslandFinder::find() {
+    const bool kept = only_more();
+    if (!kept) {
+        ++searches_;
+        bodies_ = told_;
+        parent_.resize(bodies_);
+        std::iota(parent_.begin(), parent_.end(), 0);
+        has_rows_.assign(bodies_, 0);
+    }
+    bool changed = !kept;
+    for (const Islands::Tie tie : kept ? more_ : ties_) changed = join(tie) || changed;
+    if (!kept || !more_.empty()) known_ = ties_;
+    if (changed) number();
     return islands_;
 }
 

@@ -19,8 +19,11 @@ struct Islands {
     int count = 0;
 };
 
-/// Islands of ties that are told again and again: memory is kept, and the islands are while the ties stay. begin(), then
-/// tie() for each, then find().
+/// Islands of ties that are told again and again: memory is kept, and so are the islands. Ties that have come since join
+/// what they tie; where one has gone all are found anew. begin(), then tie() for each, then find().
+///
+/// 10 000 bodies with 20 000 ties cost 110 us anew and 33 where none has gone, and a step of theirs 25 ms: to find
+/// out what a tie that has gone held together would save less than it costs to keep what that takes.
 class IslandFinder {
 public:
     void begin(int bodies);
@@ -36,13 +39,18 @@ public:
     /// The islands of the last find().
     const Islands& islands() const noexcept { return islands_; }
     std::span<const Islands::Tie> ties() const noexcept { return ties_; }
-    /// How often ties were others than before.
+    /// How often they were found anew.
     long searches() const noexcept { return searches_; }
 
 private:
+    bool only_more();
+    bool join(Islands::Tie tie);
+    void number();
+
     Islands islands_;
     int bodies_ = -1;                         // islands_ are of so many,
     std::vector<Islands::Tie> known_, ties_;  //   and of these; those told since begin()
+    std::vector<Islands::Tie> more_;          // of those, who were not known
     int told_ = 0;                            // bodies
     std::vector<int> parent_;
     std::vector<char> has_rows_;
