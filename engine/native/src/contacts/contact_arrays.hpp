@@ -49,6 +49,7 @@ struct EventSearch {
     std::vector<std::uint64_t> struck;  // the pair of the island's strike, plus one
     std::vector<char> plain, bouncy;
     std::vector<double> when, speed;
+    std::vector<std::size_t> climbing, may_climb;  // how many move along the forces, and may
 };
 
 /// Of one blow; energies, shares and flags by island.

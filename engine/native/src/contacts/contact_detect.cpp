@@ -91,7 +91,10 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         const double room = std::sqrt(squares / static_cast<double>(margin_.size()));
         for (double& margin : search_) margin += room;
     }
+    pressing_.clear();
+    carried_kick_.assign(bodies, Vec6{});
     find_open();
+    find_carried();
     predicted_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b)
         predicted_[b] = supported_[b] || jointed_[b] || unknown_[b] < 0 ? velocity[b] : free_velocity[b];
@@ -187,6 +190,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         for (const Contact& contact : scratch_) {
             if (!reachable(contact)) continue;
             add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
+            note_pressing(points_.back());
             const double depth = sunk_by(points_.back());
             for (const int b : {contact.first, contact.second}) {
                 supported_[b] = 1;  // and as deep as it will be when it meets the next part of what holds it

@@ -358,7 +358,10 @@ void ContactStage::impact(MixedSystem& system) {
 /// Blows set bodies in motion that meet others within the same step.
 void ContactStage::after_impact(const MixedSystem& system) {
     for (std::size_t b = 0; b < unknown_.size(); ++b)
-        if (unknown_[b] >= 0 && held_[unknown_[b]]) velocity_[b] = system.velocity[unknown_[b]];
+        if (unknown_[b] >= 0 && held_[unknown_[b]]) {
+            let_go(static_cast<int>(b), system.velocity[unknown_[b]]);
+            velocity_[b] = system.velocity[unknown_[b]];
+        }
     std::vector<Vec6>& next = arrays_.blow.next = velocity_;
     for (std::size_t b = 0; b < next.size(); ++b)
         if (unknown_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], kick_[b]);

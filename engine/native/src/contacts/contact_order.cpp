@@ -17,7 +17,8 @@ constexpr std::size_t event_bodies = 8;  // a larger island is not led to the ti
 
 /// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
 /// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
-/// that goes with it changes the energy.
+/// that goes with it changes the energy. Who is carried and moves along the forces would win energy by it, unless what
+/// is moved carries it, or the strike is of something that stands still and pushes against the forces.
 void ContactStage::find_events() {
     root_.resize(unknown_.size());
     std::iota(root_.begin(), root_.end(), 0);
@@ -34,20 +35,24 @@ void ContactStage::find_events() {
     for (const auto& [a, b] : joints_)
         if (a >= 0 && b >= 0) join(a, b);
 
-    auto& [members, struck, plain, bouncy, when, speed] = arrays_.events;
+    auto& [members, struck, plain, bouncy, when, speed, climbing, may_climb] = arrays_.events;
     members.assign(unknown_.size(), 0);
     struck.assign(unknown_.size(), 0);
     plain.assign(unknown_.size(), 1), bouncy.assign(unknown_.size(), 0);
+    climbing.assign(unknown_.size(), 0), may_climb.assign(unknown_.size(), 0);
     when.assign(unknown_.size(), -1.0);
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0) {
             const int island = root(static_cast<int>(b));
             ++members[island];
             plain[island] = plain[island] && ball_[b];
+            climbing[island] += climbs(static_cast<int>(b));
         }
     for (const Point& point : points_) {
         const Contact& contact = point.contact;
         const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
+        if (is_supplied(contact)) may_climb[island] = event_bodies;
+        else if (lifts(point)) may_climb[island] = std::max<std::size_t>(may_climb[island], 1);
         if (point.strike < 0.0) {
             const double approach = -relative(point, contact.point.normal, predicted_, false);
             if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
@@ -61,7 +66,9 @@ void ContactStage::find_events() {
         bouncy[island] = bouncy[island] || point.material.restitution > 0.0;
     }
     // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
-    // others will: bodies led to an event's time would not be where such rows expect them.
+    // others will: bodies led to an event's time would not be where such rows expect them. Nor are successive blows among
+    // such bodies led here: another may come first.
+    const bool successive = options_.impacts == ImpactOrder::successive;
     speed.assign(unknown_.size(), 0.0);
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         double& fastest = speed[unknown_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
@@ -71,13 +78,14 @@ void ContactStage::find_events() {
     for (const OpenPair& open : open_) {
         const int a = island(open.first), b = island(open.second);
         if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
-        plain[a] = plain[a] && bouncy[a];
-        plain[b] = plain[b] && bouncy[b];
+        plain[a] = plain[a] && bouncy[a] && !successive;
+        plain[b] = plain[b] && bouncy[b] && !successive;
     }
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         if (unknown_[b] < 0) continue;
         const int island = root(static_cast<int>(b));
         if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
+        if (climbing[island] > may_climb[island]) continue;
         event_time_[b] = when[island];
         if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
         velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);

@@ -446,7 +446,10 @@ void ContactStage::correct_events(const MixedSystem& system) {
         for (int i = 0; i < (jointed_[b] ? 6 : 3); ++i)
             correction_[u][i] +=
                 event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
+        const Vec3 more = whole_fall(static_cast<int>(b), linear(system.velocity[u]));
+        for (int i = 0; i < 3; ++i) correction_[u][i] += more[i];
     }
+    book_carried(system);
 }
 
 }  // namespace spook

@@ -300,6 +300,14 @@ private:
                     const std::vector<Vec6>& velocity, bool late);
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
+    // contact_carried.cpp
+    void note_pressing(const Point& point);
+    void find_carried();
+    bool climbs(int body) const;
+    bool lifts(const Point& point) const;
+    void let_go(int body, const Vec6& velocity);
+    Vec3 whole_fall(int body, Vec3 after) const;
+    void book_carried(const MixedSystem& system);
     void order_points();
     void measure_points();
     double margin_of(std::size_t body, const std::vector<Vec6>& velocity,
@@ -443,7 +451,13 @@ private:
     std::vector<IndexPair> beside_, seams_;       // pairs without points, where others part; those let in
     std::vector<IndexPair> near_;                 // where the search was widened
     std::vector<int> grown_;                      // whom it was widened for
-    std::vector<char> supported_;                 // bodies with a closed contact
+    std::vector<char> supported_;                 // bodies that closed contacts carry
+    struct Pressing {                             // of a closed point: whom the forces press on the other one
+        int first, second;
+        bool first_presses, second_presses, both;  // both: on each other, whether or not somebody carries them
+    };
+    std::vector<Pressing> pressing_;
+    std::vector<Vec6> carried_kick_;  // what supports took of a body's kick until they let it go
     std::vector<double> depth_;                   // of a body's closed contacts, m
     std::vector<double> sinking_;  // what sweeps that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;

@@ -101,7 +101,7 @@ void ContactStage::find_earliest_blows(MixedSystem& system, std::vector<std::siz
             clock_[b] = time;
             if (balls[own]) lead_forces(b, system);
         }
-        if (!balls[own]) continue;
+        if (!balls[own] || climbs(static_cast<int>(b))) continue;
         event_time_[b] = clock_[b];
         if (clock_[b] > 0.0) predicted_[b] = sum(Vec6{}, way_[b], 1.0 / clock_[b]);
     }

@@ -1,0 +1,229 @@
+"""Elastic balls under gravity: a blow takes nothing, and a step of fall what it takes without one, wherever the blow is in it.
+
+With the kick k = h g and an elastic blow R at the share s of a step, v₊ = R(v + s k) + (1 − s) k and
+q₊ = q + s h (v + k) + (1 − s) h v₊. Since R keeps |v|, E₊ − E = ½ m |v₊|² − ½ m |v|² − m g·(q₊ − q) = −½ m |k|² for
+every s and every R, several blows included: what symplectic Euler loses in a step of free flight, no more and no less.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    Box,
+    ContactForce,
+    Energy,
+    Final,
+    Material,
+    Method,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+
+GRAVITY = 9.81  # m/s²
+ELASTIC = Material(restitution=1.0)
+RADIUS = 0.2  # m
+SOLVERS = ("direct", "iterative", "hybrid")
+Impacts = Literal["simultaneous", "successive"]
+IMPACTS: tuple[Impacts, ...] = ("simultaneous", "successive")
+H = 1 / 60  # s
+
+
+def wall(name: str, place: tuple[float, float, float], size: tuple[float, float, float]) -> RigidBody:
+    return RigidBody(name=name, motion="static", shape=Box(size), position=place, material=ELASTIC)
+
+
+def ball(
+    name: str,
+    place: tuple[float, ...],
+    velocity: tuple[float, ...],
+    mass: float = 1.0,
+    radius: float = RADIUS,
+) -> RigidBody:
+    return RigidBody(
+        name=name,
+        mass=mass,
+        shape=Sphere(radius),
+        position=place,  # type: ignore[arg-type]
+        velocity=velocity,  # type: ignore[arg-type]
+        material=ELASTIC,
+    )
+
+
+def changes(
+    bodies: list[RigidBody], steps: int, time_step: float, solver: str, impacts: Impacts
+) -> tuple[np.ndarray, float]:
+    """What each step changes of the energy, J, and the energy above the lowest place there is, J."""
+    result = simulate(
+        Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY)),
+        time_step=time_step,
+        steps=steps,
+        method=Method(solver=solver, impacts=impacts),  # type: ignore[arg-type]
+        observe={"energy": Trace(quantity=Energy())},
+    )
+    assert result.status == "completed"
+    return np.diff(result["energy"]), float(result["energy"][0])
+
+
+def flight(*masses: float) -> float:
+    """What a step of free flight takes, J."""
+    return 0.5 * sum(masses) * (GRAVITY * H) ** 2
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_balls_that_touch_as_they_fly_are_carried_by_nobody(
+    share: float, solver: str, impacts: Impacts
+) -> None:
+    """Two rise, one on top of the other, and meet a third: each half of the kick before the blow used to come after it."""
+    up, down, heavy = 2.4, 1.5, 8.0
+    gap = share * H * (up + down)
+    places = (0.0, 2 * RADIUS, 4 * RADIUS + gap)
+    bodies = [
+        ball("lower", (0.0, 0.0, places[0]), (0.0, 0.0, up), 4.0),
+        ball("upper", (0.0, 0.0, places[1]), (0.0, 0.0, up), 0.5),
+        ball("third", (0.0, 0.0, places[2]), (0.0, 0.0, -down), heavy),
+    ]
+    change, _ = changes(bodies, 3, H, solver, impacts)
+
+    np.testing.assert_allclose(change, -flight(4.0, 0.5, heavy), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_ball_that_rises_along_a_wall_is_not_carried_by_it(
+    share: float, solver: str, impacts: Impacts
+) -> None:
+    speed = 3.0
+    reach = RADIUS + share * H * speed
+    bodies = [
+        wall("side", (-0.5 - RADIUS, 0.0, 0.0), (1.0, 4.0, 8.0)),
+        wall("roof", (0.0, 0.0, reach + 0.5), (4.0, 4.0, 1.0)),
+        ball("ball", (0.0, 0.0, 0.0), (0.0, 0.0, speed)),
+    ]
+    change, _ = changes(bodies, 3, H, solver, impacts)
+
+    np.testing.assert_allclose(change, -flight(1.0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_ball_that_has_left_the_floor_is_not_carried_by_it(share: float, solver: str) -> None:
+    """It begins the step on the floor, with a speed that gravity does not take back in it. Successive blows: in a
+    simultaneous one the floor, which it still touches as the step begins, takes part and stops it."""
+    speed = 3.0
+    bodies = [
+        wall("floor", (0.0, 0.0, -0.5 - RADIUS), (4.0, 4.0, 1.0)),
+        wall("roof", (0.0, 0.0, RADIUS + share * H * speed + 0.5), (4.0, 4.0, 1.0)),
+        ball("ball", (0.0, 0.0, 0.0), (0.0, 0.0, speed)),
+    ]
+    change, _ = changes(bodies, 1, H, solver, "successive")
+
+    np.testing.assert_allclose(change, -flight(1.0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("slope", [-0.3, 0.3, 1.0])
+@pytest.mark.parametrize("share", [0.2, 0.9])
+def test_a_ball_struck_on_a_slope_wins_nothing(
+    share: float, slope: float, solver: str, impacts: Impacts
+) -> None:
+    """It rolls up a plank that carries it, and one that comes down knocks it back."""
+    up = np.array((math.cos(slope), 0.0, math.sin(slope)))
+    normal = np.array((-up[2], 0.0, up[0]))
+    plank = RigidBody(
+        name="plank",
+        motion="static",
+        shape=Box((9.0, 4.0, 1.0)),
+        position=tuple(-(0.5 + RADIUS) * normal),
+        orientation=(math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0),
+        material=ELASTIC,
+    )
+    bodies = [
+        plank,
+        ball("rises", (0.0, 0.0, 0.0), tuple(2.0 * up)),
+        ball("falls", tuple((2 * RADIUS + share * H * 3.0) * up), tuple(-1.0 * up), 3.0),
+    ]
+    change, energy = changes(bodies, 4, H, solver, impacts)
+
+    assert change.max() <= 1e-9 * energy
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_the_floor_carries_what_lies_on_it_until_a_blow_lifts_it(
+    share: float, solver: str, impacts: Impacts
+) -> None:
+    """A ball at rest, hit by a smaller one from below its middle: it falls from then on, and has not fallen before. Over
+    the step the floor has carried what forces and momentum ask for."""
+    small, speed = 0.5 * RADIUS, 4.0
+    reach = math.sqrt((RADIUS + small) ** 2 - (RADIUS - small) ** 2)
+    bodies = [
+        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
+        ball("lies", (0.0, 0.0, RADIUS), (0.0, 0.0, 0.0)),
+        ball("rolls", (-reach - share * H * speed, 0.0, small), (speed, 0.0, 0.0), 2.0, small),
+    ]
+    result = simulate(
+        Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY)),
+        time_step=H,
+        steps=1,
+        method=Method(solver=solver, impacts=impacts),  # type: ignore[arg-type]
+        observe={
+            "energy": Trace(quantity=Energy()),
+            "velocity": Final(quantity=Velocity()),
+            "floor": Final(quantity=ContactForce("floor")),
+        },
+    )
+    (change,) = np.diff(result["energy"])
+    rises = result["velocity"][1:, 2]
+
+    assert rises[0] > 1.0
+    assert -flight(1.0, 2.0) < change <= 0.0
+    assert -result["floor"][2] == pytest.approx(3.0 * GRAVITY + rises @ (1.0, 2.0) / H, rel=1e-12)
+
+
+def gas(seed: int, across: int) -> list[RigidBody]:
+    """Elastic balls of .1 to 10 kg between walls 2 m apart, in `across` + 1 directions."""
+    rng, half, thick = np.random.default_rng(seed), 1.0, 1.0
+    far, size = half + 0.5 * thick, 2 * half + 4 * thick
+    walls = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            place, sizes = [0.0, 0.0, half], [size, size, size]
+            place[axis] += side * far
+            sizes[axis] = thick
+            walls.append(wall(f"wall {axis} {side:+.0f}", tuple(place), tuple(sizes)))  # type: ignore[arg-type]
+    balls: list[RigidBody] = []
+    free = np.array((across > 0, across > 1, True))
+    while len(balls) < (3, 6, 8)[across]:
+        place = np.where(free, rng.uniform(1.05 * RADIUS - half, half - 1.05 * RADIUS, 3), 0.0)
+        place += np.array((0.0, 0.0, half))
+        if all(np.linalg.norm(place - np.array(other.position)) > 2.05 * RADIUS for other in balls):
+            velocity = np.where(free, rng.normal(size=3) * 3.0, 0.0)
+            mass = float(10.0 ** rng.uniform(-1.0, 1.0))
+            balls.append(ball(f"ball {len(balls)}", tuple(place), tuple(velocity), mass))
+    return walls + balls
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("across", [0, 1, 2])
+@pytest.mark.parametrize("rate", [60, 240])
+def test_elastic_balls_between_walls_never_gain_energy(
+    rate: int, across: int, solver: str, impacts: Impacts
+) -> None:
+    for seed in range(4):
+        change, energy = changes(gas(seed, across), 2 * rate, 1 / rate, solver, impacts)
+        assert change.max() <= 1e-9 * energy, seed
