@@ -1,11 +1,13 @@
 """Random heaps from clean starts: does the energy ever rise, does anything crash, what settles? Exit code 1 if not kept.
 
-    python bench/campaign.py [--heaps 200] [--first 0] [--wide]
+    python bench/campaign.py [--heaps 200] [--first 0] [--wide | --bouncy]
 
 A heap is 20 to 44 balls, boxes and capsules that fall on a plane and on each other for 1.2 s, with friction of 0 to .8,
 restitution of 0 or .3, time steps of 1/60 to 1/240 s and each solver in turn; masses of .5 to 2 kg. With `--wide` they
-are 8 to 24 bodies of every shape there is, of 1e-6 to 1e9 kg, on a plane, a slab, a mesh or a height field. A heap is
-its number: any one can be run again. Kept is a heap whose energy never rises by more than 1e-9 of what it starts with,
+are 8 to 24 bodies of every shape there is, of 1e-6 to 1e9 kg, on a plane, a slab, a mesh or a height field. With
+`--bouncy` they are 3 to 18 balls, or bodies of every shape, of .1 to 10 kg, thrown at each other between six walls and at
+both orders of blows, with restitution of .5, .8 or 1 and friction of 0 or .4; every other heap is columns that only rise
+and fall, so that much touches in flight. A heap is its number: any one can be run again. Kept is a heap whose energy never rises by more than 1e-9 of what it starts with,
 in no step over the time limit, and in which no body that is out of reach of all others feels anything but gravity.
 Diverged and unsettled runs are outcomes that say so; they are counted apart, and until then the same is asked of them.
 """
@@ -70,6 +72,9 @@ TENTS = TriangleMesh(
         )
     ),
 )
+BOUNCY_SHAPES: tuple[Shape, ...] = (Sphere(0.25),)
+ROOM = 1.5  # m: half of what is between the walls of a bouncy heap
+WALL = 1.0  # m, thick
 GROUNDS: tuple[tuple[Shape, tuple[float, float, float]], ...] = (
     (Plane(), (0.0, 0.0, -0.1)),
     (Box((9.0, 9.0, 1.0)), (1.0, 1.0, -0.6)),
@@ -95,6 +100,53 @@ class Ending:
         return (
             self.rise <= RISE and self.ghosts == 0 and self.outcome in ("completed", "unsettled", "diverged")
         )
+
+
+def bouncy_heap(number: int) -> tuple[Scene, int, Method]:
+    """The bouncy heap of that number, its steps per second, and how it is solved."""
+    rng = np.random.default_rng((number, 1))
+    material = Material(
+        friction=float(rng.choice((0.0, 0.4))), restitution=float(rng.choice((0.5, 0.8, 1.0, 1.0)))
+    )
+    columns, all_shapes = bool(number % 2), bool(rng.integers(2))
+    shapes = WIDE_SHAPES if all_shapes else BOUNCY_SHAPES
+    bodies = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            place, size = np.array((0.0, 0.0, ROOM)), np.full(3, 2.0 * (ROOM + WALL))
+            place[axis] += side * (ROOM + 0.5 * WALL)
+            size[axis] = WALL
+            name, wall = f"wall {2 * axis + int(side > 0.0)}", Box(tuple(size))
+            bodies.append(
+                RigidBody(name=name, motion="static", shape=wall, position=tuple(place), material=material)
+            )
+    for k, cell in enumerate(rng.permutation(18)[: int(rng.integers(3, 19))]):
+        place = np.array((0.9 * (cell % 3 - 1), 0.9 * (cell // 3 % 2 - 0.5), 0.6 + 0.9 * (cell // 6)))
+        velocity, spin, turn = 3.0 * rng.normal(size=3), rng.normal(size=3), rng.normal(size=4)
+        if columns:
+            velocity[:2], spin, turn = 0.0, np.zeros(3), np.array((1.0, 0.0, 0.0, 0.0))
+        else:
+            place += rng.uniform(-0.05, 0.05, 3)
+        mass, shape = float(10.0 ** rng.uniform(-1.0, 1.0)), shapes[int(rng.integers(len(shapes)))]
+        bodies.append(
+            RigidBody(
+                name=f"body {k}",
+                mass=mass,
+                shape=shape,
+                inertia=(0.01 * mass, 0.04 * mass, 0.04 * mass) if isinstance(shape, Compound) else None,
+                position=tuple(place),
+                velocity=tuple(velocity),
+                angular_velocity=tuple(spin),
+                orientation=tuple(turn / np.linalg.norm(turn)),
+                material=material,
+            )
+        )
+    method = Method(
+        solver=SOLVERS[number % len(SOLVERS)],
+        impacts="successive" if rng.integers(2) else "simultaneous",
+        iterations=100,
+    )
+    return Scene(bodies=tuple(bodies), gravity=tuple(GRAVITY)), int(rng.choice((60, 240))), method
 
 
 def heap(number: int, wide: bool) -> tuple[Scene, int, Method]:
@@ -125,20 +177,28 @@ def heap(number: int, wide: bool) -> tuple[Scene, int, Method]:
     return Scene(bodies=tuple(bodies), gravity=tuple(GRAVITY)), int(rng.choice((60, 120, 240))), method
 
 
-def felt(places: np.ndarray, before: np.ndarray, after: np.ndarray, time_step: float) -> int:
-    """How many bodies that nothing could reach in this step did more than fall; row 0 is the ground."""
+def felt(
+    places: np.ndarray, before: np.ndarray, after: np.ndarray, time_step: float, still: int, bouncy: bool
+) -> int:
+    """How many bodies that nothing could reach in this step did more than fall; the first `still` rows do not move."""
+    low, high = (-ROOM, ROOM) if bouncy else (-np.inf, np.inf)
     way = time_step * (np.linalg.norm(before, axis=1) + time_step * 9.81) + REACH
     apart = np.linalg.norm(places[:, None] - places[None, :], axis=2) - way[:, None] - way[None, :]
     np.fill_diagonal(apart, np.inf)
-    alone = (apart[:, 1:].min(axis=1) > 0.0) & (places[:, 2] > way + 0.1)
+    alone = (apart[:, still:].min(axis=1) > 0.0) & (places[:, 2] > way + 0.1)
+    alone &= (places[:, :2] - way[:, None] > low).all(axis=1) & (places[:, :2] + way[:, None] < high).all(
+        axis=1
+    )
+    alone &= places[:, 2] + way < 2.0 * high
     expected = before + time_step * GRAVITY
     moved = np.abs(after - expected).max(axis=1) > 1e-12 * (1.0 + np.abs(before).max(axis=1))
-    return int((alone & moved)[1:].sum())
+    return int((alone & moved)[still:].sum())
 
 
-def fall(number: int, wide: bool = False) -> Ending:
+def fall(number: int, wide: bool = False, bouncy: bool = False) -> Ending:
     """One heap, watched step by step."""
-    scene, rate, method = heap(number, wide)
+    scene, rate, method = bouncy_heap(number) if bouncy else heap(number, wide)
+    still = sum(body.motion == "static" for body in scene.bodies)
     energies, outcome, words, ghosts = [], "", "", 0
     watch = {"energy": Energy(), "x": Position(), "v": Velocity()}
     try:
@@ -148,7 +208,7 @@ def fall(number: int, wide: bool = False) -> Ending:
                 places, before = run["x"], run["v"]
                 run.step(time_limit=STEP_LIMIT)
                 energies.append(float(run["energy"]))
-                ghosts += felt(places, before, run["v"], 1.0 / rate)
+                ghosts += felt(places, before, run["v"], 1.0 / rate, still, bouncy)
             outcome = run.result().status
     except SimulationFailed as failed:
         outcome, words = failed.result.status, str(failed)
@@ -163,13 +223,13 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--heaps", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument(
-        "--wide", action="store_true", help="every shape and ground, masses of 1e-6 to 1e9 kg"
-    )
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument("--wide", action="store_true", help="every shape and ground, masses of 1e-6 to 1e9 kg")
+    kind.add_argument("--bouncy", action="store_true", help="restitution of .5 to 1, between walls")
     asked = parser.parse_args(arguments)
     endings = []
     for number in range(asked.first, asked.first + asked.heaps):
-        ending = fall(number, asked.wide)
+        ending = fall(number, asked.wide, asked.bouncy)
         endings.append(ending)
         if not ending.kept:
             print(
