@@ -18,8 +18,11 @@ from spook_tracker.engine import (
     ContactForce,
     Energy,
     Final,
+    Load,
+    Lock,
     Material,
     Method,
+    Position,
     RigidBody,
     Scene,
     Sphere,
@@ -59,11 +62,11 @@ def ball(
 
 
 def changes(
-    bodies: list[RigidBody], steps: int, time_step: float, solver: str, impacts: Impacts
+    bodies: list[RigidBody], steps: int, time_step: float, solver: str, impacts: Impacts, *locks: Lock
 ) -> tuple[np.ndarray, float]:
     """What each step changes of the energy, J, and the energy above the lowest place there is, J."""
     result = simulate(
-        Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY)),
+        Scene(bodies=tuple(bodies), constraints=locks, gravity=(0.0, 0.0, -GRAVITY)),
         time_step=time_step,
         steps=steps,
         method=Method(solver=solver, impacts=impacts),  # type: ignore[arg-type]
@@ -114,6 +117,25 @@ def test_a_ball_that_rises_along_a_wall_is_not_carried_by_it(
     change, _ = changes(bodies, 3, H, solver, impacts)
 
     np.testing.assert_allclose(change, -flight(1.0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_balls_locked_to_each_other_are_carried_by_nobody(
+    share: float, solver: str, impacts: Impacts
+) -> None:
+    """One above the other they rise to a roof, and both turn round: a lock holds them together, and nobody up."""
+    speed = 3.0
+    bodies = [
+        wall("roof", (0.0, 0.0, RADIUS + share * H * speed + 0.5), (4.0, 4.0, 1.0)),
+        ball("upper", (0.0, 0.0, 0.0), (0.0, 0.0, speed)),
+        ball("lower", (0.0, 0.0, -3.0 * RADIUS), (0.0, 0.0, speed), 3.0),
+    ]
+    lock = Lock(name="lock", between=("upper", "lower"), compliance=0.0)
+    change, _ = changes(bodies, 3, H, solver, impacts, lock)
+
+    np.testing.assert_allclose(change, -flight(1.0, 3.0), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -192,6 +214,120 @@ def test_the_floor_carries_what_lies_on_it_until_a_blow_lifts_it(
     assert rises[0] > 1.0
     assert -flight(1.0, 2.0) < change <= 0.0
     assert -result["floor"][2] == pytest.approx(3.0 * GRAVITY + rises @ (1.0, 2.0) / H, rel=1e-12)
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.2, 0.9])
+def test_what_loses_its_support_in_a_blow_wins_nothing_by_its_fall(
+    share: float, solver: str, impacts: Impacts
+) -> None:
+    """A ball leans on a wall and on another, which a third knocks away: it falls, with the kick of the whole step."""
+    large, speed, lean = 1.5 * RADIUS, 4.0, 0.6
+    support = np.array((0.0, 0.0, large))
+    leans = support + (large + RADIUS) * np.array((-math.sin(lean), 0.0, math.cos(lean)))
+    way = np.array((0.5, math.sqrt(0.75), 0.0))
+    bodies = [
+        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
+        wall("wall", (leans[0] - RADIUS - 0.5, 0.0, 1.0), (1.0, 0.2, 2.0)),
+        ball("leans", tuple(leans), (0.0, 0.0, 0.0)),
+        ball("support", tuple(support), (0.0, 0.0, 0.0), 1.0, large),
+        ball(
+            "comes", tuple(support - (2.0 * large + share * H * speed) * way), tuple(speed * way), 1.0, large
+        ),
+    ]
+    change, energy = changes(bodies, 1, H, solver, impacts)
+
+    assert change.max() <= 1e-9 * energy
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_what_a_blow_lifts_falls_until_the_next_one(share: float, solver: str) -> None:
+    """Struck up from the floor, and down by a roof in the same step: free from the first blow on."""
+    small, speed = 0.5 * RADIUS, 6.0
+    reach = math.sqrt((RADIUS + small) ** 2 - (RADIUS - small) ** 2)
+    bodies = [
+        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
+        wall("roof", (0.0, 0.0, 2.0 * RADIUS + 0.01 + 0.5), (9.0, 9.0, 1.0)),
+        ball("lies", (0.0, 0.0, RADIUS), (0.0, 0.0, 0.0)),
+        ball("rolls", (-reach - share * H * speed, 0.0, small), (speed, 0.0, 0.0), 2.0, small),
+    ]
+    result = simulate(
+        Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY)),
+        time_step=H,
+        steps=1,
+        method=Method(solver=solver, impacts="successive"),  # type: ignore[arg-type]
+        observe={"energy": Trace(quantity=Energy()), "roof": Final(quantity=ContactForce("roof"))},
+    )
+    (change,) = np.diff(result["energy"])
+
+    assert result["roof"][2] > 0.0
+    assert -flight(1.0, 2.0) < change <= 0.0
+
+
+@pytest.mark.parametrize("impacts", IMPACTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("share", [0.2, 0.9])
+def test_a_ball_that_slides_up_to_a_steeper_slope_wins_nothing(
+    share: float, solver: str, impacts: Impacts
+) -> None:
+    planks, ways = [], []
+    for name, slope in (("plank", 0.3), ("steeper", 0.36)):
+        way, normal = (
+            np.array((math.cos(slope), 0.0, math.sin(slope))),
+            np.array((-math.sin(slope), 0.0, math.cos(slope))),
+        )
+        ways.append((way, normal))
+        planks.append(
+            RigidBody(
+                name=name,
+                motion="static",
+                shape=Box((4.0, 4.0, 1.0)),
+                position=tuple((-2.0 if name == "plank" else 2.0) * way - 0.5 * normal),
+                orientation=(math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0),
+                material=ELASTIC,
+            )
+        )
+    (up, normal), speed = ways[0], 2.0
+    place = RADIUS * normal - (RADIUS * math.tan(0.03) + share * H * speed) * up
+    change, energy = changes(
+        [*planks, ball("slides", tuple(place), tuple(speed * up))], 1, H, solver, impacts
+    )
+
+    assert change[0] <= 1e-9 * energy
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_balls_that_are_pressed_together_as_they_fly_carry_each_other(solver: str) -> None:
+    """Loads push two at each other, and a third strikes one from the side: at its time, with both where they lie."""
+    bodies = [
+        RigidBody(
+            name=name,
+            mass=1.0,
+            shape=Sphere(RADIUS),
+            position=(x, 0.0, 0.0),
+            material=ELASTIC,
+        )
+        for name, x in (("left", -RADIUS), ("right", RADIUS))
+    ]
+    bodies.append(ball("comes", (RADIUS, -2.0 * RADIUS - 0.9 * H * 3.0, 0.0), (0.0, 3.0, 0.0)))
+    result = simulate(
+        Scene(
+            bodies=tuple(bodies),
+            forces=tuple(
+                Load(name=name, body=name, force=(force, 0.0, 0.0))
+                for name, force in (("left", 50.0), ("right", -50.0))
+            ),
+        ),
+        time_step=H,
+        steps=1,
+        method=Method(solver=solver),  # type: ignore[arg-type]
+        observe={"x": Final(quantity=Position()), "v": Final(quantity=Velocity())},
+    )
+
+    assert result["x"][1, 1] == pytest.approx(0.1 * H * 3.0, rel=1e-9)
+    assert np.linalg.norm(result["x"][1] - result["x"][0]) > 2.0 * RADIUS - 1e-9
 
 
 def gas(seed: int, across: int) -> list[RigidBody]:
