@@ -242,6 +242,22 @@ def test_what_loses_its_support_in_a_blow_wins_nothing_by_its_fall(
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
+def test_a_blow_that_comes_before_the_expected_one_takes_nothing(solver: str) -> None:
+    """Two would meet late in the step; a third, sent up by the floor, hits the lower one before: both had been led to the
+    time of their own blow."""
+    heavy, light = 5.0, 0.4
+    bodies = [
+        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
+        ball("lowest", (0.0, 0.0, RADIUS + 0.1 * H * 12.0), (0.0, 0.0, -12.0), light),
+        ball("lower", (0.0, 0.0, 3.0 * RADIUS + 0.03), (0.0, 0.0, 1.6), heavy),
+        ball("upper", (0.0, 0.0, 5.0 * RADIUS + 0.03 + 0.9 * H * 2.6), (0.0, 0.0, -1.0), heavy),
+    ]
+    change, _ = changes(bodies, 1, H, solver, "successive")
+
+    np.testing.assert_allclose(change, -flight(light, heavy, heavy), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.1, 0.3])
 def test_what_a_blow_lifts_falls_until_the_next_one(share: float, solver: str) -> None:
     """Struck up from the floor, and down by a roof in the same step: free from the first blow on."""
