@@ -40,10 +40,17 @@ class Particle:
 class Material:
     """How a surface behaves in contact.
 
-    Two surfaces combine: friction by the geometric mean, restitution, rolling and torsional friction by the larger,
+    Two surfaces combine: friction by the geometric mean, both restitutions, rolling and torsional friction by the larger,
     compliance by the sum. Viscous friction, a force c times the slip, is a slip_compliance of 1/c under a friction that
     is never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
     a blow that returns.
+
+    A blow at the relative speed u of approach and v along the surface leaves -psi u and, where friction holds, -psi_t v;
+    where that asks for more than mu times the normal impulse the surfaces slide through the blow. One contact with both
+    at most 1 loses energy or keeps it: with the inverse mass A of the point the impulse is -A^-1 (1 + psi) v, the work
+    half of that times (1 - psi) v, and Coulomb's bound only shortens what opposes the slip. What several contacts at
+    once, or a point whose A couples both directions, would add is taken back towards the plastic answer, which cannot
+    gain. psi_t acts in blows that return, where psi > 0; a ball of rubber that grips has one of nearly psi.
 
     Friction may differ with the direction, as it does along a grain, on a blade or on a board with grooves: then
     `friction` is along `friction_direction`, a direction of the body, and `friction_across` across it; both are
@@ -60,6 +67,9 @@ class Material:
 
     friction: float = 0.0  # Coulomb's mu, 1
     restitution: float = 0.0  # psi, between 0 and 1
+    tangential_restitution: float = (
+        0.0  # psi_t, between 0 and 1: of the slip that a blow which grips turns round
+    )
     compliance: float = 0.0  # m/N per contact point
     damping: float | None = None  # s; None means 4.5 time steps
     slip_compliance: float = 0.0  # gamma, m/(N s): creep speed per tangential force
@@ -71,10 +81,11 @@ class Material:
     def __post_init__(self) -> None:
         for name in ("friction", "compliance", "slip_compliance", "rolling_friction", "torsional_friction"):
             object.__setattr__(self, name, check.not_negative("material", name, getattr(self, name)))
-        restitution = check.not_negative("material", "restitution", self.restitution)
-        if restitution > 1.0:
-            raise SceneError(f"material: restitution must lie between 0 and 1, not {restitution:g}")
-        object.__setattr__(self, "restitution", restitution)
+        for name in ("restitution", "tangential_restitution"):
+            share = check.not_negative("material", name, getattr(self, name))
+            if share > 1.0:
+                raise SceneError(f"material: {name} must lie between 0 and 1, not {share:g}")
+            object.__setattr__(self, name, share)
         if self.damping is not None:
             object.__setattr__(self, "damping", check.not_negative("material", "damping", self.damping))
         if self.friction_direction is not None or self.friction_across is not None:

@@ -70,6 +70,7 @@ class Capabilities:
     rolling_friction: bool = False  # of rolling, and of turning on the spot
     joint_friction: bool = False  # constant; none has any that grows with a joint's load
     restitution: bool = False
+    tangential_restitution: bool = False  # of the slip
     motors: bool = False
     limits: bool = False
     springs: bool = False  # in a joint
@@ -176,6 +177,8 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "friction"
     if body.material.restitution and not can.restitution:
         yield "restitution"
+    if body.material.tangential_restitution and not can.tangential_restitution:
+        yield "restitution of the slip"
     if (body.material.compliance > RIGID or body.material.slip_compliance) and not can.compliance:
         yield "compliance of a surface"
     rolls = body.material.rolling_friction or body.material.torsional_friction

@@ -69,6 +69,8 @@ RigidBodySpec body(Bytes& bytes, double step) {
     const int said = bytes.byte();
     if (said & 1) spec.material.friction = 2.0 * bytes.share();
     if (said & 2) spec.material.restitution = bytes.share();
+    if ((said & 2) && spec.material.restitution > 0.5)
+        spec.material.tangential_restitution = spec.material.restitution;
     if (said & 4) spec.material.compliance = 1e-3 * bytes.share();
     if (said & 8) spec.material.rolling = bytes.share();
     if (said & 16) spec.material.torsional = bytes.share();

@@ -22,7 +22,8 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
                   torsional = table.numbers("torsional_friction"),
                   surface_velocity = table.numbers("surface_velocity", 3),
                   friction_across = table.numbers("friction_across"),
-                  friction_direction = table.numbers("friction_direction", 3);
+                  friction_direction = table.numbers("friction_direction", 3),
+                  tangential_restitution = table.numbers("tangential_restitution");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         RigidBodySpec& body = scene.bodies.emplace_back();
         body.motion = motion[i];
@@ -36,11 +37,17 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
         body.angular_velocity = angular_velocity.vec(i);
         body.force = force.vec(i);
         body.torque = torque.vec(i);
-        body.material = {friction[i],        restitution[i],
-                         compliance[i],      damping[i],
-                         slip_compliance[i], rolling[i],
-                         torsional[i],       surface_velocity.vec(i),
-                         friction_across[i], friction_direction.vec(i)};
+        body.material = {friction[i],
+                         restitution[i],
+                         compliance[i],
+                         damping[i],
+                         slip_compliance[i],
+                         rolling[i],
+                         torsional[i],
+                         surface_velocity.vec(i),
+                         friction_across[i],
+                         friction_direction.vec(i),
+                         tangential_restitution[i]};
     }
     table.expect_all_read();
 }

@@ -1,6 +1,7 @@
 // Arrays that the contact stage fills anew in each step, kept for their memory.
 #pragma once
 
+#include <array>
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -59,6 +60,7 @@ struct BlowArrays {
     std::vector<std::size_t> who, pushed;  // points; rows against what moves as it is told, or along itself
     std::vector<std::pair<int, int>> pairs;
     std::vector<Vec6> before, mixed, next;
+    std::vector<std::array<double, 2>> returned;  // of the slip of each point, m/s
     std::vector<double> limit, energy, share, low, high, asked, first, closing;
     std::vector<char> rises, answered, touched, struck, balls, is_hit;  // the last by body
 };

@@ -294,8 +294,12 @@ void ContactStage::impact(MixedSystem& system) {
     const std::size_t joints = hit.rows.size();
     std::vector<FrictionPoint>& friction = filled(blow.friction, 0);
     std::vector<std::size_t>& pushed = filled(blow.pushed, 0);
-    for (const std::size_t k : who) {
-        const Point& point = points_[k];
+    std::vector<Vec6>& before = blow.before = hit.momentum;
+    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
+    auto& returned = blow.returned;
+    returned.assign(who.size(), {});
+    for (std::size_t j = 0; j < who.size(); ++j) {
+        const Point& point = points_[who[j]];
         RowBlock block = row_block(point, point.material.friction > 0.0 ? 3 : 1);
         if (std::any_of(block.right.begin(), block.right.begin() + block.size,
                         [](double r) { return r != 0.0; }))
@@ -305,11 +309,16 @@ void ContactStage::impact(MixedSystem& system) {
         if (block.size == 3) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.material.friction, 0.0, -1.0});
             friction.back().stretched = point.is_stretched();
+            const double slip = point.bounce > 0.0 && is_blow(point)
+                                    ? std::max(materials_[point.contact.first].tangential_restitution,
+                                               materials_[point.contact.second].tangential_restitution)
+                                    : 0.0;
+            for (int i = 1; i < 3 && slip > 0.0; ++i)
+                block.right[i] -= returned[j][i - 1] =
+                    slip * (row_velocity(block, i, before) - block.right[i]);
         }
         hit.rows.push_back(block);
     }
-    std::vector<Vec6>& before = blow.before = hit.momentum;
-    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
     // No step before has anything to say about a blow: the box takes this one's own normal impulses.
     const FrictionModel model =
         options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
@@ -332,7 +341,10 @@ void ContactStage::impact(MixedSystem& system) {
         plastic = blow.start, blow.plastic_friction = blow.fresh;
         for (std::size_t k = 0; k < joints; ++k)
             if (RowBlock& block = plastic.rows[k]; block.stop.row >= 0) block.right[block.stop.row] = 0.0;
-        for (std::size_t k = joints; k < plastic.rows.size(); ++k) plastic.rows[k].right[0] = 0.0;
+        for (std::size_t k = joints; k < plastic.rows.size(); ++k) {
+            plastic.rows[k].right[0] = 0.0;
+            for (int i = 1; i < 3; ++i) plastic.rows[k].right[i] += returned[k - joints][i - 1];
+        }
         hit_exactly(plastic, joints, blow.plastic_friction, model);
         blend(blow, islands);
     }

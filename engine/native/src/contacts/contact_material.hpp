@@ -19,6 +19,7 @@ struct SurfaceMaterial {
     Vec3 surface_velocity;  // of the surface along itself, body axes, m/s; a body's own, never combined
     double friction_across = 0.0;  // mu across `direction`, where there is one; along it is `friction`
     Vec3 direction;  // unit, body axes; zero: the same friction in all directions; never combined
+    double tangential_restitution = 0.0;  // psi_t, 0 … 1
 
     bool is_oriented() const noexcept { return dot(direction, direction) > 0.0; }
     bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }

@@ -1,0 +1,113 @@
+"""Tangential restitution: a blow that grips turns the slip round, by no more than friction holds, and energy never rises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    AngularVelocity,
+    Box,
+    Capsule,
+    Cylinder,
+    Energy,
+    Final,
+    Material,
+    Method,
+    Plane,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+from spook_tracker.engine.errors import SceneError
+
+RADIUS = 0.1  # m
+SOLVERS = ["direct", "iterative", "hybrid"]
+SHAPES = (Sphere(0.2), Box((0.3, 0.4, 0.5)), Capsule(0.1, 0.4), Cylinder(0.15, 0.4))
+
+
+def floor(material: Material) -> RigidBody:
+    return RigidBody(name="floor", motion="static", shape=Plane(), position=(0, 0, 0), material=material)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("model", ["cone", "box", "scaled_box"])
+@pytest.mark.parametrize(("mu", "returned"), [(5.0, 1.0), (5.0, 0.6), (0.2, 1.0), (0.0, 1.0)])
+def test_a_blow_turns_the_slip_round_as_far_as_friction_holds(
+    solver: str, model: str, mu: float, returned: float
+) -> None:
+    """Half a ball's mass over 7/2 takes up the slip: the impulse is (1 + psi_t) 2/7 of it, at most mu (1 + psi) u."""
+    rubber = Material(friction=mu, restitution=0.8, tangential_restitution=returned)
+    ball = RigidBody(
+        name="ball",
+        mass=2.0,
+        shape=Sphere(RADIUS),
+        position=(0.0, 0.0, 0.15),
+        velocity=(3.0, 0.0, -2.0),
+        angular_velocity=(0.0, -10.0, 0.0),
+        material=rubber,
+    )
+
+    end = simulate(
+        Scene(bodies=(floor(rubber), ball)),
+        time_step=1 / 60,
+        steps=4,
+        method=Method(solver=solver, friction=model),  # type: ignore[arg-type]
+        observe={"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))},
+    )
+
+    slip = 3.0 + 10.0 * RADIUS
+    taken = min((1.0 + returned) * slip * 2.0 / 7.0, mu * 1.8 * 2.0)
+    np.testing.assert_allclose(end["v"], (3.0 - taken, 0.0, 1.6), atol=1e-9)
+    np.testing.assert_allclose(end["w"], (0.0, -10.0 + 2.5 * taken / RADIUS, 0.0), atol=1e-7)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("seed", range(12))
+def test_no_rubber_gains_energy(solver: str, seed: int) -> None:
+    """Bodies of every kind, elastic both ways and rough, thrown at a floor and each other: what couples both directions,
+    and several blows at once, would add."""
+    random = np.random.default_rng(seed)
+    bodies = [
+        floor(Material(friction=1.0, restitution=float(random.uniform(0.5, 1.0)), tangential_restitution=0.5))
+    ]
+    for k in range(5):
+        turn = random.normal(size=4)
+        bodies.append(
+            RigidBody(
+                name=f"b{k}",
+                mass=float(random.uniform(0.5, 2.0)),
+                shape=SHAPES[int(random.integers(len(SHAPES)))],
+                position=(0.7 * (k % 2), 0.1 * k, 0.5 + 0.7 * (k // 2)),
+                orientation=tuple(turn / np.linalg.norm(turn)),
+                velocity=tuple(random.uniform((-2, -2, -3), (2, 2, 0))),
+                angular_velocity=tuple(random.uniform(-5, 5, 3)),
+                material=Material(
+                    friction=float(random.choice((0.3, 1.0, 3.0))),
+                    restitution=float(random.uniform(0.5, 1.0)),
+                    tangential_restitution=float(random.uniform(0.0, 1.0)),
+                ),
+            )
+        )
+
+    run = simulate(
+        Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -9.81)),
+        time_step=1 / 240,
+        steps=240,
+        method=Method(solver=solver),  # type: ignore[arg-type]
+        observe={"energy": Trace(quantity=Energy())},
+    )
+
+    energy = np.asarray(run["energy"])
+    assert np.diff(energy).max() <= 1e-9 * energy[0]
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])
+def test_a_restitution_beyond_its_bounds_is_refused_by_name(share: float) -> None:
+    with pytest.raises(SceneError, match="tangential_restitution"):
+        Material(tangential_restitution=share)
