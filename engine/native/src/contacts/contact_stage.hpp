@@ -15,8 +15,8 @@
 //   4. parting     where the step ends, a displacement that parts overlapping bodies and leaves no trace in v.
 //
 // What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
-// finds that they meet (`collision/sweep.hpp`). Bodies in contact are swept with v, which their supports agree
-// with; flying ones with v + h M⁻¹ f.
+// finds that they meet (`collision/sweep.hpp`). Bodies that contacts carry (`contacts/contact_carried.cpp`) are swept
+// with v, which their supports agree with; flying ones with v + h M⁻¹ f, whether or not they touch.
 //
 // A strike of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
 // arms of the meeting: impulses act there, with
@@ -454,12 +454,13 @@ private:
     std::vector<char> supported_;                 // bodies that closed contacts carry
     struct Pressing {                             // of a closed point: whom the forces press on the other one
         int first, second;
-        bool first_presses, second_presses, both;  // both: on each other, whether or not somebody carries them
+        bool first_presses, second_presses,
+            both;  // both: on each other, whether or not somebody carries them
     };
     std::vector<Pressing> pressing_;
     std::vector<Vec6> carried_kick_;  // what supports took of a body's kick until they let it go
-    std::vector<double> depth_;                   // of a body's closed contacts, m
-    std::vector<double> sinking_;  // what sweeps that have not settled would add to it in this step, m
+    std::vector<double> depth_;       // of a body's closed contacts, m
+    std::vector<double> sinking_;     // what sweeps that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
