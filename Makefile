@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -26,7 +26,8 @@ help:
 	@echo "make looks     every page of the website in every width and theme, to axe"
 	@echo "make engines   every engine that can be had on every scene: docs/engines.md"
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
-	@echo "make campaign  random heaps from clean starts: does their energy ever rise?"
+	@echo "make campaign  2000 random heaps, others every week: does their energy ever rise?"
+	@echo "make campaign-wide  the same with every shape and ground, of 1e-6 to 1e9 kg"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make past      a wrong commit planted in this history and found, and ten old commits asked: many builds"
@@ -110,8 +111,12 @@ release:
 heaps: develop
 	$(BIN)/python bench/piles.py
 
+# Two thousand of each kind; others every week.
 campaign: develop
-	$(BIN)/python bench/campaign.py
+	$(BIN)/python bench/campaign.py --this-week --workers 2
+
+campaign-wide: develop
+	$(BIN)/python bench/campaign.py --this-week --workers 2 --wide
 
 mutants: develop
 	$(BIN)/python bench/mutants.py --record bench/mutants.json

@@ -1,6 +1,6 @@
 """Random heaps from clean starts: does the energy ever rise, does anything crash, what settles? Exit code 1 if not kept.
 
-    python bench/campaign.py [--heaps 200] [--first 0] [--wide | --bouncy]
+    python bench/campaign.py [--heaps 2000] [--first 0 | --this-week] [--wide | --bouncy] [--workers 1]
 
 A heap is 20 to 44 balls, boxes and capsules that fall on a plane and on each other for 1.2 s, with friction of 0 to .8,
 restitution of 0 or .3, time steps of 1/60 to 1/240 s and each solver in turn; masses of .5 to 2 kg. With `--wide` they
@@ -10,13 +10,19 @@ both orders of blows, with restitution of .5, .8 or 1 and friction of 0 or .4; e
 and fall, so that much touches in flight. A heap is its number: any one can be run again. Kept is a heap whose energy never rises by more than 1e-9 of what it starts with,
 in no step over the time limit, and in which no body that is out of reach of all others feels anything but gravity.
 Diverged and unsettled runs are outcomes that say so; they are counted apart, and until then the same is asked of them.
+One that was timed out is lost. `--this-week` begins where the last week's heaps end, so that no week asks what another
+has asked; `--workers` shares the heaps out over processes, and tells them in their order.
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime
+import functools
+import multiprocessing
 import sys
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +51,7 @@ from spook_tracker.engine import (
     start,
 )
 
+HEAPS = 2000  # as many as are asked for at least
 DURATION = 1.2  # s
 RISE = 1e-9  # of the energy at the start
 STEP_LIMIT = 3.0  # s of one step
@@ -217,31 +224,65 @@ def fall(number: int, wide: bool = False, bouncy: bool = False) -> Ending:
     return Ending(number, str(method.solver), outcome, worst, int(rises.argmax()) + 1, words, ghosts)
 
 
+def fall_each(numbers: Sequence[int], wide: bool, workers: int, bouncy: bool = False) -> Iterator[Ending]:
+    """What becomes of each, in their order; by so many processes."""
+    if workers == 1:
+        yield from (fall(number, wide, bouncy) for number in numbers)
+        return
+    with multiprocessing.get_context("spawn").Pool(
+        workers
+    ) as pool:  # nothing of this process is needed there
+        yield from pool.imap(functools.partial(fall, wide=wide, bouncy=bouncy), numbers)
+
+
+def first_of_week(day: datetime.date, heaps: int) -> int:
+    """The first number of that day's week, where every week has so many."""
+    return day.toordinal() // 7 * heaps
+
+
+def told(endings: Sequence[Ending]) -> Iterator[str]:
+    """The counts, a line each: what became of the heaps of each solver, of all, and how many kept what is asked."""
+    for (solver, outcome), count in sorted(Counter((e.solver, e.outcome) for e in endings).items()):
+        yield f"  {solver:<10}{outcome:<12}{count:>5}"
+    counts = Counter(ending.outcome for ending in endings)
+    for outcome in ("completed", "unsettled", "diverged", "timed_out"):
+        yield f"  {outcome:<22}{counts.pop(outcome, 0):>5} of {len(endings)}"
+    for outcome, count in sorted(counts.items()):
+        yield f"  {outcome:<22}{count:>5} of {len(endings)}"
+    kept = sum(ending.kept for ending in endings)
+    yield f"{kept} of {len(endings)} heaps kept their energy and their time"
+
+
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--heaps", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--heaps", type=int, default=HEAPS, help="how many (default %(default)s)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--first", type=int, default=0, help="the first one's number (default %(default)s)")
+    where.add_argument("--this-week", action="store_true", help="numbers that no other week has")
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument("--wide", action="store_true", help="every shape and ground, masses of 1e-6 to 1e9 kg")
     kind.add_argument("--bouncy", action="store_true", help="restitution of .5 to 1, between walls")
+    parser.add_argument("--workers", type=int, default=1, help="processes (default %(default)s)")
     asked = parser.parse_args(arguments)
+    if asked.heaps < 1 or asked.workers < 1:
+        parser.error("there is no campaign without heaps and somebody to drop them")
+    first = first_of_week(datetime.date.today(), asked.heaps) if asked.this_week else asked.first
+    sort = "wide" if asked.wide else "bouncy" if asked.bouncy else "ordinary"
+    print(f"{asked.heaps} {sort} heaps from number {first}", flush=True)
     endings = []
-    for number in range(asked.first, asked.first + asked.heaps):
-        ending = fall(number, asked.wide, asked.bouncy)
+    for ending in fall_each(range(first, first + asked.heaps), asked.wide, asked.workers, asked.bouncy):
         endings.append(ending)
         if not ending.kept:
             print(
-                f"  heap {number}, {ending.solver}: {ending.outcome}, energy {ending.rise:+.1e} in step {ending.step}"
+                f"  heap {ending.number}, {ending.solver}: {ending.outcome}, energy {ending.rise:+.1e} in step {ending.step}"
                 f"{f', {ending.ghosts} ghost hits' if ending.ghosts else ''}{': ' if ending.words else ''}{ending.words}",
                 flush=True,
             )
-    lost = [ending for ending in endings if not ending.kept]
-    for (solver, outcome), count in sorted(Counter((e.solver, e.outcome) for e in endings).items()):
-        print(f"  {solver:<10}{outcome:<12}{count:>5}")
-    print(f"{len(endings) - len(lost)} of {len(endings)} heaps kept their energy and their time")
-    return 1 if lost else 0
+    for line in told(endings):
+        print(line)
+    return 0 if all(ending.kept for ending in endings) else 1
 
 
 if __name__ == "__main__":

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import datetime
 import importlib.util
+import itertools
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 FILE = Path(__file__).parents[1] / "bench" / "campaign.py"
 
@@ -60,3 +64,48 @@ def test_what_gains_energy_is_not_kept(campaign: Any) -> None:
     assert not campaign.Ending(0, "direct", "completed", 2e-9, 1).kept
     assert not campaign.Ending(0, "direct", "timed_out", 0.0, 1).kept
     assert campaign.Ending(0, "direct", "unsettled", -1e-3, 1).kept
+
+
+def test_a_campaign_is_of_as_many_heaps_as_are_asked_for(campaign: Any) -> None:
+    assert campaign.HEAPS >= 2000
+
+
+def test_no_week_asks_what_another_has_asked(campaign: Any) -> None:
+    monday = datetime.date(2026, 1, 5)
+    days = [monday + datetime.timedelta(days=k) for k in range(800)]
+    firsts = [campaign.first_of_week(day, 2000) for day in days]
+
+    assert {b - a for a, b in itertools.pairwise(firsts)} == {0, 2000}
+    assert all(b - a == 2000 for a, b in zip(firsts, firsts[7:], strict=False))
+
+
+def test_every_outcome_is_counted_and_a_lost_heap_is_not_kept(campaign: Any) -> None:
+    outcomes = ("completed", "completed", "unsettled", "diverged", "timed_out")
+    told = list(campaign.told([campaign.Ending(k, "direct", o, -1.0, 1) for k, o in enumerate(outcomes)]))
+    words = [" ".join(line.split()) for line in told]
+
+    assert {"completed 2 of 5", "unsettled 1 of 5", "diverged 1 of 5", "timed_out 1 of 5"} <= set(words)
+    assert words[-1] == "4 of 5 heaps kept their energy and their time"
+
+
+def test_two_processes_find_what_one_finds(campaign: Any) -> None:
+    asked = [sys.executable, str(FILE), "--heaps", "3", "--first", "3"]
+    alone, shared = (
+        subprocess.run([*asked, "--workers", n], capture_output=True, text=True, timeout=300) for n in "12"
+    )
+
+    assert alone.stdout.startswith("3 ordinary heaps from number 3\n")
+    assert alone.stdout == shared.stdout
+    assert alone.returncode == shared.returncode == 0, alone.stderr + shared.stderr
+
+
+def test_both_campaigns_run_every_week(campaign: Any) -> None:
+    root = FILE.parents[1]
+    weekly = yaml.safe_load((root / ".github" / "workflows" / "weekly.yml").read_text())
+    recipes = (root / "Makefile").read_text()
+
+    for target, kind in (("campaign", ""), ("campaign-wide", " --wide")):
+        assert target in weekly["jobs"]["heavy"]["strategy"]["matrix"]["target"]
+        assert (
+            f"{target}: develop\n\t$(BIN)/python bench/campaign.py --this-week --workers 2{kind}\n" in recipes
+        )
