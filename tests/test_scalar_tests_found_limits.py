@@ -18,7 +18,6 @@ from spook_tracker.scalar_tests import (
     grasp,
     leaning_cards,
     loaded_rods,
-    pile,
     rolling_friction,
     rope,
     scissor_lift,
@@ -348,17 +347,6 @@ def test_the_slope_at_which_a_box_slips_is_as_well_known_as_it_is_searched(
     for off in (-3.2e-4, 3.2e-4, 1e-3, -1e-2):
         slope, held = errors(off)
         assert not by_slope.passes(slope) and not by_bracket.passes(held), off
-
-
-def test_parting_lifts_a_pile_by_less_than_it_has_fallen() -> None:
-    """No sphere is lifted by more than its overlap; packed as densely as spheres can be, the pile has fallen so far."""
-    side = round(pile.COUNT ** (1.0 / 3.0))
-    before = 2.0 * pile.RADIUS + pile.SPACING * 0.5 * (side - 1)
-    volume = pile.COUNT * 4.0 / 3.0 * math.pi * pile.RADIUS**3 / (math.pi / math.sqrt(18.0))
-    after = 0.5 * volume / (side * pile.SPACING) ** 2
-    bound = float(metric("pile", "overlap").limit) / (before - after)  # type: ignore[arg-type]
-
-    assert metric("pile", "energy_rise").limit <= bound  # type: ignore[operator]
 
 
 def eliminated(neighbours: dict[int, set[int]], order: Iterable[int]) -> int:
