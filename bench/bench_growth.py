@@ -7,7 +7,8 @@ The first hundred nights are recorded as any other; further ones are copied insi
 changed, which takes a tenth of the time and leaves the same rows. Each measure is a command of its own, as a user runs
 it, start included, the less of two goes; times are of the processor, on PostgreSQL the server's beside the client's.
 What is there beyond the smallest size grows with a power of the samples: its exponent is taken between the two largest
-sizes, and carried on to a hundred million, on paper. Ten million are 27 years of these nights.
+sizes, and carried on to a hundred million, on paper. Ten million are 27 years of these nights. Exit code 1 where an exponent is above GROWS,
+or one night in costs more than NIGHT times what it costs in the smallest history.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ from spook_tracker.tracker.store.transfer import write_document
 RECORDED = 100  # nights that go the usual way before others are copied
 AT_ONCE = 500  # nights in one statement
 NOISE = 0.1  # of a measure: a smaller difference between two sizes is none
+GROWS = 1.3  # exponent; 1.17 at most when it was set
+NIGHT = 1.5  # × one night in, of the smallest size; less than 1 when it was set
 PLANNED = 100_000_000  # samples, on paper
 MEASURES = ("one night in", "one series", "one comparison", "the website")
 CHANCE = {"sqlite": f"abs(random() % {round(1 / CHANGED)}) = 0", "postgresql": f"random() < {CHANGED}"}
@@ -189,20 +192,50 @@ def two_digits(value: float) -> str:
     return f"{rounded:.0f}" if rounded >= 10.0 else f"{rounded:g}"
 
 
+def exponent(values: list[tuple[int, float]]) -> float | None:
+    """Of what grows beyond the smallest size; none where there are too few sizes, or they differ by noise alone."""
+    if len(values) < 3:
+        return None
+    (_, least), (smaller, before), (larger, last) = values[0], *values[-2:]
+    if last - before < NOISE * last or before <= least:
+        return None
+    return math.log((last - least) / (before - least)) / math.log(larger / smaller)
+
+
 def line(name: str, values: list[tuple[int, float]], unit: str, columns: int) -> str:
     """One measure over the sizes."""
     told = [f"{two_digits(value)} {unit}" for _, value in values]
     told += ["not measured"] * (columns - len(told))
     if len(values) < 3:
         return f"| {name} | {' | '.join(told)} | | |"
-    (_, least), (smaller, before), (larger, last) = values[0], *values[-2:]
+    (_, least), (_, before), (larger, last) = values[0], *values[-2:]
     if last - before < NOISE * last:
         return f"| {name} | {' | '.join(told)} | none seen | {two_digits(last)} {unit} |"
-    if before <= least:  # no growth to carry on: the smallest two are noise
+    power = exponent(values)
+    if power is None:  # no growth to carry on: the smallest two are noise
         return f"| {name} | {' | '.join(told)} | | |"
-    exponent = math.log((last - least) / (before - least)) / math.log(larger / smaller)
-    planned = least + (last - least) * (PLANNED / larger) ** exponent
-    return f"| {name} | {' | '.join(told)} | {exponent:.2f} | {two_digits(planned)} {unit} |"
+    planned = least + (last - least) * (PLANNED / larger) ** power
+    return f"| {name} | {' | '.join(told)} | {power:.2f} | {two_digits(planned)} {unit} |"
+
+
+def missed(kind: str, found: list[Measured]) -> list[str]:
+    """What grows too much, a sentence each."""
+    over = []
+    measures = {
+        name: [(at.samples, at.seconds[name]) for at in found if name in at.seconds] for name in MEASURES
+    }
+    measures["memory"] = [
+        (at.samples, at.memory["the website"]) for at in found if "the website" in at.memory
+    ]
+    measures["the database"] = [(at.samples, at.size / 1e9) for at in found]
+    for name, values in measures.items():
+        power = exponent(values)
+        if power is not None and power > GROWS:
+            over.append(f"{kind}: {name} grows with the power {power:.2f} (limit {GROWS:g})")
+    nights = measures["one night in"]
+    if nights and nights[-1][1] > NIGHT * nights[0][1]:
+        over.append(f"{kind}: one night in takes {nights[-1][1] / nights[0][1]:.1f} × (limit {NIGHT:g})")
+    return over
 
 
 @contextlib.contextmanager
@@ -222,15 +255,15 @@ def place_of(kind: str, folder: Path) -> Iterator[Place]:
         yield Place(url, number)
 
 
-def main() -> None:
+def main() -> int:
     options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     options.add_argument("--samples", type=int, nargs="+", default=[100_000, 1_000_000, 10_000_000])
     options.add_argument("--only", choices=("sqlite", "postgresql"), help="one kind of database")
     options.add_argument(
         "--without-website", action="store_true", help="it needs some 6 GB of memory at ten million"
     )
-    given = options.parse_args()
-    tables = []
+    given = options.parse_known_args()[0]
+    over: list[str] = []
     for kind in [given.only] if given.only else ["sqlite", "postgresql"]:
         with tempfile.TemporaryDirectory() as name, place_of(kind, Path(name)) as place:
             engine, there, found = open_database(place.url), 0, []
@@ -244,9 +277,13 @@ def main() -> None:
                 found.append(measure(place, engine, nights, Path(name), given.without_website))
                 there = nights + 2
             engine.dispose()
-        tables.append("\n".join(table({"sqlite": "SQLite", "postgresql": "PostgreSQL"}[kind], found)))
-        print(tables[-1], flush=True)
+        name_of_kind = {"sqlite": "SQLite", "postgresql": "PostgreSQL"}[kind]
+        print("\n".join(table(name_of_kind, found)), flush=True)
+        over += missed(name_of_kind, found)
+    for sentence in over:
+        print(f"MISSED: {sentence}")
+    return 1 if over else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

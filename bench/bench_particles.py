@@ -65,13 +65,13 @@ def planetarium() -> Scene:
     return Scene(bodies=(planet,), forces=(CentralGravity(name="sun", strength=k * k),))
 
 
-def build_loops(folder: Path) -> ctypes.CDLL:
-    """Compile loops.cpp the way the engine is compiled."""
+def build_loops(folder: Path, name: str = "loops.cpp") -> ctypes.CDLL:
+    """Compile a file of this folder the way the engine is compiled."""
     compiler = next((c for c in ("c++", "g++", "clang++") if shutil.which(c)), None)
     if compiler is None:
         sys.exit("bench: there is no C++ compiler on the path")
-    library = folder / "loops.so"
-    source = Path(__file__).with_name("loops.cpp")
+    library = folder / f"{name}.so"
+    source = Path(__file__).with_name(name)
     subprocess.run(
         [
             compiler,
