@@ -150,6 +150,22 @@ def one_by_one(scene: Scene, **options: object) -> object:
     return simulate(scene, **(options | {"method": Method(impacts="successive")}))  # type: ignore[arg-type]
 
 
+def swept(scene: Scene, **options: object) -> object:
+    """Sweeps where it was to solve."""
+    return simulate(scene, **(options | {"method": Method(solver="iterative")}))  # type: ignore[arg-type]
+
+
+def lifting(scene: Scene, **options: object) -> object:
+    """Has a floor that creeps upwards, a millimetre in ten seconds."""
+
+    def creeping(body: object) -> object:
+        if body.name != "floor":  # type: ignore[attr-defined]
+            return body
+        return replace(body, motion="kinematic", velocity=(0.0, 0.0, 1e-4))
+
+    return bodies(creeping)(scene, **options)
+
+
 def weak(scene: Scene, **options: object) -> object:
     """Has half of every friction coefficient."""
     return bodies(lambda b: replace(b, material=replace(b.material, friction=0.5 * b.material.friction)))(
@@ -197,6 +213,8 @@ def stepped(scene: Scene, **options: object) -> object:
         ("cradle", "unequal_error", all_at_once),
         ("cradle", "touching_error", one_by_one),
         ("overhang", "standing_moved", short),
+        ("overhang", "heap_overlap", swept),
+        ("overhang", "heap_energy_rise", lifting),
     ],
 )
 def test_a_fault_turns_the_metric_red_that_is_there_for_it(test: str, metric: str, fault: Simulate) -> None:
