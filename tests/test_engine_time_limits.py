@@ -14,10 +14,12 @@ import pytest
 
 from spook_tracker.engine import (
     Box,
+    Load,
     Lock,
     Material,
     Method,
     Plane,
+    Program,
     RigidBody,
     Scene,
     Sphere,
@@ -169,4 +171,105 @@ def test_the_keyboard_interrupts_a_step() -> None:
     _, words = child.communicate(timeout=30.0)
 
     assert "KeyboardInterrupt" in words
-    assert time.monotonic() - began < 10.0  # not the minute it would run
+    assert time.monotonic() - began < 10.0  # not the minute it would run; how soon is asked below
+
+
+PROMPT = (
+    3.0 * LATE
+)  # s of processor time: asked at most ten times a second, and of two threads each has its own
+
+
+def interrupted_after(seconds: float, program: Program) -> float | None:
+    """How late a run ends [s], in processor time, after the signal of Ctrl-C; None if it ended before that.
+
+    The system raises the signal once this process has had so much processor time, however busy the machine is.
+    """
+    before = signal.signal(signal.SIGPROF, signal.default_int_handler)
+    try:
+        began = time.process_time()
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+        program.run(10**6, time_limit=600.0)
+    except KeyboardInterrupt:
+        return time.process_time() - began - seconds
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+    return None
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_keyboard_interrupts_a_step_at_once(name: str) -> None:
+    scene, method = SCENES[name]()
+    late = interrupted_after(LIMIT, compile(scene, time_step=TIME_STEP, method=method))
+
+    assert late is not None
+    assert late < PROMPT
+
+
+FAILS = 60  # the step that is unfit
+
+
+def falls_and_fails() -> Made:
+    """Balls fall for half a second and land, and their steps become long; then a body turns too fast for any step.
+
+    Blocks of steps have grown while nothing was met: the one that ends unfit holds some twenty long steps, and is
+    replayed one by one to find the step.
+    """
+    rng, gap = np.random.default_rng(1), 0.52  # m
+    balls = tuple(
+        RigidBody(
+            name=f"ball {k}",
+            mass=1.0,
+            shape=Sphere(0.25),
+            position=(
+                gap * (k % 5) + rng.uniform(-0.009, 0.009),
+                gap * (k // 5 % 5) + rng.uniform(-0.009, 0.009),
+                2.02 + 0.501 * (k // 25),
+            ),
+            material=ROUGH,
+        )
+        for k in range(200)
+    )
+    inertia = 0.004  # kg m²
+    spun = RigidBody(name="spun", mass=1.0, inertia=(inertia,) * 3, position=(100.0, 0.0, 50.0))
+    torque = inertia / TIME_STEP**2 / (FAILS - 0.5)  # reaches one radian a step then
+    spin = Load(name="spin", body="spun", torque=(0.0, 0.0, torque))
+    scene = Scene(bodies=(ground(), *balls, spun), forces=(spin,), gravity=DOWN)
+    return scene, Method(solver="iterative", iterations=6000, residual_tolerance=0.0)
+
+
+@pytest.fixture(scope="module")
+def failing() -> tuple[Program, float]:
+    """A run that fails, and s of the processor until then: what comes later is the replay."""
+    scene, method = falls_and_fails()
+    program = compile(scene, time_step=TIME_STEP, method=method)
+    passed = program.run(FAILS - 1)
+    assert passed.completed and passed.cpu_seconds > LATE
+    return program, passed.cpu_seconds
+
+
+ATTEMPTS = 10  # on a busy machine blocks may not have grown, and there is next to nothing to replay
+
+
+def test_a_time_limit_holds_while_a_block_is_replayed(failing: tuple[Program, float]) -> None:
+    program, passed = failing
+    for _ in range(ATTEMPTS):
+        limit = 1.3 * passed
+        result = program.run(10**6, time_limit=limit)
+        if result.status == "timed_out" and result.cpu_seconds > 1.1 * passed:
+            assert result.cpu_seconds < limit + LATE
+            assert result.failed_step == result.steps + 1
+            assert result.steps < FAILS - 1  # of a block that is not finished nothing is kept
+            return
+        assert result.status == "timed_out" or result.failed_step == FAILS
+    pytest.fail("no limit fell into a replay")
+
+
+def test_the_keyboard_interrupts_a_replay(failing: tuple[Program, float]) -> None:
+    program, passed = failing
+    for _ in range(ATTEMPTS):
+        late = interrupted_after(1.3 * passed, program)
+        if late is not None:
+            assert late < PROMPT
+            return
+    pytest.fail("no interruption fell into a replay")
