@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from spook_tracker.engine import PLAIN, explain, protocol
+from spook_tracker.engine import PLAIN, Method, explain, protocol
 from spook_tracker.scalar_tests.case import Configuration, Metric, ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.measure.others import asked_of
@@ -225,3 +228,38 @@ def test_other_engines_are_asked_every_time_step_that_any_of_our_settings_takes(
     assert ladder.steps_of(coarse) == (1.0, 0.5)
     assert ladder.steps_of(ladder.configurations[0]) == (0.5, 0.25)
     assert all(theirs.time_steps == (1.0, 0.5, 0.25) for theirs in asked["pendulum"].ladders)
+
+
+def test_nobody_sleeps_while_a_question_is_asked() -> None:
+    """What is asleep is out of the steps: neither answers nor run times would be those of the solver that is asked."""
+    root = Path(__file__).parent.parent
+    awake = Method().sleep_speed
+    methods = [
+        configuration.method
+        for test in CATALOGUE.values()
+        for ladder in test.ladders
+        for configuration in ladder.configurations
+    ]
+    methods += [test.example().method for test in CATALOGUE.values()]
+
+    assert awake == PLAIN.sleep_speed == 0.0
+    assert {method.sleep_speed for method in methods} == {awake}
+    for room in ("scalar_tests", "tracker/measure"):  # those that are made where a question is asked
+        for file in sorted((root / room).rglob("*.py")):
+            assert not re.search(r"\bsleep_(speed|after)\b", file.read_text()), file
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_no_first_run_of_a_question_has_sleepers(name: str) -> None:
+    """As the engine is asked, and not as the file reads."""
+
+    class Asked(Exception):
+        pass
+
+    def listen(scene: Any, *, method: Method = PLAIN, **options: Any) -> Any:
+        raise Asked(method.sleep_speed)
+
+    for measurement in CATALOGUE[name].measurements:
+        with pytest.raises(Asked) as asked:
+            measurement.measure(listen)
+        assert asked.value.args == (0.0,)
