@@ -440,7 +440,7 @@ def tower(count: int) -> Scene:
 
 
 def test_an_unsettled_solve_is_said_and_keeps_its_values() -> None:
-    """Five sweeps do not carry a load through a hundred boxes; fifty let them sink (tests/test_engine_unsettled.py)."""
+    """Five sweeps do not carry a load through a hundred boxes (more in tests/test_engine_unsettled.py)."""
     observe, few = {"e": Trace(quantity=Energy())}, Method(solver="iterative", iterations=5)
     result = simulate(tower(100), time_step=H, steps=60, method=few, observe=observe)
 

@@ -119,6 +119,13 @@ def test_what_overlaps_where_a_step_ends_parts_however_it_is_turned(
 
 
 @pytest.mark.parametrize("friction", falling_pile.FRICTIONS)
+@pytest.mark.parametrize("seed", range(10))
+def test_sweeps_part_again_what_comes_down_elsewhere(seed: int, friction: float) -> None:
+    """Parted once a step, five of these piles were left with up to 13 mm more than turns explain."""
+    assert overlaps(seed, friction, "iterative")[1] < LEFT_BY_SWEEPS * falling_pile.RADIUS
+
+
+@pytest.mark.parametrize("friction", falling_pile.FRICTIONS)
 @pytest.mark.parametrize("seed", range(5))
 def test_piles_overlap_by_no_more_than_what_turns_unforeseen(seed: int, friction: float) -> None:
     assert overlaps(seed, friction, "direct")[1] < 1e-7

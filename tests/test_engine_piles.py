@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    Box,
     Final,
     Maximum,
     Method,
@@ -56,6 +59,21 @@ def test_every_step_of_the_nightly_pile_settles() -> None:
     )
     assert result.completed, result.failure
     assert result["depth"] < 1e-3
+
+
+def test_a_heap_of_boxes_by_few_sweeps_sinks_in_no_further_than_a_residual_leads() -> None:
+    """Ten layers: sweeps leave up to .1 m/s of a speed, and that leads so far in a step. Parted once they sank by .2 m."""
+    heap = pile.scene(300)
+    boxes = tuple(replace(body, shape=Box((0.5, 0.5, 0.5))) for body in heap.bodies[1:])
+    result = simulate(
+        replace(heap, bodies=(heap.bodies[0], *boxes)),
+        time_step=STEP,
+        steps=240,
+        method=Method(solver="iterative", iterations=20),
+        observe={"depth": Maximum(quantity=Penetration())},
+    )
+    assert result.completed, result.failure
+    assert result["depth"] < 0.1 * STEP
 
 
 def test_a_ball_that_passes_a_pile_keeps_every_bit_of_its_velocity() -> None:

@@ -1,4 +1,4 @@
-"""A stack of a hundred boxes asked of the real engine: carried by it, or not by fifty sweeps (TOY_SOLVER)."""
+"""A stack of two hundred boxes asked of the real engine: carried by it, or not by fifty sweeps (TOY_SOLVER)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from spook_tracker.scalar_tests.bracket import break_count
 from spook_tracker.scalar_tests.case import BreakPoint, Configuration, Ladder, Measurement, Metric, Simulate
 from spook_tracker.scalar_tests.resting_stack import scene
 
-COUNT, STEPS = 100, 60
+COUNT, STEPS = 200, 60
 SWEEPS = Method(solver="iterative", iterations=50)
 
 
@@ -30,7 +30,7 @@ def measure(simulate: Simulate) -> dict[str, float]:
 
 
 def tallest(simulate: Simulate) -> BreakPoint:
-    return break_count(lambda count: lowered(simulate, count, SWEEPS)[1], (2, 100))
+    return break_count(lambda count: lowered(simulate, count, SWEEPS)[1], (2, COUNT))
 
 
 def _metric(name: str, role: str, limit: float | None) -> Metric:

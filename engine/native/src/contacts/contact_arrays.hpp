@@ -81,6 +81,7 @@ struct ContactArrays {
     std::vector<EnergySums> sums;     // by island
     std::vector<Vec6> free_velocity;  // per moving body
     std::vector<char> reached;        // bodies, see find_beside()
+    std::vector<char> parted_far;     // islands, see note_far()
     std::vector<double> island_mass;  // kg
     DepthOfPair left;                 // see note_given()
     // Who hangs together by rows of joints and points; in what parts; where a solve is shortened.

@@ -20,6 +20,7 @@ constexpr std::size_t most_beside = 32;  // bodies of a ring: where more part at
 constexpr int rings = 4;                 // of neighbours that parting sees
 constexpr double around = 4.0;           // of the deepest overlap: gaps that parting may close
 constexpr double aside = 1e-5;           // of the smaller body's radius: who parts by less pushes nobody else
+constexpr double aside_by_sweeps = 2e-3;  // the same where every row more leads fifty sweeps less far
 constexpr double same_place = 0.1;       // of the larger body's radius: one point, seen again
 constexpr unsigned pairs_a_look = 256;   // between two looks at the clock
 
@@ -115,6 +116,36 @@ void ContactStage::note_given() {
     given_ = left;
 }
 
+/// Whether a point parts by so much that its bodies may come down elsewhere, or push others aside, and one displacement is
+/// not enough. By sweeps balls never do, which only go aside: of a thousand of them hundreds part a little in each step.
+bool ContactStage::parts_far(const Point& lap) const noexcept {
+    const double little = parts_by_sweeps() ? aside_by_sweeps : aside;
+    if (!(lap.push > little * moving_size(lap.contact))) return false;
+    const auto swings = [this](int b) { return unknown_[b] >= 0 && ball_[b] == 0; };
+    return !parts_by_sweeps() || swings(lap.contact.first) || swings(lap.contact.second);
+}
+
+/// Who is to be looked at again: everybody, or by sweeps the islands of parting() in which a point has parted far.
+void ContactStage::note_far() {
+    if (!far_ || !parts_by_sweeps()) return;
+    far_ = false;
+    const auto island = [this](int b) {
+        return unknown_[b] < 0 ? -1 : parting_.islands.of_body[unknown_[b]];
+    };
+    std::vector<char>& parted = filled(arrays_.parted_far, parting_.islands.count);
+    for (const Point& lap : laps_) {
+        if (!parts_far(lap)) continue;
+        far_ = true;
+        for (const int b : {lap.contact.first, lap.contact.second})
+            if (island(b) >= 0) parted[island(b)] = 1;
+    }
+    looked_at_.resize(unknown_.size());
+    for (std::size_t b = 0; b < looked_at_.size(); ++b) {
+        const int k = island(static_cast<int>(b));
+        looked_at_[b] = k >= 0 && parted[k] != 0;
+    }
+}
+
 /// Pairs without points, near enough to what parts, or to who that pushes, to be pushed into each other: one neighbour
 /// after the other, `rings` of them.
 void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
@@ -132,7 +163,8 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
     };
     grown_.clear();
     for (const Point& lap : laps_)
-        if (lap.push > aside * moving_size(lap.contact)) reach(lap.contact.first), reach(lap.contact.second);
+        if (parts_far(lap)) reach(lap.contact.first), reach(lap.contact.second);
+    far_ = !parts_by_sweeps() || !grown_.empty();
     for (int ring = 0; ring < rings && !grown_.empty() && grown_.size() <= most_beside; ++ring) {
         std::sort(grown_.begin(), grown_.end());
         if (!detection_.near_again(grown_, search_, near_)) near_ = detection_.near(poses_, search_);
@@ -175,9 +207,10 @@ double ContactStage::find_overlaps_beside(const std::vector<Pose>& poses, double
     double deepest = 0.0;
     unsigned seen = 0;
     for (const IndexPair& pair : beside_) {
+        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
+        if (!is_looked_at(a, b)) continue;
         if (++seen % pairs_a_look == 0) Watch::look();
         scratch_.clear();
-        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
         detection_.touch(pair, poses[a], poses[b], margin, scratch_);
         const bool seam = std::binary_search(seams_.begin(), seams_.end(), pair);
         for (const Contact& contact : scratch_) {
@@ -214,7 +247,7 @@ bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
         fresh = fresh || (lap.push > slack(lap.contact) && !has(parted_, parted_places_, lap.contact));
     for (Point lap : parted_) {
         const Contact& contact = lap.contact;
-        if (has(laps_, places_, contact)) continue;
+        if (!is_looked_at(contact.first, contact.second) || has(laps_, places_, contact)) continue;
         for (const int b : {contact.first, contact.second}) {
             Vec3& arm = b == contact.first ? lap.first_arm : lap.second_arm;
             const Vec3 now = poses[b].rotation * local(lap_poses_[b].rotation, arm);
@@ -264,6 +297,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             most_pressed = std::max(most_pressed, touches_[end].pressed);
             overlapped = overlapped || touches_[end].contact.point.gap < -rounding;
         }
+        if (!is_looked_at(a, b)) continue;
         if (margin == 0.0 && !overlapped && moved(a) + moved(b) < 0.1 * rounding) continue;
         if (++seen % pairs_a_look == 0) Watch::look();
         scratch_.clear();
@@ -282,8 +316,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             if (margin > 0.0) add_lap(contact, poses, excess).parting_before = before;
         }
     }
-    // Sweeps part once, nearly: with more rows they come less far, and the next step sees who was pushed aside.
-    if (!again && margin > 0.0 && !parts_by_sweeps()) find_beside(poses, margin, std::cref(moved));
+    if (!again && margin > 0.0) find_beside(poses, margin, std::cref(moved));
     if (again || margin > 0.0) deepest = std::max(deepest, find_overlaps_beside(poses, margin));
     return deepest;
 }
@@ -327,6 +360,9 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
                         bool again) {
     const double last = parting_.deepest;
     parting_.velocity.clear();
+    if (again && !far_) return false;
+    if (again) std::swap(laps_, parted_);
+    else looked_at_.clear();
     parting_.deepest = find_overlaps(poses, 0.0, again);
     if (!(parting_.deepest > 0.0)) {
         if (!again) given_.clear();
@@ -336,7 +372,6 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     find_overlaps(poses, around * parting_.deepest, again);
     const bool fresh = again && keep_parted(poses);
     if (again && !fresh && !(parting_.deepest < 0.5 * last)) return false;
-    if (!parts_by_sweeps()) parted_ = laps_, lap_poses_ = poses;
     MixedSystem& parting = parting_system_;
     parting.mass = system.mass;
     parting.momentum.assign(system.mass.size(), Vec6{});
@@ -351,6 +386,8 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     arrays_.parted.begin(static_cast<int>(parting.mass.size()));
     if (!(parts_by_sweeps() ? part_by_sweeps(parting, again) : part_directly(parting, again))) return false;
     note_parted(parting);
+    note_far();
+    if (far_) lap_poses_ = poses;
     if (!again) note_given();
     return true;
 }
@@ -389,7 +426,7 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
         row.first_arm = lap.first_arm;
         row.second_arm = lap.second_arm;
         row.right[0] = parting_speed(lap, again);
-        row.impulse[0] = lap.parting_before;
+        if (!again) row.impulse[0] = lap.parting_before;  // what is left is another load
         if (!parting.rows.empty()) row.softness = give_of(lap.contact, gives_);
         parting_sweeps_.add(row);
     }
@@ -404,7 +441,7 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
         const auto touch =
             std::lower_bound(touches_.begin(), touches_.end(), contact.key,
                              [](const Touch& t, std::uint64_t key) { return t.contact.key < key; });
-        if (touch != touches_.end() && touch->contact.key == contact.key) touch->parting = impulse;
+        if (!again && touch != touches_.end() && touch->contact.key == contact.key) touch->parting = impulse;
         if (impulse != 0.0) arrays_.parted.tie(unknown_[contact.first], unknown_[contact.second]);
     }
     return true;

@@ -164,7 +164,7 @@ public:
     /// Looks among the pairs of this step's points for overlaps with the bodies at `poses`, where the step ends, and
     /// fills parting(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
     /// `again` when the bodies are displaced: what is linear in the displacement is not all. Then it is false, too, where
-    /// the displacement before was of no use.
+    /// the displacement before was of no use, or by sweeps so small that nothing comes of it.
     bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
 
     /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse at
@@ -388,6 +388,11 @@ private:
     double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
     double find_overlaps_beside(const std::vector<Pose>& poses, double margin);
     bool keep_parted(const std::vector<Pose>& poses);
+    bool parts_far(const Point& lap) const noexcept;
+    void note_far();
+    bool is_looked_at(int a, int b) const noexcept {
+        return looked_at_.empty() || looked_at_[a] != 0 || looked_at_[b] != 0;
+    }
     bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
     double parting_speed(const Point& lap, bool again) const;
     bool part_directly(MixedSystem& parting, bool again);
@@ -428,6 +433,8 @@ private:
     std::vector<double> gives_;        // of contacts of jointed bodies, see find_gives(), 1/kg
     LargeArray<Point> laps_, parted_;  // points of the step's pairs where it ends; of all its partings
     std::vector<Pose> lap_poses_;      // where bodies were at the last of them
+    bool far_ = false;                 // the last may not have been enough, see parts_far()
+    std::vector<char> looked_at_;      // for whom not, by body; empty: for anybody
     DepthOfPair given_;                // by pair: overlap the scene began with, as far as it is left, m
     bool begun_ = false;               // whether it is known
     bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly

@@ -52,10 +52,9 @@ void RigidSystem::note_begin() {
 }
 
 /// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first
-/// order, and turns bring other points down. By sweeps once, and the rest is the next step's.
+/// order, and turns bring other points down.
 void RigidSystem::part_overlaps() {
-    const int most = contacts_->parts_by_sweeps() ? 1 : most_partings;
-    for (int round = 0; round < most; ++round) {
+    for (int round = 0; round < most_partings; ++round) {
         end_poses_.resize(constants_.size());
         for (int i = 0; i < bodies(); ++i)
             end_poses_[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
