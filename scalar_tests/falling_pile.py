@@ -13,6 +13,7 @@ from spook_tracker.engine import (
     Box,
     Energy,
     Material,
+    Method,
     Penetration,
     Plane,
     RigidBody,
@@ -20,6 +21,7 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
 )
+from spook_tracker.engine.method import PLAIN
 from spook_tracker.scalar_tests.case import (
     Curve,
     Drawing,
@@ -43,6 +45,7 @@ TIME_STEP = 1.0 / 60.0  # s
 STEPS = 120  # 2 s
 PILES = range(10)  # seeds
 RESTITUTIONS = (0.0, 0.1)
+SWEEPS = Method(solver="iterative", iterations=200)
 REACH = 0.5 * float(np.linalg.norm(EDGES))  # m, of a box's corners
 
 
@@ -89,14 +92,14 @@ def bend(turned: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     return most
 
 
-def read(simulate: Simulate, seed: int, restitution: float, friction: float) -> Fall:
+def read(simulate: Simulate, seed: int, restitution: float, friction: float, method: Method = PLAIN) -> Fall:
     falling = scene(seed, restitution, friction)
     observe = {
         "depth": Trace(quantity=Penetration()),
         "spin": Trace(quantity=AngularVelocity()),
         "energy": Trace(quantity=Energy()),
     }
-    result = simulate(falling, time_step=TIME_STEP, steps=STEPS, observe=observe)
+    result = simulate(falling, time_step=TIME_STEP, steps=STEPS, method=method, observe=observe)
     boxes = np.array([isinstance(body, RigidBody) and isinstance(body.shape, Box) for body in falling.bodies])
     depth, energy = result["depth"].ravel(), result["energy"].ravel()
     bent = bend(TIME_STEP * np.linalg.norm(result["spin"], axis=2), boxes)
@@ -107,8 +110,8 @@ def read(simulate: Simulate, seed: int, restitution: float, friction: float) -> 
     )
 
 
-def measure(simulate: Simulate, restitution: float, friction: float) -> dict[str, float]:
-    falls = [read(simulate, seed, restitution, friction) for seed in PILES]
+def measure(simulate: Simulate, restitution: float, friction: float, method: Method) -> dict[str, float]:
+    falls = [read(simulate, seed, restitution, friction, method) for seed in PILES]
     return {
         "unexplained": max(float((fall.depth - fall.bent).max()) for fall in falls),
         "deepest": max(float(fall.depth.max()) for fall in falls),
@@ -190,12 +193,16 @@ TEST = ScalarTest(
     source="ours",
     measurements=tuple(
         Measurement(
-            configuration="plain",
+            configuration=configuration,
             time_step=TIME_STEP,
             parameters={"mu": friction, "e": restitution},
             metrics=METRICS,
-            measure=functools.partial(measure, restitution=restitution, friction=friction),
-            note="Plain SPOOK, directly solved.",
+            measure=functools.partial(measure, restitution=restitution, friction=friction, method=method),
+            note=note,
+        )
+        for configuration, method, note in (
+            ("plain", PLAIN, "Plain SPOOK, directly solved."),
+            ("iterative", SWEEPS, "Plain SPOOK, by two hundred sweeps."),
         )
         for friction in FRICTIONS
         for restitution in RESTITUTIONS
