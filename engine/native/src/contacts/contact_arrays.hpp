@@ -1,8 +1,8 @@
 // Arrays that the contact stage fills anew in each step, kept for their memory.
 #pragma once
 
-#include <array>
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
