@@ -218,7 +218,10 @@ double first_touch(const Mover& first, const Mover& second, double duration, dou
                  second_far = far + turning_arm(first.shape, first.part);
     const Vec3 approach = second.velocity - first.velocity;
     // A ball beside its body's centre is one that joints may lead straight on: it only seems to circle away.
-    const bool balls = first.shape.kind == ShapeKind::sphere || second.shape.kind == ShapeKind::sphere;
+    const auto on_arm = [](const Mover& mover) {
+        return mover.shape.kind == ShapeKind::sphere && norm(mover.part.position) > 0.0;
+    };
+    const bool led = on_arm(first) || on_arm(second);
     double time = 0.0;
     constexpr int rounds = 200;  // a factor of two each where a round surface is met at a slant
     for (int round = 0; round < rounds; ++round) {
@@ -234,8 +237,7 @@ double first_touch(const Mover& first, const Mover& second, double duration, dou
         }
         if (!(speed * left > apart.gap + slop)) return -1.0;
         double until = (apart.gap + slop) / speed;
-        if (round > 0 && turning > 0.0 &&
-            !balls) {  // what turns away beside a surface would never get past it
+        if (round > 0 && turning > 0.0 && !led) {  // what turns away beside a surface would never get past it
             until = std::max(until, parted_for(first, second, apart.normal, time, left, slop));
             if (until >= left) return -1.0;
         }
