@@ -248,21 +248,26 @@ def failing() -> tuple[Program, float]:
     return program, passed.cpu_seconds
 
 
-ATTEMPTS = 10  # on a busy machine blocks may not have grown, and there is next to nothing to replay
+ATTEMPTS = 20  # on a busy machine blocks may not have grown, and there is next to nothing to replay
 
 
 def test_a_time_limit_holds_while_a_block_is_replayed(failing: tuple[Program, float]) -> None:
+    """The limit is of the clock on the wall: how much of that is ours is found by trying."""
     program, passed = failing
+    limit = 1.3 * passed
     for _ in range(ATTEMPTS):
-        limit = 1.3 * passed
         result = program.run(10**6, time_limit=limit)
-        if result.status == "timed_out" and result.cpu_seconds > 1.1 * passed:
+        if result.status != "timed_out":
+            assert result.failed_step == FAILS
+            limit /= 1.2
+        elif result.cpu_seconds < 1.1 * passed:  # before the replay began
+            limit *= 1.4
+        else:
             assert result.cpu_seconds < limit + LATE
             assert result.failed_step == result.steps + 1
             assert result.steps < FAILS - 1  # of a block that is not finished nothing is kept
             return
-        assert result.status == "timed_out" or result.failed_step == FAILS
-    pytest.skip("too busy a machine: no limit fell into a replay")
+    pytest.fail("no limit fell into a replay")
 
 
 def test_the_keyboard_interrupts_a_replay(failing: tuple[Program, float]) -> None:
