@@ -43,11 +43,12 @@ RUNGS: dict[int, tuple[Rung, ...]] = {
 
 
 def expected(count: int) -> tuple[float, float]:
-    """The missing load on springs, and its spread: of many spheres the luck is that of the nightly's many, averaged."""
+    """The missing load on springs, and its spread: of many spheres the luck is that of the nightly's many, averaged, and
+    the mean of a few starts has its own."""
     spread = pile.SPREAD * math.sqrt(pile.COUNT / count)
     if count == pile.COUNT:
         return pile.MISSING_LOAD, spread
-    return float(np.mean(missing_loads(count, STARTS))), spread
+    return float(np.mean(missing_loads(count, STARTS))), spread * math.sqrt(1.0 + 1.0 / STARTS)
 
 
 def kept(count: int, missing_load: float, spread: float) -> bool:
