@@ -80,6 +80,7 @@ struct ContactArrays {
     std::vector<double> share;        // per moving body
     std::vector<EnergySums> sums;     // by island
     std::vector<Vec6> free_velocity;  // per moving body
+    std::vector<IndexPair> grazing;   // pairs, see let_pass()
     std::vector<char> reached;        // bodies, see find_beside()
     std::vector<char> parted_far;     // islands, see note_far()
     std::vector<double> island_mass;  // kg

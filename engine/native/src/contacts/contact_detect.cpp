@@ -144,6 +144,8 @@ void ContactStage::find_open_again() {
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
     known_.clear();
+    const std::size_t before = points_.size();
+    const auto unmet = static_cast<std::ptrdiff_t>(open_.size());
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
     const auto separation_of = [this](const IndexPair& pair) {
@@ -163,9 +165,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
         const double reach = search_[first.body] + search_[second.body];
-        OpenPair open{pair, first.body, second.body, shared ? apart_[k] : separation_of(pair)};
-        open.first_arm = first.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.first);
-        open.second_arm = second.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(pair.second);
+        const OpenPair open = opened(pair, shared ? apart_[k] : separation_of(pair));
         const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach) open_.push_back(open);  // clearly apart: no need for its points
@@ -187,17 +187,30 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
             for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)
                 std::swap(scratch_[at], scratch_[at - 1]);
-        for (const Contact& contact : scratch_) {
-            if (!reachable(contact)) continue;
-            add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
-            note_pressing(points_.back());
-            const double depth = sunk_by(points_.back());
-            for (const int b : {contact.first, contact.second}) {
-                supported_[b] = 1;  // and as deep as it will be when it meets the next part of what holds it
-                depth_[b] = std::max(depth_[b], depth);
-            }
-        }
+        for (const Contact& contact : scratch_)
+            if (reachable(contact)) add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
     }
+    for (std::size_t k = before; k < points_.size(); ++k) {
+        // As deep as a body will be when it meets the next part of what holds it.
+        const double depth = sunk_by(points_[k]);
+        for (const int b : {points_[k].contact.first, points_[k].contact.second})
+            depth_[b] = std::max(depth_[b], depth);
+    }
+    if (let_pass(before))
+        std::sort(open_.begin() + unmet, open_.end(),
+                  [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; });
+    for (std::size_t k = before; k < points_.size(); ++k) {
+        note_pressing(points_[k]);
+        for (const int b : {points_[k].contact.first, points_[k].contact.second}) supported_[b] = 1;
+    }
+}
+
+ContactStage::OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) const {
+    const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
+    const auto arm = [this](int collider, const Collider& of) {
+        return of.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(collider);
+    };
+    return {pair, first.body, second.body, apart, arm(pair.first, first), arm(pair.second, second)};
 }
 
 void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double strike) {
@@ -302,10 +315,13 @@ Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6
 int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
     for (auto& meetings : meetings_) meetings.clear();
+    if (swings_ && !open_.empty()) index_points();
     share_out(team_.get(), open_.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k)
+        for (std::size_t k = begin; k < end; ++k) {
+            if (end - begin == open_.size() && (k + 1) % pairs_a_look == 0) Watch::look();  // on one thread
             if (const double time = meeting(open_[k], velocity, late); !(time < 0.0))
                 meetings_[part].push_back({k, time});
+        }
     });
     int found = 0;
     for (const auto& meetings : meetings_)

@@ -1,5 +1,6 @@
 // The contact stage by sweeps: resting contact for as many bodies as there are.
 #include <algorithm>
+#include <utility>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
@@ -11,7 +12,8 @@ namespace {
 
 constexpr int most_turns = 16;  // times `iterations` sweeps' work, where a step would be unsettled otherwise
 constexpr int joint_turns = 4;  // the same where a joint is furthest off: all of them are swept each time
-constexpr double focus = 0.5;   // of the residual allowed: contacts that change less are left alone then
+constexpr double too_much = 1e6;  // times the energy there is
+constexpr double focus = 0.5;     // of the residual allowed: contacts that change less are left alone then
 // Before points found late are solved for:
 constexpr int foreseeing = 100;         // sweeps at most
 constexpr double foreseen = 1e-6;       // of the speeds: what changes less is
@@ -135,6 +137,33 @@ bool ContactStage::is_settled(MixedSystem& system) {
     return unsettled_body_ < 0;
 }
 
+/// Whether the sweeps have made far more energy than there is. No answer does, but where friction on a long arm loads the
+/// contact that it stems from, each sweep's may be larger than the one before.
+bool ContactStage::runs_away(const MixedSystem& system) const {
+    double speed = 0.0, had = 0.0, has = 0.0;  // of what moves as it is told, or along itself
+    for (std::size_t b = 0; supplies_ && b < prescribed_.size(); ++b)
+        speed = std::max(speed, norm(linear(prescribed_[b])) +
+                                    radius(static_cast<int>(b)) * norm(angular(prescribed_[b])));
+    for (const Point& point : points_)
+        if (conveys_)
+            speed = std::max({speed, std::abs(carried(point, point.tangent)),
+                              std::abs(carried(point, cross(point.contact.point.normal, point.tangent)))});
+    const auto energy = [](const Mat6& mass, const Vec6& v) {
+        double sum = 0.0;
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6; ++j) sum += 0.5 * v[i] * mass[6 * i + j] * v[j];
+        return sum;
+    };
+    for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        if (unknown_[b] < 0) continue;
+        const Mat6& mass = system.mass[unknown_[b]];
+        had +=
+            energy(mass, velocity_[b]) + energy(mass, sum(velocity_[b], kick_[b])) + mass[0] * speed * speed;
+        has += energy(mass, system.velocity[unknown_[b]]);
+    }
+    return !(has <= too_much * had);
+}
+
 /// The islands of the points, and which of them have points from `known` on: no solve has answered those yet.
 const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies, std::size_t known) {
     arrays_.hanging.begin(static_cast<int>(bodies));
@@ -188,7 +217,8 @@ void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
     }
 }
 
-/// `left`: it ends unfinished, since few joints and contacts are better solved by rows, and directly if need be.
+/// `left`: it ends unfinished, since few joints and contacts are better solved by rows, and directly if need be; or the
+/// sweeps run away.
 bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     sweeps_.start(system, options_.friction);
     next_.clear();
@@ -203,11 +233,18 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     sunk_ = false;
     for (bool again = true; again;) {
         again = false;
+        double last = unbounded;
         for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
             report = sweeps_.run(options_.iterations, options_.residual_tolerance,
                                  focus * options_.unsettled_residual, [this] { return find_more(); });
             counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-            if (!report.finite || is_settled(system) || report.converged) break;
+            if ((report.finite && is_settled(system)) || report.converged) break;
+            const bool grows = residual_ > std::exchange(last, residual_) && system.rows.empty();
+            if (!report.finite || (grows && runs_away(system))) {
+                points_.resize(begun);  // what was met on that way is not
+                find_open();
+                return left = ran_away_ = true;
+            }
             if (turn + 1 >= joint_turns && joint_is_worst_) break;
         }
         if (!report.finite) break;

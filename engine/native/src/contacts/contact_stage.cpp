@@ -10,8 +10,9 @@ namespace spook {
 
 namespace {
 
-constexpr double slack_share = 1e-10;  // of the smaller body's radius
-constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
+constexpr std::size_t not_too_large = 500;  // blocks
+constexpr double slack_share = 1e-10;       // of the smaller body's radius
+constexpr double rounding = 1e-15;          // of a place and of a size: four roundings
 constexpr int late_rounds = 64;  // of solves that set others in motion towards a third: each finds pairs anew
 
 FrictionReport sweep(const ContactOptions& o, FrictionModel model, MixedSystem& island,
@@ -186,10 +187,12 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
     const bool exact = &islands == &impact_solver_ || by_rows_;
     const double enough = exact ? o.residual_tolerance : o.unsettled_residual;
     const bool foreseen = foreseen_ && &islands == &resting_solver_;
-    const auto solve = [&o, model, enough, foreseen](MixedSystem& island, std::vector<FrictionPoint>& own,
-                                                     DirectSolver& solver) {
+    const bool direct = o.solver == SolverKind::direct;
+    const std::size_t most = direct ? system.rows.size() : ran_away_ ? not_too_large : 0;
+    const auto solve = [&o, model, enough, foreseen, most](
+                           MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
         solver.foreseen = foreseen;
-        if (o.solver == SolverKind::direct) return solve_friction_direct(island, own, model, solver);
+        if (island.rows.size() <= most) return solve_friction_direct(island, own, model, solver);
         if (island.rows.size() > few_rows) return sweep(o, model, island, own, solver);
         return sweep_or_solve(o, model, enough, island, own, solver);
     };
@@ -283,7 +286,7 @@ RowBlock ContactStage::resting_row(Point& point) const {
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
-    foreseen_ = ends_passed_ = false;
+    foreseen_ = ends_passed_ = ran_away_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) {
         bool left = false;
         const bool finite = solve_by_sweeps(system, left);

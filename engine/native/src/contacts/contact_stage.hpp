@@ -293,6 +293,9 @@ private:
     bool blows_come_first();
     bool find_left_out(const std::vector<Vec6>& velocity);
     void look_at(const std::vector<IndexPair>& near);
+    OpenPair opened(const IndexPair& pair, const Separation& apart) const;
+    bool let_pass(std::size_t from);
+    bool passes_by(const Point& point, double overlap) const;
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
     bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
@@ -345,7 +348,9 @@ private:
     bool outrun(const std::vector<Vec6>& velocity);
     double slop(const OpenPair& open) const noexcept;
     double sunk_by(const Point& point) const;
-    bool is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open) const;
+    void index_points();
+    bool is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
+                 Vec3 facing = {}) const;
     Pose moved(int body, const std::vector<Vec6>& velocity) const;
     Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
     double meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const;
@@ -371,6 +376,7 @@ private:
     void take_in(std::size_t known);
     void note_sinking();
     bool is_settled(MixedSystem& system);
+    bool runs_away(const MixedSystem& system) const;
     void hand_over();
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
@@ -438,6 +444,7 @@ private:
     DepthOfPair given_;                // by pair: overlap the scene began with, as far as it is left, m
     bool begun_ = false;               // whether it is known
     bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly
+    bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
     std::vector<Vec6> next_;     // velocities between sweeps, per body of the scene
     std::vector<char> changed_;  // who has another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
@@ -469,6 +476,7 @@ private:
     std::vector<double> depth_;       // of a body's closed contacts, m
     std::vector<double> sinking_;     // what sweeps that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;
+    std::vector<int> points_of_, points_begin_;  // points by moving body, and where each one's begin
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
     std::vector<double> lead_, event_time_;
