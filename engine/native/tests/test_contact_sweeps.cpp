@@ -45,7 +45,7 @@ SweepContact on_the_ground(int body, double friction) {
     return contact;
 }
 
-const std::function<bool()> nothing_more = [] { return false; };
+const std::function<bool(bool)> nothing_more = [](bool) { return false; };
 
 /// The first body's island is broken, the second's is not: whatever holds the first, the solve has not settled.
 void an_island_that_is_no_number_has_not_settled() {
@@ -85,7 +85,7 @@ void what_is_found_last_leaves_it_open() {
         sweeps.start(system, FrictionModel::cone);
         sweeps.add(on_the_ground(0, 0.0));
         int known = 1, sweep_end = 0;
-        const FrictionReport report = sweeps.run(4, 1e-9, 1e-9, [&] {
+        const FrictionReport report = sweeps.run(4, 1e-9, 1e-9, [&](bool) {
             if (++sweep_end > late) return false;
             sweeps.add(on_the_ground(known++, 0.0));
             return true;

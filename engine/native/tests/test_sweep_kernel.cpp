@@ -116,7 +116,7 @@ std::vector<double> heap(int threads, bool portable, FrictionModel model) {
     for (int k = 0; k < all; ++k) add();
     int left = 2;
     std::vector<double> out;
-    const auto more = [&] {
+    const auto more = [&](bool) {
         if (left-- <= 0) return false;
         for (int k = 0; k < late; ++k) add();
         return true;

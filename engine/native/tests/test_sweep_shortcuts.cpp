@@ -13,7 +13,7 @@ using namespace spook;
 namespace {
 
 constexpr int forever = 1'000'000;  // sweeps: no island is spent
-const std::function<bool()> nothing_more = [] { return false; };
+const std::function<bool(bool)> nothing_more = [](bool) { return false; };
 
 Mat6 unit_mass() {
     Mat6 unit{};
@@ -151,7 +151,7 @@ void islands_that_grow_together_obey_the_law() {
             for (int k = 0; k < 12; ++k) heap.add(any_contact(random, bodies, friction));
             int left = 16;
             const double tolerance = 1e-11;
-            const auto find = [&] {
+            const auto find = [&](bool) {
                 if (left == 0) return false;
                 for (int k = static_cast<int>(random() % 3); k >= 0 && left > 0; --k, --left) {
                     const SweepContact& found = any_contact(random, bodies, friction);
@@ -183,7 +183,7 @@ void a_body_at_rest_is_woken_by_what_joins_it() {
         for (int k = 0; k < bodies - 1; ++k)
             heap.add(between(foot + k, k == 0 ? -1 : foot + k - 1, {0, 0, 1}, 0.0));
         bool met = false;
-        const FrictionReport report = heap.sweeps.run(forever, 1e-13, 1e-3, [&] {
+        const FrictionReport report = heap.sweeps.run(forever, 1e-13, 1e-3, [&](bool) {
             if (met) return false;
             SweepContact push = between(still, foot, {0, 0, 1}, 0.0);
             push.right[0] = 0.25;

@@ -15,10 +15,10 @@ namespace {
 constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
-constexpr unsigned pairs_a_look = 256;   // of shapes, between two looks at the clock
-constexpr std::size_t many_pairs = 512;  // worth several threads
-constexpr double vanishing = 1e-8;       // a direction so steep on the surface has no shadow
-constexpr double steep = 0.9;            // of normals: up to it another side, or an edge of one
+constexpr unsigned pairs_a_look = 256;    // of shapes, between two looks at the clock
+constexpr std::size_t many_pairs = 512;   // worth several threads
+constexpr double vanishing = 1e-8;        // a direction so steep on the surface has no shadow
+constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
 
 }  // namespace
 
@@ -192,7 +192,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
     }
     for (std::size_t k = before; k < points_.size(); ++k) {
         // As deep as a body will be when it meets the next part of what holds it.
-        const double depth = sunk_by(points_[k]);
+        const double depth = sunk_by(points_[k], false);
         for (const int b : {points_[k].contact.first, points_[k].contact.second})
             depth_[b] = std::max(depth_[b], depth);
     }
@@ -291,7 +291,8 @@ double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velo
     const Mover first = mover(open.pair.first, at_first, velocity),
                 second = mover(open.pair.second, at_second, velocity);
     const double time = first_touch(first, second, options_.time_step, slop(open));
-    if (time < 0.0 || is_seam(first, open.first, second, open) || is_seam(second, open.second, first, open))
+    if (time < 0.0 || is_seam(first, open.first, second, open, velocity, time, late) ||
+        is_seam(second, open.second, first, open, velocity, time, late))
         return -1.0;
     return time;
 }
@@ -323,23 +324,26 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
                 meetings_[part].push_back({k, time});
         }
     });
+    std::vector<Meeting>& all = meetings_[0];
+    for (std::size_t part = 1; part < meetings_.size(); ++part)
+        all.insert(all.end(), meetings_[part].begin(), meetings_[part].end());
+    leave_out_what_others_keep_off(all, velocity);
     int found = 0;
-    for (const auto& meetings : meetings_)
-        for (const auto& [k, time] : meetings) {
-            OpenPair& open = open_[k];
-            const Pose first = moved(open.first, velocity), second = moved(open.second, velocity);
-            const std::size_t known = points_.size();
-            const bool met =
-                add_strike(open.pair, mover(open.pair.first, first, velocity).body_at(time),
-                           mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
-            const Vec3 led = (first.position - poses_[open.first].position) -
-                             (second.position - poses_[open.second].position);
-            for (std::size_t i = known; i < points_.size(); ++i)
-                points_[i].begun -= dot(points_[i].contact.point.normal, led);
-            if (!met) continue;
-            open.first = -1;
-            ++found;
-        }
+    for (const auto& [k, time] : all) {
+        OpenPair& open = open_[k];
+        const Pose first = moved(open.first, velocity), second = moved(open.second, velocity);
+        const std::size_t known = points_.size();
+        const bool met =
+            add_strike(open.pair, mover(open.pair.first, first, velocity).body_at(time),
+                       mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
+        const Vec3 led =
+            (first.position - poses_[open.first].position) - (second.position - poses_[open.second].position);
+        for (std::size_t i = known; i < points_.size(); ++i)
+            points_[i].begun -= dot(points_[i].contact.point.normal, led);
+        if (!met) continue;
+        open.first = -1;
+        ++found;
+    }
     if (found > 0) std::erase_if(open_, [](const OpenPair& open) { return open.first < 0; });
     return found;
 }
@@ -415,6 +419,12 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
         detection_.touch(pair, search_[meeting.first] + search_[meeting.second], scratch_);
         const std::size_t old = points_.size();
         bool stops = false;
+        // Past an edge of what does not move, it is met with another side than the one it faces at the start.
+        const bool fixed = std::min(unknown_[meeting.first], unknown_[meeting.second]) < 0;
+        if (fixed && std::any_of(scratch_.begin(), scratch_.end(), [&](const Contact& contact) {
+                return dot(contact.point.normal, meeting.point.normal) < same_side;
+            }))
+            scratch_.clear();
         for (const Contact& contact : scratch_) {
             add_point(contact, poses_[contact.first], poses_[contact.second], strike);
             stops =

@@ -68,7 +68,8 @@ void ContactStage::note_sinking() {
 }
 
 /// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
-bool ContactStage::find_more() {
+bool ContactStage::find_more(bool over) {
+    settling_ = !over;
     const bool first = next_.empty();  // look of this step
     next_.resize(unknown_.size());
     changed_.resize(unknown_.size());
@@ -200,7 +201,8 @@ void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
     handed_over_ = 0;
     hand_over();
     const double enough = foreseen * speed;
-    const FrictionReport report = sweeps_.run(foreseeing, enough, enough, [this] { return find_more(); });
+    const FrictionReport report =
+        sweeps_.run(foreseeing, enough, enough, [this](bool over) { return find_more(over); });
     counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
     late_blow_ = false;  // by velocities on the way: the solve will tell
     std::fill(sinking_.begin(), sinking_.end(), 0.0);
@@ -225,6 +227,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     late_blow_ = false;
     handed_over_ = 0;
     hand_over();
+    settling_ = false;
     const std::size_t begun = points_.size();
     FrictionReport report;
     residual_ = 0.0;
@@ -236,7 +239,8 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
         double last = unbounded;
         for (int turn = 0; turn < most_turns || sweeps_.work() < most_turns * options_.iterations; ++turn) {
             report = sweeps_.run(options_.iterations, options_.residual_tolerance,
-                                 focus * options_.unsettled_residual, [this] { return find_more(); });
+                                 focus * options_.unsettled_residual,
+                                 [this](bool over) { return find_more(over); });
             counters_.sweeps += static_cast<std::uint64_t>(report.sweeps);
             if ((report.finite && is_settled(system)) || report.converged) break;
             const bool grows = residual_ > std::exchange(last, residual_) && system.rows.empty();

@@ -4,6 +4,10 @@
 // of the second. Swept as it would stand if it were lifted out of the first, it goes over the second. What does not lie
 // beneath the surface it is lifted to is no such part: it is met where it stands, however deep the body is sunk elsewhere,
 // or overlaps would breed others.
+//
+// Who falls onto the first tile is swept through it as well, and would come to the side of the second from below: what is met
+// first keeps a body off what it would meet only behind. And where edges lie on each other, as a body's and a tile's do when
+// a step begins there, both faces are as near: the one it moves past is no obstacle.
 #include <algorithm>
 
 #include "collision/sweep.hpp"
@@ -14,18 +18,24 @@ namespace spook {
 
 namespace {
 
-constexpr double share = 0.25;     // of the overlap at which pairs count as met: less is none
-constexpr double same_face = 0.9;  // cosine of normals: what both lie on
+constexpr double share = 0.25;            // of the overlap at which pairs count as met: less is none
+constexpr double same_face = 0.9;         // cosine of normals: what both lie on
+constexpr double level = 1e-6;            // of a kick: a part along a normal that is none
+constexpr std::size_t most_before = 8;    // of the meetings of a body, that may keep it off later ones
+constexpr double together = 0.05;         // of a step: which of two meetings comes first is not known
+constexpr double same_way = 1.0 - 1e-12;  // the same of one face met twice
+constexpr double unheld =
+    3.0;  // of its fall in a step: what the far end of a body may sink before sweeps hold it
 
 }  // namespace
 
-/// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m: as
-/// much as sweeps that count as settled may have left, or as the depth.
-double ContactStage::sunk_by(const Point& point) const {
+/// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
+/// When a solve has answered it, as much as sweeps that count as settled may have left, or as the depth.
+double ContactStage::sunk_by(const Point& point, bool late) const {
     const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
-    const double sinking = -h * relative(point, point.contact.point.normal, velocity_, false);
+    const double sinking = std::max(0.0, -h * relative(point, point.contact.point.normal, velocity_, false));
     const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
-    return depth + std::clamp(sinking, 0.0, std::max(depth, left));
+    return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
 }
 
 /// Puts the points of each body together: what holds it is asked of each that it would meet.
@@ -43,10 +53,10 @@ void ContactStage::index_points() {
     both([&](std::size_t b, int k) { points_of_[static_cast<std::size_t>(begin[b + 1]++)] = k; });
 }
 
-/// Whether `body`, that would meet another as they move, does not once it is lifted out of what holds it. `facing` is
+/// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
 /// the normal they touch with already, if they do. Between sweeps a body may also sink on the way.
 bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                           Vec3 facing) const {
+                           const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing) const {
     const ShapeKind kind = moving.shape.kind, next = other.shape.kind;
     if (kind == ShapeKind::plane || next == ShapeKind::plane) return false;  // they have no sides
     if (kind == ShapeKind::sphere && next == ShapeKind::sphere) return false;
@@ -59,21 +69,35 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
     const int end = points_begin_[static_cast<std::size_t>(body) + 1];
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
-        Vec3 n;
-        double depth = -unbounded, begun = 0.0;
+        Vec3 n, leads;  // what holds it goes itself, m/s
+        double depth = -unbounded, begun = -unbounded, sinking = 0.0;
         for (; at < end && points_[points_of_[at]].contact.key >> feature_bits == pair; ++at) {
             const Point& point = points_[points_of_[at]];
-            if (point.strike >= 0.0) continue;
-            const double deep = sunk_by(point), side = point.contact.first == body ? 1.0 : -1.0;
-            if (deep > depth) depth = deep, n = side * point.contact.point.normal;
-            begun = std::max(begun, -point.contact.point.gap);
+            const bool strikes = point.strike >= 0.0;
+            if (strikes && !(late && settling_)) continue;
+            const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
+            const double deep = strikes ? -gap : sunk_by(point, late);
+            if (deep > depth) {
+                const int holder = point.contact.first == body ? point.contact.second : point.contact.first;
+                const Vec3 arm = point.contact.first == body ? point.second_arm : point.first_arm;
+                depth = deep, n = side * point.contact.point.normal;
+                leads = linear(velocity[holder]) + cross(angular(velocity[holder]), arm);
+            }
+            begun = std::max(begun, strikes ? -gap : std::max(0.0, -gap));
+            sinking = std::max(sinking, strikes ? gap : sunk_by(point, false));
         }
-        if (depth < 0.0 || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face) continue;
+        if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face)
+            continue;
         if (sinks) {
-            const double falls =
-                height(moving.shape, moving.at(0.0), n) - height(moving.shape, moving.at(h), n);
-            depth = std::max(
-                depth, begun + std::clamp(falls, 0.0, std::max(begun, h * options_.unsettled_residual)));
+            const double now = height(moving.shape, moving.at(0.0), n);
+            double falls = 0.0;
+            for (const double part : {time, h})
+                falls =
+                    std::max(falls, now + part * dot(n, leads) - height(moving.shape, moving.at(part), n));
+            double most = h * options_.unsettled_residual;
+            if (settling_) most += sinking + h * unheld * norm(linear(kick_[body]));
+            depth = std::max(depth, begun + std::min(falls, std::max(begun, most)));
+            if (time > 0.0) depth += slop;  // it met the other with as much
         }
         if (!(depth > least)) continue;
         Pose out = moving.body;
@@ -83,6 +107,74 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
         if (above > -least && first_touch(lifted, other, h, slop) < 0.0) return true;
     }
     return false;
+}
+
+/// Whether `body`, that meets one after the other in this step, would not meet the later one if the earlier one stopped it:
+/// it falls onto a tile, and would be past its edge, below its top, when it came to the next one's side.
+bool ContactStage::keeps_off(const Meeting& earlier, const Meeting& later, int body,
+                             const std::vector<Vec6>& velocity) const {
+    const OpenPair &before = open_[earlier.open], &after = open_[later.open];
+    const Pose before_first = moved(before.first, velocity), before_second = moved(before.second, velocity),
+               after_first = moved(after.first, velocity), after_second = moved(after.second, velocity);
+    const Mover one = mover(before.pair.first, before_first, velocity),
+                two = mover(before.pair.second, before_second, velocity),
+                three = mover(after.pair.first, after_first, velocity),
+                four = mover(after.pair.second, after_second, velocity);
+    const Mover &held = before.first == body ? one : two, &moving = after.first == body ? three : four,
+                &other = after.first == body ? four : three;
+    for (const Mover* each : {&one, &two, &three, &four})
+        if (each->shape.kind == ShapeKind::triangle) return false;  // its neighbours are known
+    if (moving.shape.kind == ShapeKind::plane || other.shape.kind == ShapeKind::plane) return false;
+    if (moving.shape.kind == ShapeKind::sphere && other.shape.kind == ShapeKind::sphere) return false;
+    const auto normal = [](const Mover& a, const Mover& b, double time) {
+        return separation(a.shape, a.at(time), b.shape, b.at(time)).normal;
+    };
+    const auto height = [](const Mover& of, double time, Vec3 n) {
+        return separation(of.shape, of.at(time), Primitive::plane(n), {}).gap;
+    };
+    const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier.time);
+    const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later.time);
+    if (dot(n, side) > same_way) return false;
+    const double h = options_.time_step, slop = this->slop(after), level = height(held, earlier.time, n);
+    if (!(level + height(other, earlier.time, -n) > -2.0 * (slop + this->slop(before)))) return false;
+    const Mover& holder = before.first == body ? two : one;
+    const double leads = std::min(0.0, dot(n, holder.velocity)) * (h - earlier.time);
+    const double falls = level + leads - std::min(height(held, later.time, n), height(held, h, n));
+    if (!(falls > 0.0)) return false;
+    Pose out = moving.body;
+    out.position += (falls + slop) * n;
+    return first_touch({moving.shape, moving.part, out, moving.velocity, moving.spin}, other, h, slop) < 0.0;
+}
+
+/// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
+/// all the same is found again with the velocities of the solve.
+void ContactStage::leave_out_what_others_keep_off(std::vector<Meeting>& meetings,
+                                                  const std::vector<Vec6>& velocity) {
+    if (!swings_ || meetings.size() < 2) return;
+    meetings_of_.clear();
+    for (std::size_t at = 0; at < meetings.size(); ++at)
+        for (const int b : {open_[meetings[at].open].first, open_[meetings[at].open].second})
+            if (unknown_[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
+    std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
+        return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
+    });
+    for (std::size_t from = 0; from < meetings_of_.size();) {
+        std::size_t end = from + 1;
+        for (; end < meetings_of_.size() && meetings_of_[end].body == meetings_of_[from].body; ++end) {
+            Meeting& later = meetings[meetings_of_[end].at];
+            for (std::size_t k = from; k < std::min(end, from + most_before) && !(later.time < 0.0); ++k) {
+                Meeting& earlier = meetings[meetings_of_[k].at];
+                if (earlier.time < 0.0) continue;
+                const int body = meetings_of_[from].body;
+                if (keeps_off(earlier, later, body, velocity)) later.time = -1.0;
+                else if (later.time - earlier.time < together * options_.time_step &&
+                         keeps_off(later, earlier, body, velocity))
+                    earlier.time = -1.0;
+            }
+        }
+        from = end;
+    }
+    std::erase_if(meetings, [](const Meeting& meeting) { return meeting.time < 0.0; });
 }
 
 /// Takes out the points from `from` on of pairs that only graze: they touch with a side or an edge, and as they move no
@@ -104,7 +196,7 @@ bool ContactStage::let_pass(std::size_t from) {
             const double overlap = h * closing - std::max(0.0, contact.point.gap);
             if (overlap > most) most = overlap, deepest = end;
         }
-        if (most > 0.0 && passes_by(points_[deepest], most))
+        if (most > 0.0 && passes_by(points_[deepest], most) && !is_needed(points_[deepest], gone))
             gone.push_back({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)});
     }
     for (const IndexPair& pair : gone) {
@@ -115,6 +207,32 @@ bool ContactStage::let_pass(std::size_t from) {
                       [&](const Point& point) { return point.contact.key >> feature_bits == pair_of(pair); });
     }
     return !gone.empty();
+}
+
+/// Whether forces press the bodies of a point together, and nothing else that is left holds one of them as it does.
+bool ContactStage::is_needed(const Point& point, const std::vector<IndexPair>& gone) const {
+    const Contact& contact = point.contact;
+    const double push = -relative(point, contact.point.normal, kick_, false);
+    if (!(push > level * (norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second])))))
+        return false;
+    for (const int body : {contact.first, contact.second}) {
+        if (unknown_[body] < 0) continue;
+        const double side = contact.first == body ? 1.0 : -1.0;
+        for (int at = points_begin_[static_cast<std::size_t>(body)];
+             at < points_begin_[static_cast<std::size_t>(body) + 1]; ++at) {
+            const Contact& other = points_[points_of_[at]].contact;
+            const std::uint64_t pair = other.key >> feature_bits;
+            const double own = other.first == body ? 1.0 : -1.0;
+            if (pair == contact.key >> feature_bits || !(points_[points_of_[at]].strike < 0.0) ||
+                !is_closed(other))
+                continue;
+            if (side * own * dot(other.point.normal, contact.point.normal) < same_face) continue;
+            if (std::none_of(gone.begin(), gone.end(),
+                             [&](const IndexPair& g) { return pair_of(g) == pair; }))
+                return false;
+        }
+    }
+    return true;
 }
 
 /// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
@@ -132,8 +250,8 @@ bool ContactStage::passes_by(const Point& point, double overlap) const {
     const Mover first = mover(pair.first, poses_[a], velocity_),
                 second = mover(pair.second, poses_[b], velocity_);
     return first_touch(first, second, options_.time_step, slop(open)) < 0.0 ||
-           is_seam(first, a, second, open, contact.point.normal) ||
-           is_seam(second, b, first, open, contact.point.normal);
+           is_seam(first, a, second, open, velocity_, 0.0, true, contact.point.normal) ||
+           is_seam(second, b, first, open, velocity_, 0.0, true, contact.point.normal);
 }
 
 }  // namespace spook

@@ -282,6 +282,10 @@ private:
         Separation apart;
         double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
     };
+    struct Meeting {  // of an open pair, s
+        std::size_t open;
+        double time;
+    };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void lie_as(const Memory& memory);
     void rouse(const Contact& contact);
@@ -295,6 +299,7 @@ private:
     void look_at(const std::vector<IndexPair>& near);
     OpenPair opened(const IndexPair& pair, const Separation& apart) const;
     bool let_pass(std::size_t from);
+    bool is_needed(const Point& point, const std::vector<IndexPair>& gone) const;
     bool passes_by(const Point& point, double overlap) const;
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
@@ -347,10 +352,13 @@ private:
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
     bool outrun(const std::vector<Vec6>& velocity);
     double slop(const OpenPair& open) const noexcept;
-    double sunk_by(const Point& point) const;
+    double sunk_by(const Point& point, bool late) const;
     void index_points();
+    void leave_out_what_others_keep_off(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity);
+    bool keeps_off(const Meeting& earlier, const Meeting& later, int body,
+                   const std::vector<Vec6>& velocity) const;
     bool is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                 Vec3 facing = {}) const;
+                 const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing = {}) const;
     Pose moved(int body, const std::vector<Vec6>& velocity) const;
     Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
     double meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const;
@@ -372,7 +380,7 @@ private:
     };
     const Unanswered& find_unanswered(std::size_t bodies, std::size_t known);
     void order_touches();
-    bool find_more();
+    bool find_more(bool over);
     void take_in(std::size_t known);
     void note_sinking();
     bool is_settled(MixedSystem& system);
@@ -456,17 +464,19 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     LargeArray<OpenPair> open_;
-    std::vector<Separation> apart_;  // of pairs, found on several threads
-    struct Meeting {
-        std::size_t open;
-        double time;
-    };
+    std::vector<Separation> apart_;               // of pairs, found on several threads
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread
-    std::vector<IndexPair> beside_, seams_;       // pairs without points, where others part; those let in
-    std::vector<IndexPair> near_;                 // where the search was widened
-    std::vector<int> grown_;                      // whom it was widened for
-    std::vector<char> supported_;                 // bodies that closed contacts carry
-    struct Pressing {                             // of a closed point: whom the forces press on the other one
+    struct MeetingOf {
+        int body;
+        double time;
+        std::size_t at;
+    };
+    std::vector<MeetingOf> meetings_of_;     // by body and time
+    std::vector<IndexPair> beside_, seams_;  // pairs without points, where others part; those let in
+    std::vector<IndexPair> near_;            // where the search was widened
+    std::vector<int> grown_;                 // whom it was widened for
+    std::vector<char> supported_;            // bodies that closed contacts carry
+    struct Pressing {                        // of a closed point: whom the forces press on the other one
         int first, second;
         bool first_presses, second_presses,
             both;  // both: on each other, whether or not somebody carries them
@@ -494,6 +504,7 @@ private:
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
     bool foreseen_ = false;       // the step's next solve starts from foresee()
+    bool settling_ = false;       // sweeps go on: what bodies do so far is not what they will
     bool late_blow_ = false;      // a strike found after the solve needs an impact
     bool plastic_first_ = false;  // plastic blows are met in the impact as well
     bool ends_passed_ = false;    // by the last solve

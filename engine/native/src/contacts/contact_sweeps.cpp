@@ -354,7 +354,7 @@ void ContactSweeps::sweep(double focus) noexcept {
 }
 
 FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus,
-                                  const std::function<bool()>& more) {
+                                  const std::function<bool(bool)>& more) {
     FrictionReport report;
     if (!swept_) std::fill(active_.begin(), active_.end(), 1);
     swept_ = true;
@@ -381,7 +381,7 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
         look = 2 * round;
         if (round >= until)
             for (const int island : roots_) spent_[island] = spent_[island] || active_[island];
-        const bool grown = more && more();
+        const bool grown = more && more(over);
         if (scheduled_ < bodies_of_.size()) schedule();
         if (!over) continue;
         if (!grown || late == late_rounds) break;
