@@ -19,6 +19,19 @@ template <class T> std::vector<T>& filled(std::vector<T>& array, std::size_t cou
     return array;
 }
 
+/// Of an open pair, by its place; s.
+struct Meeting {
+    std::size_t open;
+    double time;
+};
+
+/// Of a body, the one at that place.
+struct MeetingOf {
+    int body;
+    double time;
+    std::size_t at;
+};
+
 /// A depth [m] by pair of colliders, in one array.
 class DepthOfPair {
 public:

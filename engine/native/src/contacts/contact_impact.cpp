@@ -1,4 +1,11 @@
 // The contact stage's second part: blows.
+//
+// Why the impact cannot raise the kinetic energy E = ½ vᵀ M v. Let v_p be the plastic impact (psi = 0): with
+// impulse P, M (v_p − v₋) = P and E_p − E₋ = v_p·P − ½ |v_p − v₋|²_M, where v_p·P = Σ nu C v_p + beta·D v_p, whose
+// first part is zero by complementarity and whose second is negative, friction acting against the slip. So
+// E_p <= E₋. Newton's law, v_N, can raise E where restitutions differ, or where friction turns a slip round: then
+// v₊ = v_p + s (v_N − v_p) with the largest s in 0 … 1 for which E(v₊) <= E₋, island by island. It exists, E being
+// convex in s and E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
 #include <algorithm>
 #include <cmath>
 #include <utility>

@@ -60,9 +60,8 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
     const ShapeKind kind = moving.shape.kind, next = other.shape.kind;
     if (kind == ShapeKind::plane || next == ShapeKind::plane) return false;  // they have no sides
     if (kind == ShapeKind::sphere && next == ShapeKind::sphere) return false;
-    const bool sinks = options_.solver == SolverKind::iterative;
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
-    if (unknown_[body] < 0 || !(sinks || depth_[body] > least)) return false;
+    if (unknown_[body] < 0 || !(settling_ || depth_[body] > least)) return false;
     const auto height = [&](const Primitive& shape, const Pose& at, Vec3 n) {
         return separation(shape, at, Primitive::plane(n), {}).gap;  // of a triangle: infinite
     };
@@ -70,34 +69,33 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
         Vec3 n, leads;  // what holds it goes itself, m/s
-        double depth = -unbounded, begun = -unbounded, sinking = 0.0;
+        double depth = -unbounded, begun = 0.0, sinking = 0.0;
         for (; at < end && points_[points_of_[at]].contact.key >> feature_bits == pair; ++at) {
             const Point& point = points_[points_of_[at]];
-            const bool strikes = point.strike >= 0.0;
-            if (strikes && !(late && settling_)) continue;
+            if (point.strike >= 0.0) continue;
             const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
-            const double deep = strikes ? -gap : sunk_by(point, late);
+            const double deep = sunk_by(point, late);
             if (deep > depth) {
                 const int holder = point.contact.first == body ? point.contact.second : point.contact.first;
                 const Vec3 arm = point.contact.first == body ? point.second_arm : point.first_arm;
                 depth = deep, n = side * point.contact.point.normal;
                 leads = linear(velocity[holder]) + cross(angular(velocity[holder]), arm);
             }
-            begun = std::max(begun, strikes ? -gap : std::max(0.0, -gap));
-            sinking = std::max(sinking, strikes ? gap : sunk_by(point, false));
+            begun = std::max(begun, -gap);
+            sinking = std::max(sinking, sunk_by(point, false));
         }
         if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face)
             continue;
-        if (sinks) {
+        if (settling_) {
             const double now = height(moving.shape, moving.at(0.0), n);
             double falls = 0.0;
             for (const double part : {time, h})
                 falls =
                     std::max(falls, now + part * dot(n, leads) - height(moving.shape, moving.at(part), n));
-            double most = h * options_.unsettled_residual;
-            if (settling_) most += sinking + h * unheld * norm(linear(kick_[body]));
+            const double most =
+                h * (options_.unsettled_residual + unheld * norm(linear(kick_[body]))) + sinking;
             depth = std::max(depth, begun + std::min(falls, std::max(begun, most)));
-            if (time > 0.0) depth += slop;  // it met the other with as much
+            depth += slop;  // it met the other with as much
         }
         if (!(depth > least)) continue;
         Pose out = moving.body;

@@ -19,18 +19,11 @@
 // with v, which their supports agree with; flying ones with v + h M⁻¹ f, whether or not they touch.
 //
 // A strike of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
-// arms of the meeting: impulses act there, with
-// the part t/h of the step's forces before and the rest after, and both bodies are led t v₋ + (h − t) v₊ along.
+// arms of the meeting: impulses act there, with the part t/h of the step's forces before and the rest after, and both bodies
+// are led t v₋ + (h − t) v₊ along.
 // Other strikes act at the start of the step: the gap may close, no more; with restitution a step early, psi then
 // reduced to psi', psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching
 // speed, so that the fall still ahead is not won twice.
-//
-// Why the impact cannot raise the kinetic energy E = ½ vᵀ M v. Let v_p be the plastic impact (psi = 0): with
-// impulse P, M (v_p − v₋) = P and E_p − E₋ = v_p·P − ½ |v_p − v₋|²_M, where v_p·P = Σ nu C v_p + beta·D v_p, whose
-// first part is zero by complementarity and whose second is negative, friction acting against the slip. So
-// E_p <= E₋. Newton's law, v_N, can raise E where restitutions differ, or where friction turns a slip round: then
-// v₊ = v_p + s (v_N − v_p) with the largest s in 0 … 1 for which E(v₊) <= E₋, island by island. It exists, E being
-// convex in s and E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
 //
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was
@@ -151,9 +144,8 @@ public:
         std::vector<Vec6> velocity;  // per moving body; empty when none is
         Islands islands;             // of bodies that push each other, or hang together by joints
         std::vector<char> grounded;  // per island: something that does not move by itself took part
-        std::vector<char>
-            supplied;          // per island: what moves it, or an overlap of the start, may do work on it
-        double deepest = 0.0;  // overlap that nothing explains, m
+        std::vector<char> supplied;  // per island: what moves it, or a first overlap, may do work on it
+        double deepest = 0.0;        // overlap that nothing explains, m
     };
     const Parting& parting() const noexcept { return parting_; }
     /// Whether displacements come by sweeps: cheap, and as exact as the next step will need.
@@ -281,10 +273,6 @@ private:
         int first, second;  // bodies
         Separation apart;
         double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
-    };
-    struct Meeting {  // of an open pair, s
-        std::size_t open;
-        double time;
     };
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void lie_as(const Memory& memory);
@@ -436,8 +424,7 @@ private:
     bool supplies_ = false;      // or, in this step, something that does not move by itself
     bool oriented_ = false;      // some surface has a friction that differs with the direction
     bool resists_turning_ = false;
-    bool swings_ =
-        false;  // some surface is neither a sphere's nor a plane's: what turns on it may meet elsewhere
+    bool swings_ = false;     // some surface has sides: what turns on it may meet elsewhere
     std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, parting_solver_;
     ContactSweeps sweeps_, parting_sweeps_;
@@ -466,20 +453,14 @@ private:
     LargeArray<OpenPair> open_;
     std::vector<Separation> apart_;               // of pairs, found on several threads
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread
-    struct MeetingOf {
-        int body;
-        double time;
-        std::size_t at;
-    };
-    std::vector<MeetingOf> meetings_of_;     // by body and time
-    std::vector<IndexPair> beside_, seams_;  // pairs without points, where others part; those let in
-    std::vector<IndexPair> near_;            // where the search was widened
-    std::vector<int> grown_;                 // whom it was widened for
-    std::vector<char> supported_;            // bodies that closed contacts carry
-    struct Pressing {                        // of a closed point: whom the forces press on the other one
+    std::vector<MeetingOf> meetings_of_;          // by body and time
+    std::vector<IndexPair> beside_, seams_;       // pairs without points, where others part; those let in
+    std::vector<IndexPair> near_;                 // where the search was widened
+    std::vector<int> grown_;                      // whom it was widened for
+    std::vector<char> supported_;                 // bodies that closed contacts carry
+    struct Pressing {                             // of a closed point: whom the forces press on the other one
         int first, second;
-        bool first_presses, second_presses,
-            both;  // both: on each other, whether or not somebody carries them
+        bool first_presses, second_presses, both;  // on each other, carried or not
     };
     std::vector<Pressing> pressing_;
     std::vector<Vec6> carried_kick_;  // what supports took of a body's kick until they let it go
