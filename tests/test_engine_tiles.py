@@ -200,8 +200,8 @@ def campaign() -> Any:
 
 
 def test_where_sweeps_run_away_the_step_is_solved_directly(campaign: Any) -> None:
-    """550 t fall on the point of a cone of 40 kg: each sweep gives a hundredth more than the one before, 10³⁸ J in a step.
-    It was called a system that cannot be solved, after seconds of meeting everything on that way."""
+    """550 t fall on the point of a cone of 40 kg: each run of sweeps leaves far more speed than the one before, without end.
+    The step ran into its time limit, meeting everything on that way."""
     scene, rate, method = campaign.heap(101833, wide=True)
     energies = []
     with start(scene, time_step=1 / rate, method=method, observe={"energy": Energy()}) as run:

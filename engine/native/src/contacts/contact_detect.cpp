@@ -79,6 +79,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     points_.clear();
     roused_.clear();
     impact_needed_ = plastic_first_ = false;
+    settling_ = ran_away_ = false;  // of a step that was taken back, or is over
     impact_rounds_ = 0;
     if (options_.impacts == ImpactOrder::successive) clock_.assign(bodies, 0.0), way_.assign(bodies, Vec6{});
 
