@@ -257,10 +257,8 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) c
 /// part of what holds them as deep as that; round shapes and planes have no sides.
 double ContactStage::slop(const OpenPair& open) const noexcept {
     const int a = open.first, b = open.second;
-    const ShapeKind one = detection_.collider(open.pair.first).shape.kind;
-    const ShapeKind two = detection_.collider(open.pair.second).shape.kind;
-    const bool balls = one == ShapeKind::sphere && two == ShapeKind::sphere;
-    const bool sides = !balls && one != ShapeKind::plane && two != ShapeKind::plane;
+    const bool sides =
+        have_sides(detection_.collider(open.pair.first).shape, detection_.collider(open.pair.second).shape);
     return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
            (sides ? 2.0 * std::max(sinking_[a], sinking_[b]) : 0.0);
 }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "collision/shape.hpp"
 #include "contacts/pivot_system.hpp"
 #include "linear/vec.hpp"
 
@@ -22,6 +23,12 @@ inline Vec3 world_tangent(Vec3 normal) noexcept {
     const Vec3 axis = std::abs(normal.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
     const Vec3 t = axis - dot(axis, normal) * normal;
     return (1.0 / norm(t)) * t;
+}
+
+/// Whether one of two shapes may come to the side of the other: a plane has none, nor have balls among themselves.
+inline bool have_sides(const Primitive& one, const Primitive& two) noexcept {
+    const bool balls = one.kind == ShapeKind::sphere && two.kind == ShapeKind::sphere;
+    return !balls && one.kind != ShapeKind::plane && two.kind != ShapeKind::plane;
 }
 
 inline Vec6 sum(const Vec6& a, const Vec6& b, double s = 1.0) noexcept {

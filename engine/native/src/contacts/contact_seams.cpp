@@ -20,12 +20,15 @@ namespace {
 
 constexpr double share = 0.25;            // of the overlap at which pairs count as met: less is none
 constexpr double same_face = 0.9;         // cosine of normals: what both lie on
-constexpr double level = 1e-6;            // of a kick: a part along a normal that is none
 constexpr std::size_t most_before = 8;    // of the meetings of a body, that may keep it off later ones
 constexpr double together = 0.05;         // of a step: which of two meetings comes first is not known
 constexpr double same_way = 1.0 - 1e-12;  // the same of one face met twice
-constexpr double unheld =
-    3.0;  // of its fall in a step: what the far end of a body may sink before sweeps hold it
+constexpr double unheld = 3.0;            // of a fall in a step: what sinks before sweeps hold it
+
+/// How far the lowest point along n is above the origin, m; of a triangle infinite.
+double height(const Mover& of, double time, Vec3 n) noexcept {
+    return separation(of.shape, of.at(time), Primitive::plane(n), {}).gap;
+}
 
 }  // namespace
 
@@ -57,14 +60,9 @@ void ContactStage::index_points() {
 /// the normal they touch with already, if they do. Between sweeps a body may also sink on the way.
 bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
                            const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing) const {
-    const ShapeKind kind = moving.shape.kind, next = other.shape.kind;
-    if (kind == ShapeKind::plane || next == ShapeKind::plane) return false;  // they have no sides
-    if (kind == ShapeKind::sphere && next == ShapeKind::sphere) return false;
+    if (!have_sides(moving.shape, other.shape)) return false;
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
     if (unknown_[body] < 0 || !(settling_ || depth_[body] > least)) return false;
-    const auto height = [&](const Primitive& shape, const Pose& at, Vec3 n) {
-        return separation(shape, at, Primitive::plane(n), {}).gap;  // of a triangle: infinite
-    };
     const int end = points_begin_[static_cast<std::size_t>(body) + 1];
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
@@ -87,11 +85,10 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
         if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face)
             continue;
         if (settling_) {
-            const double now = height(moving.shape, moving.at(0.0), n);
+            const double now = height(moving, 0.0, n);
             double falls = 0.0;
             for (const double part : {time, h})
-                falls =
-                    std::max(falls, now + part * dot(n, leads) - height(moving.shape, moving.at(part), n));
+                falls = std::max(falls, now + part * dot(n, leads) - height(moving, part, n));
             const double most =
                 h * (options_.unsettled_residual + unheld * norm(linear(kick_[body]))) + sinking;
             depth = std::max(depth, begun + std::min(falls, std::max(begun, most)));
@@ -101,7 +98,7 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
         Pose out = moving.body;
         out.position += depth * n;
         const Mover lifted{moving.shape, moving.part, out, moving.velocity, moving.spin};
-        const double above = height(moving.shape, lifted.at(0.0), n) + height(other.shape, other.at(0.0), -n);
+        const double above = height(lifted, 0.0, n) + height(other, 0.0, -n);
         if (above > -least && first_touch(lifted, other, h, slop) < 0.0) return true;
     }
     return false;
@@ -122,13 +119,9 @@ bool ContactStage::keeps_off(const Meeting& earlier, const Meeting& later, int b
                 &other = after.first == body ? four : three;
     for (const Mover* each : {&one, &two, &three, &four})
         if (each->shape.kind == ShapeKind::triangle) return false;  // its neighbours are known
-    if (moving.shape.kind == ShapeKind::plane || other.shape.kind == ShapeKind::plane) return false;
-    if (moving.shape.kind == ShapeKind::sphere && other.shape.kind == ShapeKind::sphere) return false;
+    if (!have_sides(moving.shape, other.shape)) return false;
     const auto normal = [](const Mover& a, const Mover& b, double time) {
         return separation(a.shape, a.at(time), b.shape, b.at(time)).normal;
-    };
-    const auto height = [](const Mover& of, double time, Vec3 n) {
-        return separation(of.shape, of.at(time), Primitive::plane(n), {}).gap;
     };
     const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier.time);
     const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later.time);
@@ -194,7 +187,7 @@ bool ContactStage::let_pass(std::size_t from) {
             const double overlap = h * closing - std::max(0.0, contact.point.gap);
             if (overlap > most) most = overlap, deepest = end;
         }
-        if (most > 0.0 && passes_by(points_[deepest], most) && !is_needed(points_[deepest], gone))
+        if (most > 0.0 && passes_by(points_[deepest], most))
             gone.push_back({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)});
     }
     for (const IndexPair& pair : gone) {
@@ -207,41 +200,13 @@ bool ContactStage::let_pass(std::size_t from) {
     return !gone.empty();
 }
 
-/// Whether forces press the bodies of a point together, and nothing else that is left holds one of them as it does.
-bool ContactStage::is_needed(const Point& point, const std::vector<IndexPair>& gone) const {
-    const Contact& contact = point.contact;
-    const double push = -relative(point, contact.point.normal, kick_, false);
-    if (!(push > level * (norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second])))))
-        return false;
-    for (const int body : {contact.first, contact.second}) {
-        if (unknown_[body] < 0) continue;
-        const double side = contact.first == body ? 1.0 : -1.0;
-        for (int at = points_begin_[static_cast<std::size_t>(body)];
-             at < points_begin_[static_cast<std::size_t>(body) + 1]; ++at) {
-            const Contact& other = points_[points_of_[at]].contact;
-            const std::uint64_t pair = other.key >> feature_bits;
-            const double own = other.first == body ? 1.0 : -1.0;
-            if (pair == contact.key >> feature_bits || !(points_[points_of_[at]].strike < 0.0) ||
-                !is_closed(other))
-                continue;
-            if (side * own * dot(other.point.normal, contact.point.normal) < same_face) continue;
-            if (std::none_of(gone.begin(), gone.end(),
-                             [&](const IndexPair& g) { return pair_of(g) == pair; }))
-                return false;
-        }
-    }
-    return true;
-}
-
 /// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
 bool ContactStage::passes_by(const Point& point, double overlap) const {
     const Contact& contact = point.contact;
     const IndexPair pair{static_cast<int>(contact.key >> (feature_bits + 24)),
                          static_cast<int>(contact.key >> feature_bits & 0xffffff)};
-    const ShapeKind one = detection_.collider(pair.first).shape.kind,
-                    two = detection_.collider(pair.second).shape.kind;
-    if (one == ShapeKind::plane || two == ShapeKind::plane) return false;
-    if (one == ShapeKind::sphere && two == ShapeKind::sphere) return false;
+    if (!have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape))
+        return false;
     const OpenPair open = opened(pair, {contact.point.gap, contact.point.normal});
     if (!(overlap > slop(open))) return false;
     const int a = contact.first, b = contact.second;

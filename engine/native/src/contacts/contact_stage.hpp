@@ -287,7 +287,6 @@ private:
     void look_at(const std::vector<IndexPair>& near);
     OpenPair opened(const IndexPair& pair, const Separation& apart) const;
     bool let_pass(std::size_t from);
-    bool is_needed(const Point& point, const std::vector<IndexPair>& gone) const;
     bool passes_by(const Point& point, double overlap) const;
     int find_strikes(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
