@@ -72,7 +72,7 @@ void what_is_kept_does_not_show() {
         BroadPhase phase;
         std::vector<Bounds> all, shown;
         for (int k = 0; k < 700; ++k) {
-            const double size = k % 50 == 0 ? 4.0 : k % 11 == 0 ? 0.05 : 0.5;
+            const double size = k % 97 == 1 ? 14.0 : k % 50 == 0 ? 4.0 : k % 11 == 0 ? 0.05 : 0.5;
             const Vec3 centre = 4.0 * Vec3{unit(random), unit(random), unit(random)};
             const Vec3 half = 0.5 * size * Vec3{1.0, 1.0 + 0.2 * unit(random), 1.0};
             all.push_back({centre - half, centre + half});
@@ -95,6 +95,24 @@ void what_is_kept_does_not_show() {
             EXPECT(found == by_brute_force(shown));
         }
         EXPECT(found.size() > 200);
+    }
+}
+
+/// A rod over more cells of small ones than the table for them has places: each of its pairs is told once.
+void a_long_one_among_few_meets_each_once() {
+    for (const double length : {20.0, 60.0, 90.0, 97.0, 120.0, 400.0}) {
+        BroadPhase phase;
+        std::vector<Bounds> all;
+        for (int k = 0; k < 39; ++k) all.push_back({{1.0 * k, 0.0, 0.0}, {1.0 * k + 0.5, 0.5, 0.5}});
+        all.push_back({{-1.0, 0.2, 0.2}, {length, 0.3, 0.3}});
+        std::vector<IndexPair> found;
+        for (int call = 0; call < 20; ++call) {
+            const Vec3 way{0.0, call % 2 ? 0.15 : -0.15, 0.0};
+            all.back().low += way, all.back().high += way;
+            phase.overlapping_pairs(all, found);
+            EXPECT(found == by_brute_force(all));
+        }
+        EXPECT(found.size() >= 20);
     }
 }
 
@@ -273,6 +291,7 @@ int main() {
     the_grid_finds_what_brute_force_finds();
     sizes_and_places_do_not_matter();
     what_is_kept_does_not_show();
+    a_long_one_among_few_meets_each_once();
     not_a_number_touches_nothing();
     filters_and_order();
     who_goes_further_is_looked_for_again();

@@ -17,7 +17,10 @@ constexpr double fatness = 0.1;    // of the cells of level 0: by so much bounds
 constexpr double fast = 1.0;       //   but for those that got further out than this part of it in one call
 constexpr double loose = 4.0;      // times that much: bounds as far inside theirs get new ones
 constexpr std::size_t few_of = 2;  // who escape are searched for alone up to one in so many
-constexpr int most_coarse = 8;     // of them that are to be compared with all
+constexpr int most_coarse = 8;     // of them that are to be compared with all,
+constexpr std::int64_t most_rows = 100;  //   since they reach more rows of smaller cells, or longer ones
+static_assert(most_rows < static_cast<std::int64_t>(std::bit_ceil(2 * few + 1)),
+              "no row is as long as the table");
 
 std::int32_t coordinate(double x, double size) noexcept {
     return static_cast<std::int32_t>(std::floor(std::clamp(x / size, -furthest, furthest)));
@@ -84,11 +87,28 @@ BroadPhase::Cell BroadPhase::cell_at(const Bounds& b, int level) const noexcept 
 }
 
 std::size_t BroadPhase::bucket(const Cell& cell) const noexcept {
-    const std::uint64_t mixed = static_cast<std::uint32_t>(cell.x) * 0x9e3779b97f4a7c15ull ^
-                                static_cast<std::uint32_t>(cell.y) * 0xc2b2ae3d27d4eb4full ^
+    const std::uint64_t mixed = static_cast<std::uint32_t>(cell.y) * 0xc2b2ae3d27d4eb4full ^
                                 static_cast<std::uint32_t>(cell.z) * 0x165667b19e3779f9ull ^
                                 static_cast<std::uint32_t>(cell.level) * 0xd6e8feb86659fd93ull;
-    return static_cast<std::size_t>((mixed ^ mixed >> 29) & (begin_.size() - 2));
+    return static_cast<std::size_t>((mixed ^ mixed >> 29) + static_cast<std::uint32_t>(cell.x)) &
+           (begin_.size() - 2);
+}
+
+/// Tells of everybody in so many cells of a row.
+template <class Visit> void BroadPhase::visit_row(const Cell& from, int cells, const Visit& visit) const {
+    const std::size_t first = bucket(from), end = first + static_cast<std::size_t>(cells),
+                      buckets = begin_.size() - 1;
+    const auto in = [&](std::size_t begin, std::size_t end) {
+        for (int e = begin_[begin]; e < begin_[end]; ++e) {
+            const Entry& entry = entries_[e];
+            const std::int64_t along = std::int64_t{entry.cell.x} - from.x;
+            if (along >= 0 && along < cells && entry.cell.y == from.y && entry.cell.z == from.z &&
+                entry.cell.level == from.level)
+                visit(entry);
+        }
+    };
+    in(first, std::min(end, buckets));
+    if (end > buckets) in(0, end - buckets);
 }
 
 /// Finds the cell of one; its level, too, which is beyond the last for what is too large for any cell.
@@ -120,27 +140,28 @@ void BroadPhase::fill_cells() {
         if (cells_[i].level >= 0) entries_[fill_[bucket(cells_[i])]++] = {cells_[i], static_cast<int>(i)};
 }
 
+/// Tells of everybody in a cell and its neighbours.
+template <class Visit> void BroadPhase::visit_around(const Cell& cell, const Visit& visit) const {
+    for (int n = 0; n < 9; ++n)
+        visit_row({cell.x - 1, cell.y + n % 3 - 1, cell.z + n / 3 - 1, cell.level}, 3, visit);
+}
+
 /// All partners of i of its own level, each pair once, and of coarser ones.
 void BroadPhase::search(int i, std::vector<IndexPair>& found) const {
     const Bounds own = fat_[i];
-    const auto look = [&](const Cell& cell, bool later_only) {
-        const std::size_t k = bucket(cell);
-        for (int e = begin_[k]; e < begin_[k + 1]; ++e) {
-            const Entry& entry = entries_[e];
-            if (!(entry.cell == cell) || (later_only && entry.index <= i)) continue;
-            if (overlap(own, fat_[entry.index]))
-                found.emplace_back(std::min(i, entry.index), std::max(i, entry.index));
-        }
+    const auto meet = [&](const Entry& entry) {
+        if (overlap(own, fat_[entry.index]))
+            found.emplace_back(std::min(i, entry.index), std::max(i, entry.index));
     };
-    const Cell home = cells_[i];
-    look(home, true);
-    for (int n = 14; n < 27; ++n)  // the half of the neighbours that comes later: the others find us
-        look({home.x + n % 3 - 1, home.y + n / 3 % 3 - 1, home.z + n / 9 - 1, home.level}, false);
-    for (std::uint32_t left = levels_ >> home.level >> 1; left != 0; left &= left - 1) {
-        const Cell there = cell_at(own, home.level + 1 + std::countr_zero(left));
-        for (int n = 0; n < 27; ++n)
-            look({there.x + n % 3 - 1, there.y + n / 3 % 3 - 1, there.z + n / 9 - 1, there.level}, false);
-    }
+    const auto [x, y, z, level] = cells_[i];
+    visit_row({x, y, z, level}, 2, [&, x = x](const Entry& entry) {
+        if (entry.cell.x > x || entry.index > i) meet(entry);
+    });
+    // The half of the neighbours that comes later: the others find us.
+    visit_row({x - 1, y + 1, z, level}, 3, meet);
+    for (int n = -1; n <= 1; ++n) visit_row({x - 1, y + n, z + 1, level}, 3, meet);
+    for (std::uint32_t left = levels_ >> level >> 1; left != 0; left &= left - 1)
+        visit_around(cell_at(own, level + 1 + std::countr_zero(left)), meet);
 }
 
 /// Into `out` by first index and then by second: a counting sort, and short insertions.
@@ -163,6 +184,28 @@ void BroadPhase::sort_pairs(std::size_t count, std::vector<IndexPair>& out) {
     }
 }
 
+/// The cells of a smaller level whose bounds may reach into these.
+std::pair<BroadPhase::Cell, BroadPhase::Cell> BroadPhase::reach(const Bounds& b, int level) const noexcept {
+    const double size = std::ldexp(size_, level), half = 0.5 * size;
+    return {{coordinate(b.low.x - half, size), coordinate(b.low.y - half, size),
+             coordinate(b.low.z - half, size), level},
+            {coordinate(b.high.x + half, size), coordinate(b.high.y + half, size),
+             coordinate(b.high.z + half, size), level}};
+}
+
+/// How many rows of smaller cells that is, in all levels; of few but long ones, how many cells one has.
+std::int64_t BroadPhase::rows_below(int i) const noexcept {
+    std::int64_t rows = 0;
+    if (cells_[i].level < 0) return rows;
+    for (std::uint32_t left = levels_ & ((1u << cells_[i].level) - 1); left != 0; left &= left - 1) {
+        const auto [low, high] = reach(fat_[i], std::countr_zero(left));
+        const std::int64_t x = std::int64_t{high.x} - low.x + 1, y = std::int64_t{high.y} - low.y + 1,
+                           z = std::int64_t{high.z} - low.z + 1;
+        rows += std::max(x, std::min(y, most_rows + 1) * std::min(z, most_rows + 1));
+    }
+    return rows;
+}
+
 /// All partners of one that has escaped; of another that has, too, the one of lower index finds the other.
 void BroadPhase::find_partners(int i, std::vector<IndexPair>& found) const {
     const Bounds own = fat_[i];
@@ -173,20 +216,21 @@ void BroadPhase::find_partners(int i, std::vector<IndexPair>& found) const {
     const Cell home = cells_[i];
     if (home.level < 0) return;
     for (const int j : everywhere_) meet(j);
-    if ((levels_ & ((1u << home.level) - 1)) != 0) {  // too many smaller cells
+    if (rows_below(i) > most_rows) {
         for (std::size_t j = 0; j < fat_.size(); ++j)
             if (cells_[j].level >= 0) meet(static_cast<int>(j));
         return;
     }
-    for (std::uint32_t left = levels_ >> home.level; left != 0; left &= left - 1) {
-        const Cell there = cell_at(own, home.level + std::countr_zero(left));
-        for (int n = 0; n < 27; ++n) {
-            const Cell cell{there.x + n % 3 - 1, there.y + n / 3 % 3 - 1, there.z + n / 9 - 1, there.level};
-            const std::size_t k = bucket(cell);
-            for (int e = begin_[k]; e < begin_[k + 1]; ++e)
-                if (entries_[e].cell == cell) meet(entries_[e].index);
-        }
+    for (std::uint32_t left = levels_ & ((1u << home.level) - 1); left != 0; left &= left - 1) {
+        const auto [low, high] = reach(own, std::countr_zero(left));
+        for (std::int32_t z = low.z; z <= high.z; ++z)
+            for (std::int32_t y = low.y; y <= high.y; ++y)
+                visit_row({low.x, y, z, low.level}, high.x - low.x + 1,
+                          [&](const Entry& entry) { meet(entry.index); });
     }
+    for (std::uint32_t left = levels_ >> home.level; left != 0; left &= left - 1)
+        visit_around(cell_at(own, home.level + std::countr_zero(left)),
+                     [&](const Entry& entry) { meet(entry.index); });
 }
 
 /// Brings the pairs up to date where few have escaped; false if all are to be searched for.
@@ -202,9 +246,7 @@ bool BroadPhase::follow(Team* team) {
     for (const int i : everywhere_)
         if (has_escaped_[i]) return false;
     if (moved) fill_cells();
-    const auto coarse = [this](int i) {
-        return cells_[i].level > 0 && (levels_ & ((1u << cells_[i].level) - 1)) != 0;
-    };
+    const auto coarse = [this](int i) { return rows_below(i) > most_rows; };
     if (std::count_if(escaped_.begin(), escaped_.end(), coarse) > most_coarse) return false;
     for (auto& found : found_) found.clear();
     share_out(team, escaped_.size(), many, [&](int part, std::size_t begin, std::size_t end) {

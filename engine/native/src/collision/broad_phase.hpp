@@ -14,8 +14,8 @@ using IndexPair = std::pair<int, int>;
 
 /// Finds overlapping bounds in time proportional to their number and that of the pairs. Each lies, by its centre, in
 /// a cell of a grid whose cells are at least as large as it is: the cells of level 0 hold most, those of each further
-/// level are twice as large. Two that overlap are then in neighbouring cells of the coarser one's level. The cells are
-/// found by hashing.
+/// level are twice as large. Two that overlap are then in neighbouring cells of the coarser one's level. Rows of cells
+/// along x are found by hashing; the cells of a row lie one behind the other.
 ///
 /// What is searched for are pairs of bounds that have been made a little larger, and those are kept from call to call:
 /// who stays within its own costs nothing but a look, who leaves is searched for anew, and all are where many leave.
@@ -44,10 +44,14 @@ private:
     static int level_of(double extent, double size) noexcept;
     Cell cell_at(const Bounds& b, int level) const noexcept;
     std::size_t bucket(const Cell& cell) const noexcept;
+    template <class Visit> void visit_row(const Cell& from, int cells, const Visit& visit) const;
+    template <class Visit> void visit_around(const Cell& cell, const Visit& visit) const;
     double extent(std::size_t i) const noexcept;
     int place(std::size_t i);
     void fill_cells();
     void find_partners(int i, std::vector<IndexPair>& found) const;
+    std::pair<Cell, Cell> reach(const Bounds& b, int level) const noexcept;
+    std::int64_t rows_below(int i) const noexcept;
     void search(int i, std::vector<IndexPair>& found) const;
     void sort_pairs(std::size_t count, std::vector<IndexPair>& out);
 
