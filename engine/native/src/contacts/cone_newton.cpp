@@ -24,7 +24,6 @@ constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
 constexpr double behind = 10.0, slow = 0.1;      // of the blur, and of itself: what holding back leaves
 constexpr double far = 1e-3;                     // a residual, of the speeds, from which the path may crawl
 constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
-constexpr double near_enough = 1e-6;             // a residual, of the speeds, that is not worth jumps
 constexpr int max_jumps = 3;                     // without half the least they met
 constexpr int max_losses = 3;                    // of the path, sought again,
 constexpr double back = 10.0;                    //   so many blurs away
@@ -184,6 +183,10 @@ bool ConeNewton::step(const MixedSystem& system, double blur) {
 bool ConeNewton::find_directions(double blur) {
     for (ConeUnit& unit : units_) unit.lack = {-unit.map[0], -unit.map[1], -unit.map[2]};
     if (!answer(&ConeUnit::dz, &ConeUnit::du, refined)) return false;
+    if (blur == 0.0) {  // a jump: there is no path
+        for (ConeUnit& unit : units_) unit.tz = unit.tu = {};
+        return true;
+    }
     for (ConeUnit& unit : units_) unit.lack = {blur * unit.bend[0], blur * unit.bend[1], blur * unit.bend[2]};
     return answer(&ConeUnit::tz, &ConeUnit::tu, roughly);
 }

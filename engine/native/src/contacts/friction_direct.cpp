@@ -22,7 +22,6 @@ constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redunda
 constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 constexpr double fair = 1e-9;           // one that is an answer
-constexpr double near = 1e-6;           // one that is not worth another turn
 constexpr int sweep_turns = 1, turn_sweeps = 100;  // where Newton's path ends without an answer
 
 /// How much is spent on rounds of pivoting.
@@ -326,7 +325,8 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     start = system, start_points = points;
     report.residual = unbounded;
     const bool few = start.rows.size() <= few_blocks;
-    for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : near)); ++turn) {
+    for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : ConeNewton::near_enough));
+         ++turn) {
         if (turn > 0) report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
         const ConeReport found = direct.newton.solve(system, points);
         report.rounds += found.iterations;
@@ -402,7 +402,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     MixedSystem& start = work().start;
     const Effort patient{max_rounds};
     if (is_for_newton(system, points, model)) {
-        const bool near_none = direct.foreseen && system.rows.size() > few_blocks;
+        const bool near_none = (direct.foreseen || points.empty()) && system.rows.size() > few_blocks;
         if (!near_none && settle_quickly(system, points, model, direct, report)) return report;
         if (solve_by_newton(system, points, model, direct, report)) return report;
         start = system;
