@@ -88,16 +88,17 @@ struct ContactArrays {
     BlowArrays blow;
     // Of a solve:
     std::vector<FrictionPoint> friction;
-    std::vector<char> answered;       // per row: the round before found it an answer
-    std::vector<char> pushes;         // see shorten_unsettled()
-    std::vector<double> share;        // per moving body
-    std::vector<EnergySums> sums;     // by island
-    std::vector<Vec6> free_velocity;  // per moving body
-    std::vector<IndexPair> grazing;   // pairs, see let_pass()
-    std::vector<char> reached;        // bodies, see find_beside()
-    std::vector<char> parted_far;     // islands, see note_far()
-    std::vector<double> island_mass;  // kg
-    DepthOfPair left;                 // see note_given()
+    std::vector<char> answered;                   // per row: the round before found it an answer
+    std::vector<char> pushes;                     // see shorten_unsettled()
+    std::vector<double> share;                    // per moving body
+    std::vector<EnergySums> sums;                 // by island
+    std::vector<Vec6> free_velocity;              // per moving body
+    std::vector<IndexPair> grazing;               // pairs, see let_pass()
+    std::vector<std::vector<std::size_t>> asked;  // open pairs to be judged, by each thread
+    std::vector<char> reached;                    // bodies, see find_beside()
+    std::vector<char> parted_far;                 // islands, see note_far()
+    std::vector<double> island_mass;              // kg
+    DepthOfPair left;                             // see note_given()
     // Who hangs together by rows of joints and points; in what parts; where a solve is shortened.
     IslandFinder hanging, parted, shortened;
 };

@@ -145,6 +145,7 @@ void ContactStage::find_open_again() {
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
     known_.clear();
+    open_bodies_.clear();
     const std::size_t before = points_.size();
     const auto unmet = static_cast<std::ptrdiff_t>(open_.size());
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
@@ -215,7 +216,7 @@ ContactStage::OpenPair ContactStage::opened(const IndexPair& pair, const Separat
 }
 
 void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double strike) {
-    Point point;
+    Point& point = points_.emplace_back();
     point.contact = contact;
     point.material = combined(materials_[contact.first], materials_[contact.second]);
     point.first_arm = contact.point.position - first.position;
@@ -224,7 +225,6 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     point.strike = strike;
     point.begun = contact.point.gap;
     if (oriented_) orient(point, first, second);
-    points_.push_back(point);
     if (!asleep_.empty()) rouse(contact);
 }
 
@@ -282,9 +282,8 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
     return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
 }
 
-/// When an open pair meets along `velocity`, s; negative if it does not in this step, or was judged before.
+/// When an open pair meets along `velocity`, s; negative if it does not in this step.
 double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const {
-    if (late && !changed_[open.first] && !changed_[open.second]) return -1.0;
     if (passes(open, velocity)) return -1.0;
     const Pose at_first = moved(open.first, velocity), at_second = moved(open.second, velocity);
     const Mover first = mover(open.pair.first, at_first, velocity),
@@ -316,11 +315,23 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
     for (auto& meetings : meetings_) meetings.clear();
     if (swings_ && !open_.empty()) index_points();
+    if (open_bodies_.size() != open_.size()) {
+        open_bodies_.clear();
+        for (const OpenPair& open : open_) open_bodies_.emplace_back(open.first, open.second);
+    }
+    arrays_.asked.resize(meetings_.size());
     share_out(team_.get(), open_.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            if (end - begin == open_.size() && (k + 1) % pairs_a_look == 0) Watch::look();  // on one thread
-            if (const double time = meeting(open_[k], velocity, late); !(time < 0.0))
-                meetings_[part].push_back({k, time});
+        std::vector<std::size_t>& asked = arrays_.asked[part];
+        asked.resize(end - begin + 1);
+        std::size_t count = 0;
+        for (std::size_t k = begin; k < end; ++k) {  // the others were judged before
+            asked[count] = k;
+            count += !late || (changed_[open_bodies_[k].first] | changed_[open_bodies_[k].second]) != 0;
+        }
+        for (std::size_t at = 0; at < count; ++at) {
+            if (end - begin == open_.size() && (at + 1) % pairs_a_look == 0) Watch::look();  // on one thread
+            if (const double time = meeting(open_[asked[at]], velocity, late); !(time < 0.0))
+                meetings_[part].push_back({asked[at], time});
         }
     });
     std::vector<Meeting>& all = meetings_[0];
@@ -343,7 +354,10 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         open.first = -1;
         ++found;
     }
-    if (found > 0) std::erase_if(open_, [](const OpenPair& open) { return open.first < 0; });
+    if (found > 0) {
+        std::erase_if(open_, [](const OpenPair& open) { return open.first < 0; });
+        open_bodies_.clear();
+    }
     return found;
 }
 

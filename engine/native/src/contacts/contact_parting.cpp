@@ -373,7 +373,7 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     const bool fresh = again && keep_parted(poses);
     if (again && !fresh && !(parting_.deepest < 0.5 * last)) return false;
     MixedSystem& parting = parting_system_;
-    parting.mass = system.mass;
+    if (joints > 0 || !parts_by_sweeps()) parting.mass = system.mass;
     parting.momentum.assign(system.mass.size(), Vec6{});
     parting.rows.assign(system.rows.begin(), system.rows.begin() + static_cast<std::ptrdiff_t>(joints));
     gives_.clear();
@@ -383,7 +383,7 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
         for (const Point& lap : laps_) least = std::min(least, give_of(lap.contact, gives_));
         hold_joints(parting, least);
     }
-    arrays_.parted.begin(static_cast<int>(parting.mass.size()));
+    arrays_.parted.begin(static_cast<int>(system.mass.size()));
     if (!(parts_by_sweeps() ? part_by_sweeps(parting, again) : part_directly(parting, again))) return false;
     note_parted(parting);
     note_far();

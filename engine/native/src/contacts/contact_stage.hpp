@@ -450,7 +450,8 @@ private:
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
     LargeArray<OpenPair> open_;
-    std::vector<Separation> apart_;               // of pairs, found on several threads
+    std::vector<IndexPair> open_bodies_;  // of each, to look through many that nobody moved; empty: not yet
+    std::vector<Separation> apart_;       // of pairs, found on several threads
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread
     std::vector<MeetingOf> meetings_of_;          // by body and time
     std::vector<IndexPair> beside_, seams_;       // pairs without points, where others part; those let in

@@ -227,6 +227,7 @@ void ContactSweeps::fetch(const Due& later, const Due& soon) const noexcept {
         constexpr std::size_t line = 64;
         const char* const at = reinterpret_cast<const char*>(&what);
         for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
+        __builtin_prefetch(at + sizeof(what) - 1);  // a velocity may lie across two lines
     };
     ask(contacts_[later.item - joint_count_]);
     for (const int body : {soon.first, soon.second}) {
@@ -356,12 +357,13 @@ void ContactSweeps::sweep(double focus) noexcept {
 FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus,
                                   const std::function<bool(bool)>& more) {
     FrictionReport report;
+    const bool goes_on = swept_;
     if (!swept_) std::fill(active_.begin(), active_.end(), 1);
     swept_ = true;
     if (scheduled_ < bodies_of_.size()) schedule();
     for (const int island : roots_) active_[island] = active_[island] || spent_[island];
     select();
-    int look = 2, late = 0;
+    int look = goes_on ? iterations : 2, late = 0;
     for (int round = 1, until = iterations;; ++round) {
         Watch::look();
         bool any = false;

@@ -49,8 +49,9 @@ public:
     /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
     /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep, and with true when all is done: it may
     /// add contacts and says whether it did; those that come after the last sweep get `iterations` more, three times at
-    /// most. May be called again, to go on. What is spent is swept only where a body is new to its contacts, was
-    /// found by worst(), or was just changed by more than `focus` [m/s]: in a large heap something somewhere always asks.
+    /// most. May be called again, to go on: then `more` is only asked in the end, and what is spent is swept only where
+    /// a body is new to its contacts, was found by worst(), or was just changed by more than `focus` [m/s]: in a large
+    /// heap something somewhere always asks.
     FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool(bool)>& more);
 
     /// What has been done since start(), in sweeps over everything there is now; looking for the worst is work, too.
