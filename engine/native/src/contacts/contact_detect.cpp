@@ -19,6 +19,7 @@ constexpr unsigned pairs_a_look = 256;    // of shapes, between two looks at the
 constexpr std::size_t many_pairs = 512;   // worth several threads
 constexpr double vanishing = 1e-8;        // a direction so steep on the surface has no shadow
 constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
+constexpr double other_side = 0.5;        // the same
 
 }  // namespace
 
@@ -432,10 +433,15 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
         detection_.touch(pair, search_[meeting.first] + search_[meeting.second], scratch_);
         const std::size_t old = points_.size();
         bool stops = false;
-        // Past an edge of what does not move, it is met with another side than the one it faces at the start.
+        // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
         const bool fixed = std::min(unknown_[meeting.first], unknown_[meeting.second]) < 0;
-        if (fixed && std::any_of(scratch_.begin(), scratch_.end(), [&](const Contact& contact) {
-                return dot(contact.point.normal, meeting.point.normal) < same_side;
+        const double same =
+            fixed ? same_side
+            : have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape)
+                ? other_side
+                : -unbounded;
+        if (std::any_of(scratch_.begin(), scratch_.end(), [&](const Contact& contact) {
+                return dot(contact.point.normal, meeting.point.normal) < same;
             }))
             scratch_.clear();
         for (const Contact& contact : scratch_) {

@@ -30,6 +30,11 @@ double height(const Mover& of, double time, Vec3 n) noexcept {
     return separation(of.shape, of.at(time), Primitive::plane(n), {}).gap;
 }
 
+/// How far what sweeps that count as settled may have left leads in a step, m.
+double left_by_sweeps(const ContactOptions& options) noexcept {
+    return options.solver == SolverKind::iterative ? options.time_step * options.unsettled_residual : 0.0;
+}
+
 }  // namespace
 
 /// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
@@ -37,8 +42,7 @@ double height(const Mover& of, double time, Vec3 n) noexcept {
 double ContactStage::sunk_by(const Point& point, bool late) const {
     const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking = std::max(0.0, -h * relative(point, point.contact.point.normal, velocity_, false));
-    const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
-    return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
+    return depth + (late ? std::min(sinking, std::max(depth, left_by_sweeps(options_))) : sinking);
 }
 
 /// Puts the points of each body together: what holds it is asked of each that it would meet.
@@ -62,7 +66,8 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
                            const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing) const {
     if (!have_sides(moving.shape, other.shape)) return false;
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
-    if (unknown_[body] < 0 || !(settling_ || depth_[body] > least)) return false;
+    const double left = left_by_sweeps(options_);
+    if (unknown_[body] < 0 || !(settling_ || left > 0.0 || depth_[body] > least)) return false;
     const int end = points_begin_[static_cast<std::size_t>(body) + 1];
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
@@ -84,15 +89,17 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
         }
         if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face)
             continue;
-        if (settling_) {
-            const double now = height(moving, 0.0, n);
+        if (settling_ || left > 0.0) {
+            const double now = height(moving, 0.0, n), top = height(other, 0.0, -n);
             double falls = 0.0;
-            for (const double part : {time, h})
-                falls = std::max(falls, now + part * dot(n, leads) - height(moving, part, n));
-            const double most =
-                h * (options_.unsettled_residual + unheld * norm(linear(kick_[body]))) + sinking;
-            depth = std::max(depth, begun + std::min(falls, std::max(begun, most)));
-            depth += slop;  // it met the other with as much
+            for (const double part : {time, h}) {  // against what holds it, and against the other
+                const double rises = std::max(part * dot(n, leads), top - height(other, part, -n));
+                falls = std::max(falls, now + rises - height(moving, part, n));
+            }
+            const double held = h * (options_.unsettled_residual + unheld * norm(linear(kick_[body])));
+            depth =
+                std::max(depth, begun + std::min(falls, settling_ ? std::max(begun, held + sinking) : left));
+            if (settling_) depth += slop;  // it met the other with as much
         }
         if (!(depth > least)) continue;
         Pose out = moving.body;
