@@ -186,7 +186,7 @@ def test_who_sinks_before_sweeps_hold_him_meets_no_edge(
         ("upright capsule", 0.25 * math.pi, -2.7, 1 / 60, 10),
         ("cone", 0.25 * math.pi, 0.03, 1 / 60, 20),
         ("cone", 1e-3, 0.03, 1 / 60, 20),
-        ("cylinder", 0.1, 0.5, 1 / 60, 10),
+        ("cylinder", 0.1, 0.5, 1 / 120, 10),
         ("cylinder across", 0.0, 0.25, 1 / 60, 200),
         ("cylinder along", 0.0, -2.7, 1 / 60, 200),
     ],

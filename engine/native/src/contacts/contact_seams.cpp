@@ -24,15 +24,11 @@ constexpr std::size_t most_before = 8;    // of the meetings of a body, that may
 constexpr double together = 0.05;         // of a step: which of two meetings comes first is not known
 constexpr double same_way = 1.0 - 1e-12;  // the same of one face met twice
 constexpr double unheld = 3.0;            // of a fall in a step: what sinks before sweeps hold it
+constexpr double hum = 10.0;              // of that overlap: what they leave of motion where all is at rest
 
 /// How far the lowest point along n is above the origin, m; of a triangle infinite.
 double height(const Mover& of, double time, Vec3 n) noexcept {
     return separation(of.shape, of.at(time), Primitive::plane(n), {}).gap;
-}
-
-/// How far what sweeps that count as settled may have left leads in a step, m.
-double left_by_sweeps(const ContactOptions& options) noexcept {
-    return options.solver == SolverKind::iterative ? options.time_step * options.unsettled_residual : 0.0;
 }
 
 }  // namespace
@@ -42,7 +38,8 @@ double left_by_sweeps(const ContactOptions& options) noexcept {
 double ContactStage::sunk_by(const Point& point, bool late) const {
     const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking = std::max(0.0, -h * relative(point, point.contact.point.normal, velocity_, false));
-    return depth + (late ? std::min(sinking, std::max(depth, left_by_sweeps(options_))) : sinking);
+    const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
+    return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
 }
 
 /// Puts the points of each body together: what holds it is asked of each that it would meet.
@@ -66,8 +63,8 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
                            const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing) const {
     if (!have_sides(moving.shape, other.shape)) return false;
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
-    const double left = left_by_sweeps(options_);
-    if (unknown_[body] < 0 || !(settling_ || left > 0.0 || depth_[body] > least)) return false;
+    const bool swept = options_.solver == SolverKind::iterative;
+    if (unknown_[body] < 0 || !(settling_ || swept || depth_[body] > least)) return false;
     const int end = points_begin_[static_cast<std::size_t>(body) + 1];
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
@@ -89,16 +86,16 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
         }
         if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face)
             continue;
-        if (settling_ || left > 0.0) {
+        if (settling_ || swept) {
             const double now = height(moving, 0.0, n), top = height(other, 0.0, -n);
             double falls = 0.0;
             for (const double part : {time, h}) {  // against what holds it, and against the other
                 const double rises = std::max(part * dot(n, leads), top - height(other, part, -n));
                 falls = std::max(falls, now + rises - height(moving, part, n));
             }
-            const double held = h * (options_.unsettled_residual + unheld * norm(linear(kick_[body])));
-            depth =
-                std::max(depth, begun + std::min(falls, settling_ ? std::max(begun, held + sinking) : left));
+            const double most = h * (options_.unsettled_residual + unheld * norm(linear(kick_[body])));
+            falls = std::min(falls, settling_ ? std::max(begun, most + sinking) : hum * slop);
+            depth = std::max(depth, begun + falls);
             if (settling_) depth += slop;  // it met the other with as much
         }
         if (!(depth > least)) continue;
