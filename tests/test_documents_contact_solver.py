@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 
-from spook_tracker.engine import PLAIN, simulate
+import pytest
+
+from spook_tracker.engine import PLAIN, Method, simulate
 from spook_tracker.scalar_tests import pile, resting_stack
 from tests.test_documents_site import DOCS
 
@@ -26,16 +28,12 @@ def test_a_stack_at_rest_is_factored_as_often_as_is_said() -> None:
     assert after_one == after_all == factorisations
 
 
-def test_spheres_are_solved_as_far_as_is_said() -> None:
-    assert "to 1e-9 of the speeds in 240 steps but for six solves at most, and those to 1e-3 m/s" in SAID
-    assert "Fifty sweeps leave up to a tenth of a metre a second" in SAID
+@pytest.mark.parametrize(("method", "least", "most"), [(PLAIN, 0.0, 1e-8), (pile.SWEEPS, 1e-2, 0.1)])
+def test_spheres_are_solved_as_far_as_is_said(method: Method, least: float, most: float) -> None:
+    assert "1000 dropped spheres are solved in each of 240 steps to less than 1e-8 m/s" in SAID
+    assert "fifty sweeps leave up to a tenth of a metre a second" in SAID
 
-    exact, swept = (
-        simulate(pile.scene(), time_step=pile.TIME_STEP, steps=STEPS, method=method)
-        for method in (PLAIN, pile.SWEEPS)
-    )
+    result = simulate(pile.scene(), time_step=pile.TIME_STEP, steps=STEPS, method=method)
 
-    assert exact.completed and swept.completed
-    assert exact.counters["unsettled_solves"] <= 6
-    assert exact.residual < 1e-3
-    assert 1e-2 < swept.residual < 0.1
+    assert result.completed
+    assert least < result.residual < most

@@ -44,8 +44,8 @@ struct ConeReport {
 class ConeNewton {
 public:
     int max_iterations = 100;
-    /// A residual, relative to the speeds, that is not worth jumps, nor beginning anew: they about halve it.
-    static constexpr double near_enough = 3e-5;
+    double near_enough =
+        1e-6;  // a residual, relative to the speeds, that is not worth jumps, nor beginning anew
 
     /// Starts from the multipliers in `system` and fills velocities and multipliers with the best it met. Points obey the
     /// cone; rows that are no point's obey their bounds.

@@ -22,6 +22,8 @@ constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redunda
 constexpr int plain_rounds = 3;         // most systems settle within these
 constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 constexpr double fair = 1e-9;           // one that is an answer
+// One that is not worth another try; where points are redundant, tries rarely settle and about halve it.
+constexpr double near = 1e-6, redundant_near = 3e-5;
 constexpr int sweep_turns = 1, turn_sweeps = 100;  // where Newton's path ends without an answer
 
 /// How much is spent on rounds of pivoting.
@@ -32,8 +34,10 @@ struct Effort {
         8;  // rounds in a row without an end of the pivoting: it goes in circles; 1: nor the first guess
     bool near = false;  // an answer is near: directions start from its slip, not from the predicted one
 };
-constexpr Effort quick{4, 4, 1};         // what rests or moves on as it did is found within these, exactly
-constexpr Effort small{6, 8, 1};         // seven in ten of few blocks settle, at less than Newton's cost
+constexpr Effort quick{4, 4, 1};    // what rests or moves on as it did is found within these, exactly
+constexpr Effort small{12, 20, 1};  // nine systems in ten of few blocks settle
+constexpr Effort brief{6, 8,
+                       1};  // the same where points are redundant: the others are Newton's, at less cost
 constexpr Effort polish{6, 8, 1, true};  // after Newton's method
 
 /// What rounds change of a system.
@@ -53,6 +57,7 @@ struct Work {
     std::vector<Mat6> mass_factor;
     std::vector<Vec6> free_velocity, missing;
     std::vector<double> scale, used, given;
+    std::vector<std::pair<int, int>> pairs;  // see is_redundant()
 };
 
 Work& work() {
@@ -162,6 +167,15 @@ bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& 
     // Rigid joints need the factor of the whole, not a relief; and its units tie two bodies.
     return std::all_of(system.rows.begin(), system.rows.end(),
                        [](const RowBlock& block) { return block.lower[0] == 0.0 && block.beyond.empty(); });
+}
+
+/// Whether some pair of bodies has several points, which may share a load in many ways.
+bool is_redundant(const MixedSystem& system) {
+    std::vector<std::pair<int, int>>& pairs = work().pairs;
+    pairs.clear();
+    for (const RowBlock& block : system.rows) pairs.emplace_back(std::minmax(block.first, block.second));
+    std::sort(pairs.begin(), pairs.end());
+    return std::adjacent_find(pairs.begin(), pairs.end()) != pairs.end();
 }
 
 /// Takes over what multipliers and velocities say: who pushes, who sticks, and which way the others slide.
@@ -294,13 +308,13 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 /// Rounds that start from the answer of the step before find what rests or moves on at once, and exactly; they are
 /// asked first unless they failed lately. True when they settled; else the system is as it was.
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                    DirectSolver& direct, FrictionReport& report) {
+                    DirectSolver& direct, bool redundant, FrictionReport& report) {
     if (direct.patience.waits()) return false;
     MixedSystem& start = work().start;
     std::vector<FrictionPoint>& start_points = work().start_points;
     start = system, start_points = points;
     const FrictionReport before = report;
-    const Effort& effort = system.rows.size() <= few_blocks ? small : quick;
+    const Effort& effort = system.rows.size() > few_blocks ? quick : redundant ? brief : small;
     if (settle_by_rounds(system, points, model, direct.pivot, effort, report)) {
         direct.patience.succeeded();
         return true;
@@ -325,7 +339,7 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     start = system, start_points = points;
     report.residual = unbounded;
     const bool few = start.rows.size() <= few_blocks;
-    for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : ConeNewton::near_enough));
+    for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : direct.newton.near_enough));
          ++turn) {
         if (turn > 0) report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
         const ConeReport found = direct.newton.solve(system, points);
@@ -402,8 +416,11 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     MixedSystem& start = work().start;
     const Effort patient{max_rounds};
     if (is_for_newton(system, points, model)) {
-        const bool near_none = (direct.foreseen || points.empty()) && system.rows.size() > few_blocks;
-        if (!near_none && settle_quickly(system, points, model, direct, report)) return report;
+        const bool redundant = is_redundant(system);
+        const bool near_none =
+            (direct.foreseen || (redundant && points.empty())) && system.rows.size() > few_blocks;
+        direct.newton.near_enough = redundant ? redundant_near : near;
+        if (!near_none && settle_quickly(system, points, model, direct, redundant, report)) return report;
         if (solve_by_newton(system, points, model, direct, report)) return report;
         start = system;
         report.residual = unbounded;

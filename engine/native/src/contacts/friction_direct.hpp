@@ -28,9 +28,9 @@ struct DirectSolver {
 /// Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
 /// Systems of contacts alone under the cone, or of more than 24 blocks without friction, get a few of these rounds,
 /// which settle exactly what rests or slides on; where they failed they wait, up to 16 solves, and more than 24 blocks
-/// that start from sweeps, or know no friction, get none. What is left goes to Newton's method
-/// (`contacts/cone_newton.hpp`), where that ends beyond its `near_enough` of the speeds (up to 24 blocks: 1e-9) to 100
-/// sweeps and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best within
+/// that start from sweeps, or have redundant points and no friction, get none. What is left goes to Newton's method
+/// (`contacts/cone_newton.hpp`), where that ends beyond 1e-6 of the speeds (3e-5 where points are redundant, 1e-9 up to 24
+/// blocks) to 100 sweeps and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best within
 /// 1e-4 of the speeds is the answer, and converged within 1e-9; else sweeps finish.
 /// On return FrictionPoint::normal is the normal impulse; for the box it stays what bounds friction.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
