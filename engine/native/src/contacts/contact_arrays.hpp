@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "collision/detection.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/islands.hpp"
 #include "contacts/pivot_system.hpp"
@@ -55,6 +56,15 @@ public:
 private:
     static bool before(const Item& item, std::uint64_t pair) noexcept { return item.first < pair; }
     std::vector<Item> items_;
+};
+
+/// A point where the step ends, of bodies that may overlap.
+struct Lap {
+    Contact contact;
+    Vec3 first_arm, second_arm;  // from the centres of mass, m
+    double damping = 0.0;        // of the pair
+    double push = 0.0;           // how deep it is, m; negative where bodies are apart
+    double parting_before = 0.0;
 };
 
 /// Of the search for strikes that act at their own time; by an island's first body.

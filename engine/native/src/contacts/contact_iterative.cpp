@@ -25,6 +25,9 @@ constexpr int many_rounds = 8;          //   unless that has been done so often
 /// Gives the sweeps the points they do not have yet.
 void ContactStage::hand_over() {
     const double h = options_.time_step;
+    for (std::size_t k = handed_over_; k < points_.size(); ++k)
+        sweeps_.announce(unknown_[points_[k].contact.first], unknown_[points_[k].contact.second]);
+    sweeps_.arrange();
     for (; handed_over_ < points_.size(); ++handed_over_) {
         Point& point = points_[handed_over_];
         const PairMaterial& material = point.material;

@@ -107,7 +107,7 @@ void ContactStage::note_given() {
     for (const Touch& touch : kept_)
         if (const auto given = given_.find(touch.contact.key >> feature_bits); given != given_.end())
             left[given->first] = given->second;
-    for (const Point& lap : laps_) {
+    for (const Lap& lap : laps_) {
         const auto given = given_.find(lap.contact.key >> feature_bits);
         if (!(lap.push > 0.0) || given == given_.end()) continue;
         double& depth = left[given->first];
@@ -118,7 +118,7 @@ void ContactStage::note_given() {
 
 /// Whether a point parts by so much that its bodies may come down elsewhere, or push others aside, and one displacement is
 /// not enough. By sweeps balls never do, which only go aside: of a thousand of them hundreds part a little in each step.
-bool ContactStage::parts_far(const Point& lap) const noexcept {
+bool ContactStage::parts_far(const Lap& lap) const noexcept {
     const double little = parts_by_sweeps() ? aside_by_sweeps : aside;
     if (!(lap.push > little * moving_size(lap.contact))) return false;
     const auto swings = [this](int b) { return unknown_[b] >= 0 && ball_[b] == 0; };
@@ -133,7 +133,7 @@ void ContactStage::note_far() {
         return unknown_[b] < 0 ? -1 : parting_.islands.of_body[unknown_[b]];
     };
     std::vector<char>& parted = filled(arrays_.parted_far, parting_.islands.count);
-    for (const Point& lap : laps_) {
+    for (const Lap& lap : laps_) {
         if (!parts_far(lap)) continue;
         far_ = true;
         for (const int b : {lap.contact.first, lap.contact.second})
@@ -162,7 +162,7 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
         search_[b] = std::max(search_[b], margin + moved(b));
     };
     grown_.clear();
-    for (const Point& lap : laps_)
+    for (const Lap& lap : laps_)
         if (parts_far(lap)) reach(lap.contact.first), reach(lap.contact.second);
     far_ = !parts_by_sweeps() || !grown_.empty();
     for (int ring = 0; ring < rings && !grown_.empty() && grown_.size() <= most_beside; ++ring) {
@@ -227,12 +227,12 @@ double ContactStage::find_overlaps_beside(const std::vector<Pose>& poses, double
 /// edges when the faces beside them come down: they must not close again, or bodies would seesaw between them. Whether
 /// something overlaps where those had no point.
 bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
-    const auto order = [](const LargeArray<Point>& laps, auto& places) {
+    const auto order = [](const LargeArray<Lap>& laps, auto& places) {
         places.clear();
         for (std::size_t k = 0; k < laps.size(); ++k) places.push_back({laps[k].contact.key, k});
         std::sort(places.begin(), places.end());
     };
-    const auto has = [this](const LargeArray<Point>& laps, const auto& places, const Contact& contact) {
+    const auto has = [this](const LargeArray<Lap>& laps, const auto& places, const Contact& contact) {
         auto at = std::lower_bound(places.begin(), places.end(), std::make_pair(contact.key, std::size_t{0}));
         for (; at != places.end() && at->first == contact.key; ++at)  // parallel edges have one name
             if (norm(laps[at->second].contact.point.position - contact.point.position) <
@@ -243,9 +243,9 @@ bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
     order(laps_, places_);
     order(parted_, parted_places_);
     bool fresh = false;
-    for (const Point& lap : laps_)
+    for (const Lap& lap : laps_)
         fresh = fresh || (lap.push > slack(lap.contact) && !has(parted_, parted_places_, lap.contact));
-    for (Point lap : parted_) {
+    for (Lap lap : parted_) {
         const Contact& contact = lap.contact;
         if (!is_looked_at(contact.first, contact.second) || has(laps_, places_, contact)) continue;
         for (const int b : {contact.first, contact.second}) {
@@ -261,15 +261,13 @@ bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
     return fresh;
 }
 
-ContactStage::Point& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses,
-                                           double excess) {
+Lap& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess) {
     if (!asleep_.empty()) rouse(contact);
-    Point& lap = laps_.emplace_back();
+    Lap& lap = laps_.emplace_back();
     lap.contact = contact;
-    lap.material = combined(materials_[contact.first], materials_[contact.second]);
+    lap.damping = std::max(materials_[contact.first].damping, materials_[contact.second].damping);
     lap.first_arm = contact.point.position - poses[contact.first].position;
     lap.second_arm = contact.point.position - poses[contact.second].position;
-    lap.tangent = world_tangent(contact.point.normal);
     lap.push = excess;
     return lap;
 }
@@ -322,12 +320,12 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
 }
 
 /// How fast the bodies of an overlap are to part in the step, m/s; of points apart, how fast they may close.
-double ContactStage::parting_speed(const Point& lap, bool again) const {
+double ContactStage::parting_speed(const Lap& lap, bool again) const {
     const double h = options_.time_step, excess = lap.push;
     const auto given = given_.find(lap.contact.key >> feature_bits);
     if (again || !(excess > 0.0) || given == given_.end()) return excess / h;
     const double slow = std::min(excess, given->second);
-    return regularise(0.0, lap.material.damping, h).violation_gain * slow + (excess - slow) / h;
+    return regularise(0.0, lap.damping, h).violation_gain * slow + (excess - slow) / h;
 }
 
 /// Who is to be seen as one: contacts that pushed aside are given; contacts that push, whose laws a turn of some of
@@ -351,7 +349,7 @@ void ContactStage::note_parted(const MixedSystem& parting) {
     for (const Touch& touch : touches_)
         if (is_supplied(touch.contact) && island(touch.contact) >= 0)
             parting_.supplied[island(touch.contact)] = 1;
-    for (const Point& lap : laps_)
+    for (const Lap& lap : laps_)
         if (lap.push > 0.0 && given_.contains(lap.contact.key >> feature_bits) && island(lap.contact) >= 0)
             parting_.supplied[island(lap.contact)] = 1;
 }
@@ -380,7 +378,7 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     if (joints > 0) {
         find_gives(parting);
         double least = unbounded;
-        for (const Point& lap : laps_) least = std::min(least, give_of(lap.contact, gives_));
+        for (const Lap& lap : laps_) least = std::min(least, give_of(lap.contact, gives_));
         hold_joints(parting, least);
     }
     arrays_.parted.begin(static_cast<int>(system.mass.size()));
@@ -396,9 +394,16 @@ bool ContactStage::part_directly(MixedSystem& parting, bool again) {
     const std::size_t joints = parting.rows.size();
     std::vector<char>& answered = arrays_.answered;
     answered.assign(joints, 1);  // where nothing overlaps, nothing is displaced
-    for (const Point& lap : laps_) {
+    for (const Lap& lap : laps_) {
         answered.push_back(!(parting_speed(lap, again) > 0.0));
-        RowBlock block = row_block(lap, 1);
+        RowBlock block;
+        block.first = unknown_[lap.contact.first];
+        block.second = unknown_[lap.contact.second];
+        block.size = 1;
+        const Vec3 normal = lap.contact.point.normal;
+        if (block.first >= 0) block.first_jacobian[0] = contact_row(normal, lap.first_arm);
+        if (block.second >= 0) block.second_jacobian[0] = contact_row(-normal, lap.second_arm);
+        block.lower[0] = 0.0;
         block.right[0] = parting_speed(lap, again);
         block.state[0] = lap.push > 0.0 ? RowState::free : RowState::at_lower;
         if (joints > 0) block.softness[0] = give_of(lap.contact, gives_);
@@ -416,13 +421,14 @@ bool ContactStage::part_directly(MixedSystem& parting, bool again) {
 
 bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
     parting_sweeps_.start_beside(sweeps_, parting, options_.friction);
-    for (const Point& lap : laps_) {
+    for (const Lap& lap : laps_)
+        parting_sweeps_.announce(unknown_[lap.contact.first], unknown_[lap.contact.second]);
+    parting_sweeps_.arrange();
+    for (const Lap& lap : laps_) {
         SweepContact row;
         row.first = unknown_[lap.contact.first];
         row.second = unknown_[lap.contact.second];
         row.normal = lap.contact.point.normal;
-        row.tangent = lap.tangent;
-        row.across = cross(row.normal, row.tangent);
         row.first_arm = lap.first_arm;
         row.second_arm = lap.second_arm;
         row.right[0] = parting_speed(lap, again);

@@ -1,5 +1,6 @@
 // In which order contacts are swept: islands, and levels of contacts that share no body.
 #include <algorithm>
+#include <numeric>
 
 #include "contacts/contact_sweeps.hpp"
 
@@ -34,7 +35,7 @@ void ContactSweeps::join(int first, int second) {
     active_[a] = active_[a] || active_[b];
 }
 
-/// Islands of all items, and levels of those that have none yet.
+/// Islands of all items, and levels of those that have none yet; contacts that have no place yet get one in that order.
 void ContactSweeps::schedule() {
     const std::size_t items = bodies_of_.size();
     if (items - scheduled_ > few_late * static_cast<double>(items)) {  // all anew, or levels would be short
@@ -69,6 +70,7 @@ void ContactSweeps::schedule() {
         level_end_[level] = sum;
         sum += count;
     }
+    const std::size_t known = order_.size();
     order_.resize(sum);
     for (std::size_t item = scheduled_; item < items; ++item) {
         const Both bodies = bodies_of_[item];
@@ -83,8 +85,53 @@ void ContactSweeps::schedule() {
         order_[level_end_[levels + level_[item]]++] = {static_cast<int>(item), bodies.first, bodies.second,
                                                        island};
     }
+    const std::size_t contacts = items - static_cast<std::size_t>(joint_count_);
+    int next = static_cast<int>(place_.size());
+    place_.resize(contacts, -1);
+    for (std::size_t k = known; k < sum; ++k) {
+        int& place = place_[order_[k].item - joint_count_];
+        if (place < 0) place = next++;
+        order_[k].item = joint_count_ + place;
+    }
+    for (int& place : place_)
+        if (place < 0) place = next++;  // neither body moves
     scheduled_ = items;
+    size_.assign(bodies_ + 1, 0);
+    for (const Due& due : order_) ++size_[due.island];
+    due_begin_.clear();
+    marked_ = false;
     select();
+}
+
+/// Contacts of hot bodies, in this sweep and, from then on, the next.
+void ContactSweeps::mark_hot() {
+    if (due_begin_.empty()) {
+        due_begin_.assign(bodies_ + 2, 0);
+        for (const Due& due : order_) ++due_begin_[due.first + 1], ++due_begin_[due.second + 1];
+        std::partial_sum(due_begin_.begin(), due_begin_.end(), due_begin_.begin());
+        due_of_.resize(2 * order_.size());
+        for (std::size_t place = order_.size(); place-- > 0;)
+            for (const int body : {order_[place].first, order_[place].second})
+                due_of_[--due_begin_[body + 1]] = static_cast<int>(place);
+        due_begin_.erase(due_begin_.begin());
+        due_begin_.push_back(static_cast<int>(due_of_.size()));
+    }
+    due_now_.assign(order_.size() / 64 + 1, 0);
+    due_next_.assign(order_.size() / 64 + 1, 0);
+    for (int b = 0; b < bodies_; ++b)
+        if (hot_[b] != 0) mark(b);
+    std::fill(due_next_.begin(), due_next_.end(), 0);
+    for (int b = 0; b < bodies_; ++b)
+        if ((hot_[b] & now_hot) != 0) mark(b);
+    marked_ = true;
+}
+
+void ContactSweeps::mark(int body) noexcept {
+    for (int k = due_begin_[body]; k < due_begin_[body + 1]; ++k) {
+        const std::uint64_t bit = std::uint64_t{1} << (due_of_[k] % 64);
+        due_now_[due_of_[k] / 64] |= bit;
+        due_next_[due_of_[k] / 64] |= bit;
+    }
 }
 
 /// The contacts of islands that are active.

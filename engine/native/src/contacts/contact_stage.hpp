@@ -385,17 +385,17 @@ private:
     void find_given();
     void note_given();
     void find_beside(const std::vector<Pose>& poses, double margin, const std::function<double(int)>& moved);
-    Point& add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
+    Lap& add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
     double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
     double find_overlaps_beside(const std::vector<Pose>& poses, double margin);
     bool keep_parted(const std::vector<Pose>& poses);
-    bool parts_far(const Point& lap) const noexcept;
+    bool parts_far(const Lap& lap) const noexcept;
     void note_far();
     bool is_looked_at(int a, int b) const noexcept {
         return looked_at_.empty() || looked_at_[a] != 0 || looked_at_[b] != 0;
     }
     bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
-    double parting_speed(const Point& lap, bool again) const;
+    double parting_speed(const Lap& lap, bool again) const;
     bool part_directly(MixedSystem& parting, bool again);
     bool part_by_sweeps(MixedSystem& parting, bool again);
     void find_gives(const MixedSystem& parting);
@@ -430,13 +430,13 @@ private:
     MixedSystem parting_system_;
     Parting parting_;
     std::vector<char> yielding_;
-    std::vector<double> gives_;        // of contacts of jointed bodies, see find_gives(), 1/kg
-    LargeArray<Point> laps_, parted_;  // points of the step's pairs where it ends; of all its partings
-    std::vector<Pose> lap_poses_;      // where bodies were at the last of them
-    bool far_ = false;                 // the last may not have been enough, see parts_far()
-    std::vector<char> looked_at_;      // for whom not, by body; empty: for anybody
-    DepthOfPair given_;                // by pair: overlap the scene began with, as far as it is left, m
-    bool begun_ = false;               // whether it is known
+    std::vector<double> gives_;      // of contacts of jointed bodies, see find_gives(), 1/kg
+    LargeArray<Lap> laps_, parted_;  // points of the step's pairs where it ends; of all its partings
+    std::vector<Pose> lap_poses_;    // where bodies were at the last of them
+    bool far_ = false;               // the last may not have been enough, see parts_far()
+    std::vector<char> looked_at_;    // for whom not, by body; empty: for anybody
+    DepthOfPair given_;              // by pair: overlap the scene began with, as far as it is left, m
+    bool begun_ = false;             // whether it is known
     bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly
     bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
     std::vector<Vec6> next_;     // velocities between sweeps, per body of the scene

@@ -1,6 +1,7 @@
 #include "contacts/contact_sweeps.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -17,7 +18,6 @@ namespace spook {
 namespace {
 
 constexpr int late_rounds = 3;         // of sweeps for contacts found after the last one
-constexpr unsigned char now_hot = 2;   // and 1 in the sweep after
 constexpr double glance = 1.0 / 16.0;  // of what sweeping a contact costs: to see that it is cold
 constexpr double measuring = 0.5;      // the same: to see how far off it is
 constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are swept
@@ -28,158 +28,7 @@ constexpr double few_left = 0.75;           // of the contacts in the list: a sh
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
-SweptBody swept_body(const Mat6& mass) noexcept {
-    const double one = 1.0 / mass[0];
-    const double a = mass[21], b = mass[22], c = mass[23], d = mass[28], e = mass[29], f = mass[35];
-    if (b == 0.0 && c == 0.0 && e == 0.0) return {one, 1.0 / a, 0.0, 0.0, 1.0 / d, 0.0, 1.0 / f};
-    const double A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
-    const double s = 1.0 / (a * A + b * B + c * C);
-    const double D = a * f - c * c, E = b * c - a * e, F = a * d - b * b;
-    return {one, s * A, s * B, s * C, s * D, s * E, s * F};
-}
-
 }  // namespace
-
-void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
-    bodies_ = static_cast<int>(system.mass.size());
-    inertia_.resize(bodies_ + 1);
-    for (int b = 0; b < bodies_; ++b) inertia_[b] = swept_body(system.mass[b]);
-    inertia_[bodies_] = {};
-    begin(system, model);
-}
-
-void ContactSweeps::start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model) {
-    bodies_ = other.bodies_;
-    inertia_ = other.inertia_;
-    begin(system, model);
-}
-
-void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
-    model_ = model;
-    joint_count_ = static_cast<int>(system.rows.size());
-    if (joint_count_ > 0) {
-        joints_.prepare(system, {}, model);
-    } else {
-        std::vector<Vec6>& velocity = joints_.velocity();
-        velocity.resize(bodies_ + 1);
-        for (int b = 0; b < bodies_; ++b) {
-            const Vec6& p = system.momentum[b];
-            const Vec3 v = inertia_[b].inverse_mass * linear(p), w = inertia_[b].turn(angular(p));
-            velocity[b] = {v.x, v.y, v.z, w.x, w.y, w.z};
-        }
-        velocity[bodies_] = Vec6{};
-    }
-    contacts_.clear();
-    rests_.clear();
-    slips_.clear();
-    parent_.resize(bodies_ + 1);
-    std::iota(parent_.begin(), parent_.end(), 0);
-    active_.assign(bodies_ + 1, 0);
-    spent_.assign(bodies_ + 1, 0);
-    left_.assign(bodies_ + 1, 0.0);
-    parts_.resize(team_ != nullptr ? static_cast<std::size_t>(team_->size()) : 1);
-    for (Part& part : parts_) {
-        part.change.assign(bodies_ + 1, 0.0);
-        part.none.first = part.none.second = bodies_;
-        part.none.step = 1.0;
-    }
-    bodies_of_.clear();
-    roots_.clear();
-    known_.assign(bodies_ + 1, 0);
-    scheduled_ = 0;
-    order_.clear();
-    level_end_.clear();
-    swept_ = stretched_ = joined_ = false;
-    plain_ = true;
-    done_ = 0.0;
-    hot_.assign(bodies_ + 1, 0);
-    touched_.assign(bodies_ + 1, 0);
-    all_touched_ = true;
-    for (int k = 0; k < joint_count_; ++k) {
-        const RowBlock& rows = system.rows[k];
-        int anchor = std::max(rows.first, rows.second);
-        for (const Beyond& other : rows.beyond) {
-            if (anchor < 0) anchor = other.body;
-            else if (other.body >= 0) join(anchor, other.body);
-        }
-        link(anchor, anchor == rows.first ? rows.second : rows.first);
-    }
-}
-
-int ContactSweeps::add(const SweepContact& given) {
-    SweptContact& c = contacts_.emplace_back();
-    c.first = given.first >= 0 ? given.first : bodies_;
-    c.second = given.second >= 0 ? given.second : bodies_;
-    SweptRest& rest = rests_.emplace_back();
-    c.normal = given.normal;
-    c.tangent = given.tangent;
-    rest.across = given.across;
-    stretched_ = stretched_ || given.stretched;
-    c.first_arm = given.first_arm;
-    c.second_arm = given.second_arm;
-    c.right = given.right[0], rest.right_along = given.right[1], rest.right_across = given.right[2];
-    std::copy_n(given.impulse, 3, c.impulse);
-    rest.softness = given.softness;
-    rest.slip_softness = given.slip_softness;
-    c.friction = given.friction;
-    rest.normal_before = given.normal_before >= 0.0 ? given.normal_before : given.impulse[0];
-    const Vec3 third = cross(c.normal, c.tangent);
-    plain_ = plain_ && rest.right_along == 0.0 && rest.right_across == 0.0 && rest.softness == 0.0 &&
-             rest.slip_softness == 0.0 && third.x == rest.across.x && third.y == rest.across.y &&
-             third.z == rest.across.z;
-    const SweptBody &one = inertia_[c.first], &two = inertia_[c.second];
-    const double inverse_mass = one.inverse_mass + two.inverse_mass;
-    const Vec3 direction[3] = {c.normal, c.tangent, rest.across};
-    Vec3 first[3], second[3], first_push[3], second_push[3];
-    for (int i = 0; i < 3; ++i) {
-        first[i] = cross(c.first_arm, direction[i]);
-        second[i] = cross(c.second_arm, direction[i]);
-        first_push[i] = one.turn(first[i]);
-        second_push[i] = two.turn(second[i]);
-    }
-    const auto part = [&](int i, int j) {
-        return dot(first[i], first_push[j]) + dot(second[i], second_push[j]);
-    };
-    c.own = inverse_mass + part(0, 0) + rest.softness;
-    c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
-    c.coupling[0] = part(1, 0);
-    c.coupling[1] = part(2, 0);
-    const double along = given.stretched ? dot(c.tangent, c.tangent) : 1.0,
-                 across = given.stretched ? dot(rest.across, rest.across) : 1.0;
-    slips_.emplace_back().stretched = given.stretched;
-    double* const slip = slips_.back().own;
-    slip[0] = inverse_mass * along + part(1, 1) + rest.slip_softness;
-    slip[1] = part(1, 2);
-    slip[2] = inverse_mass * across + part(2, 2) + rest.slip_softness;
-    const double largest = 0.5 * (slip[0] + slip[2]) + length(0.5 * (slip[0] - slip[2]), slip[1]);
-    c.step = largest > 0.0 ? 1.0 / largest : 0.0;
-    if (!(c.friction > 0.0)) c.impulse[1] = c.impulse[2] = 0.0;
-    if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0)
-        push(c, c.impulse[0] * c.normal + c.impulse[1] * c.tangent + c.impulse[2] * rest.across);
-    heat(c.first, c.second);
-    if (c.first < bodies_) touched_[c.first] = 1;
-    if (c.second < bodies_) touched_[c.second] = 1;
-    link(given.first, given.second);
-    return static_cast<int>(contacts_.size()) - 1;
-}
-
-void ContactSweeps::push(const SweptContact& c, Vec3 impulse) noexcept {
-    const SweptBody &one = inertia_[c.first], &two = inertia_[c.second];
-    Vec6 &v = joints_.velocity()[c.first], &w = joints_.velocity()[c.second];
-    const Vec3 turn = one.turn(cross(c.first_arm, impulse)), back = two.turn(cross(c.second_arm, impulse));
-    v[0] += one.inverse_mass * impulse.x;
-    v[1] += one.inverse_mass * impulse.y;
-    v[2] += one.inverse_mass * impulse.z;
-    v[3] += turn.x;
-    v[4] += turn.y;
-    v[5] += turn.z;
-    w[0] -= two.inverse_mass * impulse.x;
-    w[1] -= two.inverse_mass * impulse.y;
-    w[2] -= two.inverse_mass * impulse.z;
-    w[3] -= back.x;
-    w[4] -= back.y;
-    w[5] -= back.z;
-}
 
 namespace {
 
@@ -212,33 +61,40 @@ struct Square {
 double ContactSweeps::update(std::size_t contact) noexcept {
     const auto by = [&](const auto& law, bool box) {
         return single::solve_contact<double>(
-            single::Single{contacts_[contact], rests_[contact], joints_.velocity().data(), inertia_.data(),
-                           bodies_},
+            single::Single{contacts_[contact], slips_.empty() ? no_slip_ : slips_[contact],
+                           rests_.empty() ? nullptr : &rests_[contact], joints_.bodies().data(),
+                           round_ ? nullptr : inertia_.data(), bodies_},
             law, box);
     };
-    const Slip& slip = slips_[contact];
-    if (model_ != FrictionModel::cone) return by(Square{slip.own}, model_ == FrictionModel::box);
-    return slip.stretched ? by(Stretched{slip.own}, false) : by(single::Disc{}, false);
+    if (boxes_.empty()) return by(single::Disc{}, false);
+    const Box& box = boxes_[contact];
+    if (model_ != FrictionModel::cone) return by(Square{box.own}, model_ == FrictionModel::box);
+    return box.stretched ? by(Stretched{box.own}, false) : by(single::Disc{}, false);
 }
 
 /// Asks for what the contacts behind this one will read: in large heaps they come from far away.
 void ContactSweeps::fetch(const Due& later, const Due& soon) const noexcept {
-    const auto ask = [](const auto& what) {
+    const auto ask = [](const auto& what) {  // each begins where a line does
         constexpr std::size_t line = 64;
+        static_assert(alignof(std::remove_cvref_t<decltype(what)>) == line);
         const char* const at = reinterpret_cast<const char*>(&what);
         for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
-        __builtin_prefetch(at + sizeof(what) - 1);  // a velocity may lie across two lines
     };
     ask(contacts_[later.item - joint_count_]);
-    for (const int body : {soon.first, soon.second}) {
-        ask(joints_.velocity()[body]);
-        ask(inertia_[body]);
+    if (!slips_.empty()) ask(slips_[later.item - joint_count_]);
+    for (const int at : {soon.first, soon.second}) {
+        ask(body(at));
+        if (!round_) ask(inertia_[at]);
     }
 }
 
 void ContactSweeps::heat(int first, int second) noexcept {
-    if (first < bodies_) hot_[first] |= now_hot;
-    if (second < bodies_) hot_[second] |= now_hot;
+    marked_ = marked_ && marking_;
+    for (const int body : {first, second}) {
+        if (body == bodies_ || (hot_[body] & now_hot) != 0) continue;
+        hot_[body] |= now_hot;
+        if (marking_) mark(body);
+    }
 }
 
 void ContactSweeps::note(Part& part, const Due& due, double change, double focus) noexcept {
@@ -252,13 +108,18 @@ void ContactSweeps::note(Part& part, const Due& due, double change, double focus
 /// Up to four contacts that share no moving body.
 void ContactSweeps::solve(Part& part, const Due* const group[4], int size, double focus) noexcept {
     const auto contact = [&](int k) { return static_cast<std::size_t>(group[k]->item - joint_count_); };
-    if (size > 1 && model_ == FrictionModel::cone && !stretched_) {
+    if (size > 1 && boxes_.empty()) {
         SweptContact* four[4] = {&part.none, &part.none, &part.none, &part.none};
+        const SweptSlip* slips[4] = {&no_slip_, &no_slip_, &no_slip_, &no_slip_};
         const SweptRest* rests[4] = {&no_rest_, &no_rest_, &no_rest_, &no_rest_};
         double change[4];
-        for (int k = 0; k < size; ++k) four[k] = &contacts_[contact(k)], rests[k] = &rests_[contact(k)];
-        sweep_four()(
-            {four, plain_ ? nullptr : rests, joints_.velocity().data(), inertia_.data(), bodies_, change});
+        for (int k = 0; k < size; ++k) {
+            four[k] = &contacts_[contact(k)];
+            slips[k] = slips_.data() + contact(k);
+            rests[k] = rests_.data() + contact(k);
+        }
+        sweep_four()({four, slips_.empty() ? nullptr : slips, rests_.empty() ? nullptr : rests,
+                      joints_.bodies().data(), round_ ? nullptr : inertia_.data(), bodies_, change});
         for (int k = 0; k < size; ++k) note(part, *group[k], change[k], focus);
     } else {
         for (int k = 0; k < size; ++k) note(part, *group[k], update(contact(k)), focus);
@@ -295,9 +156,47 @@ void ContactSweeps::solve_due(Part& part, std::size_t begin, std::size_t end, do
         part.hot += asked && spent;
         part.swept += asked && !spent;
     }
-    for (std::size_t k = 0; k < picked; ++k) fetch(*part.picked[k], *part.picked[k]);
-    for (std::size_t k = 0; k < picked; k += 4)
-        solve(part, &part.picked[k], static_cast<int>(std::min<std::size_t>(4, picked - k)), focus);
+    solve_picked(part, picked, focus);
+}
+
+void ContactSweeps::solve_picked(Part& part, std::size_t picked, double focus) noexcept {
+    for (std::size_t k = 0; k < std::min(picked, contacts_ahead); ++k)
+        fetch(*part.picked[k], *part.picked[k]);
+    for (std::size_t k = 0; k < picked; k += 4) {
+        const std::size_t size = std::min<std::size_t>(4, picked - k);
+        for (std::size_t ahead = k + contacts_ahead; ahead < std::min(picked, k + contacts_ahead + 4);
+             ++ahead)
+            fetch(*part.picked[ahead], *part.picked[ahead]);
+        solve(part, &part.picked[k], static_cast<int>(size), focus);
+    }
+}
+
+/// The contacts of hot bodies, found without a look at the others: everybody who is active is spent.
+void ContactSweeps::sweep_hot(double focus) {
+    if (!marked_) mark_hot();
+    else due_now_.swap(due_next_), std::fill(due_next_.begin(), due_next_.end(), 0);
+    Part& part = parts_[0];
+    for (const int island : roots_) part.seen += active_[island] ? size_[island] : 0;
+    marking_ = true;
+    std::size_t begin = 0;
+    for (const std::size_t end : level_end_) {
+        part.picked.resize(end - begin + 1);
+        std::size_t picked = 0;
+        for (std::size_t word = begin / 64; 64 * word < end; ++word) {
+            std::uint64_t bits = due_now_[word];
+            if (64 * word < begin) bits &= ~std::uint64_t{0} << (begin % 64);
+            if (end - 64 * word < 64) bits &= ~(~std::uint64_t{0} << (end % 64));
+            for (; bits != 0; bits &= bits - 1) {
+                const Due& due = order_[64 * word + static_cast<std::size_t>(std::countr_zero(bits))];
+                part.picked[picked] = &due;
+                picked += active_[due.island] != 0;
+            }
+        }
+        part.hot += picked;
+        solve_picked(part, picked, focus);
+        begin = end;
+    }
+    marking_ = false;
 }
 
 /// Once over what is active: joints, then contacts level by level.
@@ -323,6 +222,8 @@ void ContactSweeps::sweep(double focus) noexcept {
              focus);
     }
     const bool plain = all && !any_spent;
+    const bool all_spent = std::all_of(roots_.begin(), roots_.end(),
+                                       [this](int island) { return !active_[island] || spent_[island]; });
     for (const int island : roots_) all_touched_ = all_touched_ || (active_[island] && !spent_[island]);
     const auto piece = [&](Part& part, std::size_t begin, std::size_t end) {
         if (plain) solve_all(part, begin, end, focus);
@@ -330,10 +231,14 @@ void ContactSweeps::sweep(double focus) noexcept {
     };
     const std::size_t wide = parts_.size() * (any_spent ? narrow_due : narrow);
     const bool worth = parts_.size() > 1 && due().size() > 2 * wide * due_end().size() / 3;
-    if (!worth) {
+    if (!worth && all_spent) {
+        sweep_hot(focus);
+    } else if (!worth) {
+        marked_ = false;
         std::size_t place = 0;
         for (const std::size_t end : due_end()) piece(parts_[0], std::exchange(place, end), end);
     } else {
+        marked_ = false;
         // Narrow levels are the first thread's; the others wait for it where a wide one comes next.
         team_->each([&](int index) {
             Part& part = parts_[index];
@@ -402,7 +307,7 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
 
 void ContactSweeps::write(MixedSystem& system) const {
     if (joint_count_ > 0) joints_.write(system);
-    else system.velocity.assign(joints_.velocity().begin(), joints_.velocity().end() - 1);
+    else joints_.write_velocities(system);
 }
 
 RowsResidual ContactSweeps::worst(double focus) {
@@ -416,20 +321,22 @@ RowsResidual ContactSweeps::worst(double focus) {
     std::fill(touched_.begin(), touched_.end(), 0);
     all_touched_ = false;
     RowsResidual worst{0.0, -1};
-    for (std::size_t k = 0; k < parts_.size(); ++k) {
-        for (const int contact : parts_[k].off) heat(contacts_[contact].first, contacts_[contact].second);
-        parts_[k].off.clear();
-        const RowsResidual& found = parts_[k].worst;
+    for (Part& part : parts_) {
+        for (const int place : part.off) heat(contacts_[place].first, contacts_[place].second);
+        part.off.clear();
+        const RowsResidual& found = part.worst;
         if (!(found.residual <= worst.residual) && !std::isnan(worst.residual)) worst = found;
     }
+    if (worst.row >= 0)
+        worst.row = static_cast<int>(std::find(place_.begin(), place_.end(), worst.row) - place_.begin());
     return worst;
 }
 
 RowsResidual ContactSweeps::worst_of(Part& part, std::size_t begin, std::size_t end, double focus) {
     RowsResidual worst{0.0, -1};
     for (std::size_t k = begin; k < end; ++k) {
-        const Both bodies = bodies_of_[joint_count_ + k];
-        if (all_touched_ || touched_[bodies.first] || touched_[bodies.second]) residual_[k] = residual_of(k);
+        const SweptContact& c = contacts_[k];
+        if (all_touched_ || touched_[c.first] || touched_[c.second]) residual_[k] = residual_of(k);
         const double residual = residual_[k];
         if (!(residual <= focus)) part.off.push_back(static_cast<int>(k));
         const bool worse = !(residual <= worst.residual) && !std::isnan(worst.residual);
@@ -441,16 +348,18 @@ RowsResidual ContactSweeps::worst_of(Part& part, std::size_t begin, std::size_t 
 /// How far a contact is from its law, as rows_residual() measures it, m/s.
 double ContactSweeps::residual_of(std::size_t k) const noexcept {
     const SweptContact& c = contacts_[k];
-    const SweptRest& rest = rests_[k];
-    const Vec3 u = add_turn(joints_.velocity()[c.first], c.first_arm) -
-                   add_turn(joints_.velocity()[c.second], c.second_arm);
+    const SweptRest& rest = rests_.empty() ? no_rest_ : rests_[k];
+    const Vec3 u = add_turn(velocity(c.first), c.first_arm) - add_turn(velocity(c.second), c.second_arm);
     const double w = dot(c.normal, u) + rest.softness * c.impulse[0] - c.right;
-    double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+    const double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+    const SweptSlip& slip = slips_.empty() ? no_slip_ : slips_[k];
+    if (!(slip.friction > 0.0)) return residual;
+    const Vec3 across = rests_.empty() ? cross(c.normal, slip.tangent) : rest.across;
     const double b1 = c.impulse[1], b2 = c.impulse[2];
-    const double s1 = dot(c.tangent, u) + rest.slip_softness * b1 - rest.right_along;
-    const double s2 = dot(rest.across, u) + rest.slip_softness * b2 - rest.right_across;
-    const double bound = c.friction * (model_ == FrictionModel::box ? rest.normal_before : c.impulse[0]);
-    double z1 = b1 - c.step * s1, z2 = b2 - c.step * s2;
+    const double s1 = dot(slip.tangent, u) + rest.slip_softness * b1 - rest.right_along;
+    const double s2 = dot(across, u) + rest.slip_softness * b2 - rest.right_across;
+    const double bound = slip.friction * (model_ == FrictionModel::box ? rest.normal_before : c.impulse[0]);
+    double z1 = b1 - slip.step * s1, z2 = b2 - slip.step * s2;
     bool sticks = true;
     if (model_ == FrictionModel::cone) {
         const double reach = length(z1, z2);
@@ -460,9 +369,7 @@ double ContactSweeps::residual_of(std::size_t k) const noexcept {
         sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
         z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
     }
-    if (c.friction > 0.0)
-        residual = std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / c.step);
-    return residual;
+    return std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / slip.step);
 }
 
 }  // namespace spook

@@ -56,21 +56,17 @@ SPOOK_ALWAYS Three<R> velocity_at(const Three<R>& v, const Three<R>& w, const Th
 template <class R, class Mask, class Body>
 SPOOK_ALWAYS void push_body(Body body, const R& sign, const Three<R>& arm, const Three<R>& impulse,
                             const Mask& pushes) {
-    const Three<R> moment = cross(arm, impulse);
-    R inverse_mass, xx, xy, xz, yy, yz, zz;
-    body.inertia(inverse_mass, xx, xy, xz, yy, yz, zz);
-    const Three<R> turn{xx * moment.x + xy * moment.y + xz * moment.z,
-                        xy * moment.x + yy * moment.y + yz * moment.z,
-                        xz * moment.x + yz * moment.y + zz * moment.z};
     Three<R> v, w;
-    body.velocity(v, w);
+    R inverse_mass, round;
+    body.read(v, w, inverse_mass, round);
+    const Three<R> turn = body.turned(cross(arm, impulse), round);
     v.x = pushes ? v.x + sign * (inverse_mass * impulse.x) : v.x;
     v.y = pushes ? v.y + sign * (inverse_mass * impulse.y) : v.y;
     v.z = pushes ? v.z + sign * (inverse_mass * impulse.z) : v.z;
     w.x = pushes ? w.x + sign * turn.x : w.x;
     w.y = pushes ? w.y + sign * turn.y : w.y;
     w.z = pushes ? w.z + sign * turn.z : w.z;
-    body.write(v, w);
+    body.write(v, w, inverse_mass, round);
 }
 
 /// Solves a contact's rows for the velocities of its bodies: the normal first, then friction by `law`, whose bound is mu
@@ -78,15 +74,15 @@ SPOOK_ALWAYS void push_body(Body body, const R& sign, const Three<R>& arm, const
 /// reads and writes the contact, one of a kind or several side by side; each part when it is needed.
 template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from, const Law& law, bool box) {
     Three<R> first_arm, second_arm, normal, tangent, v, w;
-    R right, own, own_inverse, impulse[3], friction, softness, before;
+    R right, own, own_inverse, impulse[3], friction, softness, before, inverse_mass, round;
     from.arms(first_arm, second_arm, right);
-    from.first().velocity(v, w);
+    from.first().read(v, w, inverse_mass, round);
     const Three<R> a = velocity_at(v, w, first_arm);
-    from.second().velocity(v, w);
+    from.second().read(v, w, inverse_mass, round);
     const Three<R> b = velocity_at(v, w, second_arm), u{a.x - b.x, a.y - b.y, a.z - b.z};
     from.normal(normal, own);
     from.impulse(impulse, own_inverse);
-    from.tangent(tangent, friction);
+    from.tangent(tangent, friction);  // nothing where it has none
     from.normal_rest(softness, before);
     const R zero{}, old = impulse[0];
     const R asked = old - (dot(normal, u) + softness * old - right) * own_inverse;
@@ -97,7 +93,7 @@ template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from
     const R bound = friction * (box ? before : nu);
     const auto rubs = (bound > 0.0) | (impulse[1] != 0.0) | (impulse[2] != 0.0);
     Three<R> across{};
-    if (any(rubs)) {
+    if (From::rough && any(rubs)) {
         R right1, right2, coupling1, coupling2, slip_softness, step;
         from.across(across, normal, tangent);
         from.tangent_scales(coupling1, coupling2, step);
@@ -126,32 +122,38 @@ template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from
 
 /// A contact by itself. `nobody`, which does not move, is not written.
 struct Single {
+    static constexpr bool rough = true;
     SweptContact& c;
-    const SweptRest& rest;
-    Vec6* velocities;
-    const SweptBody* bodies;
+    const SweptSlip& slip;
+    const SweptRest* rest;  // null: none
+    SweptBody* bodies;
+    const SweptInertia* inertia;  // null: all are round
     int nobody;
 
     struct Body {
-        Vec6& at;
-        const SweptBody& own;
+        SweptBody& own;
+        const SweptInertia* inertia;
         bool moves;
-        SPOOK_ALWAYS void velocity(Three<double>& v, Three<double>& w) const {
-            v = {at[0], at[1], at[2]};
-            w = {at[3], at[4], at[5]};
+        SPOOK_ALWAYS void read(Three<double>& v, Three<double>& w, double& inverse_mass,
+                               double& round) const {
+            v = {own.velocity[0], own.velocity[1], own.velocity[2]};
+            w = {own.velocity[3], own.velocity[4], own.velocity[5]};
+            inverse_mass = own.inverse_mass, round = own.round;
         }
-        SPOOK_ALWAYS void inertia(double& inverse_mass, double& xx, double& xy, double& xz, double& yy,
-                                  double& yz, double& zz) const {
-            inverse_mass = own.inverse_mass;
-            xx = own.xx, xy = own.xy, xz = own.xz, yy = own.yy, yz = own.yz, zz = own.zz;
+        SPOOK_ALWAYS Three<double> turned(const Three<double>& m, double round) const {
+            return inertia != nullptr ? three(inertia->turn({m.x, m.y, m.z}))
+                                      : Three<double>{round * m.x, round * m.y, round * m.z};
         }
-        SPOOK_ALWAYS void write(const Three<double>& v, const Three<double>& w) const {
-            if (moves) at = {v.x, v.y, v.z, w.x, w.y, w.z};
+        SPOOK_ALWAYS void write(const Three<double>& v, const Three<double>& w, double, double) const {
+            if (moves) own.velocity = {v.x, v.y, v.z, w.x, w.y, w.z};
         }
     };
+    SPOOK_ALWAYS Body body(int at) const {
+        return {bodies[at], inertia != nullptr ? inertia + at : nullptr, at != nobody};
+    }
     SPOOK_ALWAYS static Three<double> three(const Vec3& a) { return {a.x, a.y, a.z}; }
-    SPOOK_ALWAYS Body first() const { return {velocities[c.first], bodies[c.first], c.first != nobody}; }
-    SPOOK_ALWAYS Body second() const { return {velocities[c.second], bodies[c.second], c.second != nobody}; }
+    SPOOK_ALWAYS Body first() const { return body(c.first); }
+    SPOOK_ALWAYS Body second() const { return body(c.second); }
     SPOOK_ALWAYS void arms(Three<double>& first, Three<double>& second, double& right) const {
         first = three(c.first_arm), second = three(c.second_arm), right = c.right;
     }
@@ -161,19 +163,22 @@ struct Single {
         own_inverse = c.own_inverse;
     }
     SPOOK_ALWAYS void tangent(Three<double>& t, double& friction) const {
-        t = three(c.tangent), friction = c.friction;
+        t = three(slip.tangent), friction = slip.friction;
     }
     SPOOK_ALWAYS void normal_rest(double& softness, double& before) const {
-        softness = rest.softness, before = rest.normal_before;
+        softness = before = 0.0;
+        if (rest != nullptr) softness = rest->softness, before = rest->normal_before;
     }
-    SPOOK_ALWAYS void across(Three<double>& u, const Three<double>&, const Three<double>&) const {
-        u = three(rest.across);
+    SPOOK_ALWAYS void across(Three<double>& u, const Three<double>& n, const Three<double>& t) const {
+        u = rest != nullptr ? three(rest->across) : cross(n, t);
     }
     SPOOK_ALWAYS void tangent_scales(double& coupling1, double& coupling2, double& step) const {
-        coupling1 = c.coupling[0], coupling2 = c.coupling[1], step = c.step;
+        coupling1 = slip.coupling[0], coupling2 = slip.coupling[1], step = slip.step;
     }
     SPOOK_ALWAYS void tangent_rest(double& right1, double& right2, double& softness) const {
-        right1 = rest.right_along, right2 = rest.right_across, softness = rest.slip_softness;
+        right1 = right2 = softness = 0.0;
+        if (rest != nullptr)
+            right1 = rest->right_along, right2 = rest->right_across, softness = rest->slip_softness;
     }
     SPOOK_ALWAYS void write(const double* z, double) const {
         for (int k = 0; k < 3; ++k) c.impulse[k] = z[k];

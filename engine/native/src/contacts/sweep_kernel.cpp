@@ -8,15 +8,15 @@
 namespace spook {
 
 void portable_sweep_four(const SweepGroup& group) {
-    static constexpr SweptRest nothing{};
+    static constexpr SweptSlip smooth{};
     for (int i = 0; i < 4; ++i) {
-        SweptContact& c = *group.contacts[i];
-        SweptRest rest = nothing;
-        rest.across = cross(c.normal, c.tangent);
-        group.change[i] =
-            portable::solve_contact<double>(portable::Single{c, group.rests ? *group.rests[i] : rest,
-                                                             group.velocity, group.bodies, group.nobody},
-                                            portable::Disc{}, false);
+        const portable::Single contact{*group.contacts[i],
+                                       group.slips ? *group.slips[i] : smooth,
+                                       group.rests ? group.rests[i] : nullptr,
+                                       group.bodies,
+                                       group.inertia,
+                                       group.nobody};
+        group.change[i] = portable::solve_contact<double>(contact, portable::Disc{}, false);
     }
 }
 

@@ -38,49 +38,55 @@ FOURS void gather(const double* const from[4], int at, Four& a, Four& b, Four& c
     transpose(a, b, c, d);
 }
 
-struct FourBodies {
+template <bool round_only> struct FourBodies {
     const int* at;
-    Vec6* velocities;
-    const SweptBody* bodies;
+    SweptBody* bodies;
+    const SweptInertia* inertia;
     int nobody;
 
-    FOURS void velocity(Three<Four>& v, Three<Four>& w) const {
+    FOURS void read(Three<Four>& v, Three<Four>& w, Four& inverse_mass, Four& round) const {
         const double* from[4];
-        for (int i = 0; i < 4; ++i) from[i] = velocities[at[i]].data();
-        Four z, x;
+        for (int i = 0; i < 4; ++i) from[i] = bodies[at[i]].velocity.data();
         gather(from, 0, v.x, v.y, v.z, w.x);
-        gather(from, 2, z, x, w.y, w.z);
+        gather(from, 4, w.y, w.z, inverse_mass, round);
     }
-    FOURS void inertia(Four& inverse_mass, Four& xx, Four& xy, Four& xz, Four& yy, Four& yz, Four& zz) const {
+    FOURS Three<Four> turned(const Three<Four>& moment, const Four& round) const {
+        if (round_only) return {round * moment.x, round * moment.y, round * moment.z};
         const double* from[4];
-        for (int k = 0; k < 4; ++k) from[k] = &bodies[at[k]].inverse_mass;
-        Four rest;
-        gather(from, 0, inverse_mass, xx, xy, xz);
-        gather(from, 4, yy, yz, zz, rest);
+        for (int k = 0; k < 4; ++k) from[k] = &inertia[at[k]].xx;
+        Four xx, xy, xz, yy, yz, zz, one, two;
+        gather(from, 0, xx, xy, xz, yy);
+        gather(from, 4, yz, zz, one, two);
+        return {xx * moment.x + xy * moment.y + xz * moment.z, xy * moment.x + yy * moment.y + yz * moment.z,
+                xz * moment.x + yz * moment.y + zz * moment.z};
     }
-    FOURS void write(const Three<Four>& v, const Three<Four>& w) const {
-        Four a = v.x, b = v.y, c = v.z, d = w.x, e = v.z, f = w.x, g = w.y, h = w.z;
+    FOURS void write(const Three<Four>& v, const Three<Four>& w, const Four& inverse_mass,
+                     const Four& round) const {
+        Four a = v.x, b = v.y, c = v.z, d = w.x, e = w.y, f = w.z, g = inverse_mass, h = round;
         transpose(a, b, c, d);
         transpose(e, f, g, h);
         const Four front[4] = {a, b, c, d}, back[4] = {e, f, g, h};
         for (int i = 0; i < 4; ++i) {
             if (at[i] == nobody) continue;
-            *reinterpret_cast<FourInMemory*>(velocities[at[i]].data()) = front[i];
-            *reinterpret_cast<FourInMemory*>(velocities[at[i]].data() + 2) = back[i];
+            double* const to = bodies[at[i]].velocity.data();
+            *reinterpret_cast<FourInMemory*>(to) = front[i];
+            *reinterpret_cast<FourInMemory*>(to + 4) = back[i];
         }
     }
 };
 
-template <bool with_rest> struct FourContacts {
+template <bool with_slip, bool with_rest, bool round_only> struct FourContacts {
+    static constexpr bool rough = with_slip;
     double* const* at;
+    const double* const* slip;
     const double* const* rest;
     const int *firsts, *seconds;
-    Vec6* velocities;
-    const SweptBody* bodies;
+    SweptBody* bodies;
+    const SweptInertia* inertia;
     int nobody;
 
-    FOURS FourBodies first() const { return {firsts, velocities, bodies, nobody}; }
-    FOURS FourBodies second() const { return {seconds, velocities, bodies, nobody}; }
+    FOURS FourBodies<round_only> first() const { return {firsts, bodies, inertia, nobody}; }
+    FOURS FourBodies<round_only> second() const { return {seconds, bodies, inertia, nobody}; }
     FOURS void arms(Three<Four>& first, Three<Four>& second, Four& right) const {
         Four names;
         gather(at, 0, names, first.x, first.y, first.z);
@@ -88,7 +94,10 @@ template <bool with_rest> struct FourContacts {
     }
     FOURS void normal(Three<Four>& n, Four& own) const { gather(at, 8, n.x, n.y, n.z, own); }
     FOURS void impulse(Four* z, Four& own_inverse) const { gather(at, 12, z[0], z[1], z[2], own_inverse); }
-    FOURS void tangent(Three<Four>& t, Four& friction) const { gather(at, 16, t.x, t.y, t.z, friction); }
+    FOURS void tangent(Three<Four>& t, Four& friction) const {
+        t.x = t.y = t.z = friction = Four{};
+        if (with_slip) gather(slip, 0, t.x, t.y, t.z, friction);
+    }
     FOURS void normal_rest(Four& softness, Four& before) const {
         softness = before = Four{};
         if (!with_rest) return;
@@ -105,7 +114,7 @@ template <bool with_rest> struct FourContacts {
     }
     FOURS void tangent_scales(Four& coupling1, Four& coupling2, Four& step) const {
         Four a;
-        gather(at, 20, coupling1, coupling2, step, a);
+        gather(slip, 4, coupling1, coupling2, step, a);
     }
     FOURS void tangent_rest(Four& right1, Four& right2, Four& softness) const {
         right1 = right2 = softness = Four{};
@@ -129,27 +138,32 @@ void avx2_sweep_four(const SweepGroup& group) {
     using namespace avx2;
     static_assert(offsetof(SweptContact, first_arm) == 8 && offsetof(SweptContact, second_arm) == 32 &&
                   offsetof(SweptContact, normal) == 64 && offsetof(SweptContact, impulse) == 96 &&
-                  offsetof(SweptContact, tangent) == 128 && offsetof(SweptContact, coupling) == 160 &&
-                  offsetof(SweptRest, right_across) == 32);
+                  offsetof(SweptSlip, coupling) == 32 && offsetof(SweptRest, right_across) == 32 &&
+                  offsetof(SweptBody, inverse_mass) == 48 && offsetof(SweptInertia, yz) == 32);
     double* at[4];
-    const double* rest[4];
+    const double *slip[4], *rest[4];
     int first[4], second[4];
     for (int i = 0; i < 4; ++i) {
         at[i] = reinterpret_cast<double*>(group.contacts[i]);
         first[i] = group.contacts[i]->first;
         second[i] = group.contacts[i]->second;
+        if (group.slips != nullptr) slip[i] = reinterpret_cast<const double*>(group.slips[i]);
+        if (group.rests != nullptr) rest[i] = reinterpret_cast<const double*>(group.rests[i]);
     }
     FourInMemory& change = *reinterpret_cast<FourInMemory*>(group.change);
-    if (group.rests == nullptr) {
-        change = solve_contact<Four>(
-            FourContacts<false>{at, rest, first, second, group.velocity, group.bodies, group.nobody}, Disc{},
-            false);
-        return;
-    }
-    for (int i = 0; i < 4; ++i) rest[i] = reinterpret_cast<const double*>(group.rests[i]);
-    change = solve_contact<Four>(
-        FourContacts<true>{at, rest, first, second, group.velocity, group.bodies, group.nobody}, Disc{},
-        false);
+    const auto solve = [&]<bool with_slip, bool with_rest>() __attribute__((always_inline)) {
+        const auto over = [&]<bool round_only>() __attribute__((always_inline)) {
+            change = solve_contact<Four>(
+                FourContacts<with_slip, with_rest, round_only>{at, slip, rest, first, second, group.bodies,
+                                                               group.inertia, group.nobody},
+                Disc{}, false);
+        };
+        if (group.inertia == nullptr) over.template operator()<true>();
+        else over.template operator()<false>();
+    };
+    if (group.rests != nullptr) solve.template operator()<true, true>();
+    else if (group.slips != nullptr) solve.template operator()<true, false>();
+    else solve.template operator()<false, false>();
 }
 
 }  // namespace spook

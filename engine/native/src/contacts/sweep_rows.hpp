@@ -8,7 +8,9 @@
 #include "contacts/disc.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/pivot_solver.hpp"
+#include "contacts/sweep_kernel.hpp"
 #include "linear/elementary.hpp"
+#include "linear/large_array.hpp"
 
 namespace spook {
 
@@ -49,13 +51,13 @@ public:
         model_ = model;
         const std::size_t bodies = system.mass.size();
         mass_factor_.resize(bodies);
-        velocity_.resize(bodies + 1);
+        bodies_.resize(bodies + 1);
         for (std::size_t b = 0; b < bodies; ++b) {
             mass_factor_[b] = factor_six(system.mass[b]);
-            velocity_[b] = system.momentum[b];
-            solve_six(mass_factor_[b], velocity_[b]);
+            bodies_[b].velocity = system.momentum[b];
+            solve_six(mass_factor_[b], bodies_[b].velocity);
         }
-        velocity_[bodies] = Vec6{};
+        bodies_[bodies] = {};
         rows_.clear();
         factors_.clear();
         beyond_.clear();
@@ -90,12 +92,16 @@ public:
     /// The update of one block of a joint.
     double update_joint(std::size_t block) noexcept { return update_joint(blocks_[block]); }
 
-    /// Velocities of all bodies, and of the spare one behind them, which stays at rest.
-    std::vector<Vec6>& velocity() noexcept { return velocity_; }
-    const std::vector<Vec6>& velocity() const noexcept { return velocity_; }
+    /// All bodies, and the spare one behind them, which stays at rest; their velocities, for who else sweeps.
+    LargeArray<SweptBody>& bodies() noexcept { return bodies_; }
+    const LargeArray<SweptBody>& bodies() const noexcept { return bodies_; }
+    void write_velocities(MixedSystem& system) const {
+        system.velocity.resize(bodies_.size() - 1);
+        for (std::size_t b = 0; b < system.velocity.size(); ++b) system.velocity[b] = bodies_[b].velocity;
+    }
 
     void write(MixedSystem& system) const {
-        system.velocity.assign(velocity_.begin(), velocity_.end() - 1);
+        write_velocities(system);
         for (std::size_t k = 0; k < blocks_.size(); ++k)
             for (int i = 0; i < blocks_[k].size; ++i) {
                 const SweepRow& row = rows_[blocks_[k].row + i];
@@ -166,19 +172,20 @@ private:
     }
 
     double residual(const SweepBlock& block, const SweepRow& row) const noexcept {
-        double left = dot(row.first, velocity_[block.first]) + dot(row.second, velocity_[block.second]) +
-                      row.softness * row.multiplier - row.right;
+        double left = dot(row.first, bodies_[block.first].velocity) +
+                      dot(row.second, bodies_[block.second].velocity) + row.softness * row.multiplier -
+                      row.right;
         for (int k = block.beyond; k < block.beyond_end; ++k)
-            left += dot(beyond_[k].row, velocity_[beyond_[k].body]);
+            left += dot(beyond_[k].row, bodies_[beyond_[k].body].velocity);
         return left;
     }
 
     void push(const SweepBlock& block, const SweepRow& row, double impulse) noexcept {
-        Vec6 &v = velocity_[block.first], &w = velocity_[block.second];
+        Vec6 &v = bodies_[block.first].velocity, &w = bodies_[block.second].velocity;
         for (int a = 0; a < 6; ++a) v[a] += row.first_push[a] * impulse;
         for (int a = 0; a < 6; ++a) w[a] += row.second_push[a] * impulse;
         for (int k = block.beyond; k < block.beyond_end; ++k)
-            for (int a = 0; a < 6; ++a) velocity_[beyond_[k].body][a] += beyond_[k].push[a] * impulse;
+            for (int a = 0; a < 6; ++a) bodies_[beyond_[k].body].velocity[a] += beyond_[k].push[a] * impulse;
     }
 
     double update_row(const SweepBlock& block, SweepRow& row) noexcept {
@@ -242,7 +249,7 @@ private:
 
     FrictionModel model_ = FrictionModel::cone;
     std::vector<Mat6> mass_factor_, factors_;
-    std::vector<Vec6> velocity_;
+    LargeArray<SweptBody> bodies_;
     std::vector<SweepRow> rows_;
     std::vector<SweepBeyond> beyond_;
     std::vector<SweepBlock> blocks_;
