@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contacts/pivot_solver.hpp"
-#include "contacts/unit_products.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
@@ -29,53 +27,62 @@ constexpr int max_losses = 3;                    // of the path, sought again,
 constexpr double back = 10.0;                    //   so many blurs away
 constexpr double nearer = 0.1;                   //   and kept so much nearer to
 
+/// M⁻¹ from its factor: good enough for directions, which are refined.
+Mat6 inverse_six(const Mat6& factor) noexcept {
+    Mat6 inverse{};
+    for (int i = 0; i < 6; ++i) {
+        Vec6 column{};
+        column[i] = 1.0;
+        solve_six(factor, column);
+        for (int j = 0; j < 6; ++j) inverse[6 * i + j] = column[j];
+    }
+    return inverse;
+}
+
 }  // namespace
 
-/// Reads one unit: `size` rows of a block from `row` on; `friction` is its point's, null if it has none.
-void ConeNewton::read(const RowBlock& given, int row, const FrictionPoint* friction, ConeUnit& unit) const {
-    unit.row = row;
+/// Reads one unit, rows of a block from its first one on; `friction` is its point's, null if it has none.
+void ConeNewton::read(const RowBlock& given, const FrictionPoint* friction, ConeUnit& unit, ConeFour& four,
+                      int at) const {
     unit.first = given.first;
     unit.second = given.second;
-    double own = 0.0;
+    const int row = unit.row;
+    double own = 0.0, first[3], second[3];
+    if (unit.first >= 0) own_inertias(mass_[unit.first], &given.first_jacobian[row], unit.size, first);
+    if (unit.second >= 0) own_inertias(mass_[unit.second], &given.second_jacobian[row], unit.size, second);
     for (int i = 0; i < unit.size; ++i) {
         unit.first_row[i] = given.first_jacobian[row + i];
         unit.second_row[i] = given.second_jacobian[row + i];
-        for (const bool end : {true, false}) {
-            const int body = end ? given.first : given.second;
-            if (body < 0) continue;
-            const Vec6& jacobian = end ? unit.first_row[i] : unit.second_row[i];
-            Vec6 x = jacobian;
-            solve_six(mass_factor_[body], x);
-            own += dot(jacobian, x);
-        }
-        unit.softness[i] = i > 0 ? friction->slip_softness : given.softness[row + i];
-        unit.right[i] = given.right[row + i];
-        unit.z[i] = given.multiplier[row + i];
+        if (unit.first >= 0) own += first[i];
+        if (unit.second >= 0) own += second[i];
+        four.softness[i][at] = i > 0 ? friction->slip_softness : given.softness[row + i];
+        four.right[i][at] = given.right[row + i];
+        four.z[i][at] = given.multiplier[row + i];
     }
-    unit.soft = unit.softness[0] > 0.0 || unit.softness[1] > 0.0;
-    unit.root = own > 0.0 ? std::sqrt(unit.size / own) : 1.0;
-    unit.over = 1.0 / unit.root;
-    unit.lower = given.lower[row] / unit.root;
-    unit.upper = given.upper[row] / unit.root;
-    unit.z[0] = std::clamp(unit.z[0], given.lower[row], given.upper[row]);
+    const double lower = given.lower[row], upper = given.upper[row];
+    four.soft = four.soft || four.is_soft(at);
+    four.pushing = four.pushing && lower > -unbounded && upper == unbounded;
+    four.root[at] = own > 0.0 ? std::sqrt(unit.size / own) : 1.0;
+    four.over[at] = 1.0 / four.root[at];
+    four.lower[at] = lower / four.root[at];
+    four.upper[at] = upper / four.root[at];
+    four.z[0][at] = std::clamp(four.z[0][at], lower, upper);
     if (unit.size == 3) {
-        unit.friction = friction->coefficient;
-        unit.along = unit.over / unit.friction;
+        four.friction[at] = friction->coefficient;
+        four.along[at] = four.over[at] / four.friction[at];
     }
 }
 
 void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& points) {
     const std::size_t bodies = system.mass.size();
-    mass_factor_.resize(bodies);
+    laws_ = &cone_laws();
     mass_inverse_.resize(bodies);
-    for (std::size_t b = 0; b < bodies; ++b) {
-        mass_factor_[b] = factor_six(system.mass[b]);
-        mass_inverse_[b] = inverse_six(mass_factor_[b]);
-    }
+    mass_.find(system.mass, [this](std::size_t b) { mass_inverse_[b] = inverse_six(mass_[b]); });
     std::vector<const FrictionPoint*>& friction = friction_;
     friction.assign(system.rows.size(), nullptr);
     for (const FrictionPoint& point : points) friction[point.block] = &point;
     units_.clear();
+    fours_.clear();
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         RowBlock& given = system.rows[k];
         const bool rough = friction[k] && friction[k]->coefficient > 0.0;
@@ -84,11 +91,17 @@ void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& 
             given.multiplier[1] = given.multiplier[2] = 0.0;
             rows = 1;
         }
-        for (int row = 0; row < rows; row += rough ? 3 : 1) {
+        const int size = rough ? 3 : 1;
+        for (int row = 0; row < rows; row += size) {
+            if (fours_.empty() || fours_.back().count == ConeFour::most || fours_.back().size != size) {
+                fours_.emplace_back().clear(size);
+                fours_.back().begin = static_cast<int>(units_.size());
+            }
             ConeUnit& unit = units_.emplace_back();
             unit.block = static_cast<int>(k);
-            unit.size = rough ? 3 : 1;
-            read(given, row, friction[k], unit);
+            unit.row = row;
+            unit.size = size;
+            read(given, friction[k], unit, fours_.back(), fours_.back().count++);
         }
     }
 }
@@ -100,7 +113,7 @@ void ConeNewton::connect() {
         if (unit.first >= 0 && unit.second >= 0) needed_.emplace_back(std::minmax(unit.first, unit.second));
     std::sort(needed_.begin(), needed_.end());
     needed_.erase(std::unique(needed_.begin(), needed_.end()), needed_.end());
-    const int bodies = static_cast<int>(mass_factor_.size());
+    const int bodies = static_cast<int>(mass_inverse_.size());
     // The order of elimination follows from this system alone: a run that goes back must round as it did.
     if (bodies != bodies_ || pairs_ != needed_) {
         edges_.clear();
@@ -111,175 +124,100 @@ void ConeNewton::connect() {
         bodies_ = bodies;
     }
     for (ConeUnit& unit : units_) {
-        unit.edge = -1;
+        if (unit.first >= 0) unit.matrix[1][1] = matrix_.diagonal(unit.first);
+        if (unit.second >= 0) unit.matrix[0][0] = matrix_.diagonal(unit.second);
         if (unit.first < 0 || unit.second < 0) continue;
         const std::pair<int, int> pair = std::minmax(unit.first, unit.second);
-        unit.edge = static_cast<int>(std::lower_bound(pairs_.begin(), pairs_.end(), pair) - pairs_.begin());
-        unit.turned = unit.first > unit.second;
+        const auto edge =
+            static_cast<int>(std::lower_bound(pairs_.begin(), pairs_.end(), pair) - pairs_.begin());
+        const bool turned = unit.first > unit.second;
+        unit.matrix[1][0] = turned ? matrix_.back(edge) : matrix_.forth(edge);
+        unit.matrix[0][1] = turned ? matrix_.forth(edge) : matrix_.back(edge);
     }
 }
 
 /// The square of the smoothed map a part of the way along Newton's direction and the path; past `enough` a part of it.
 double ConeNewton::merit(double blur, double length, double along, double enough) const {
-    double sum = 0.0, map[3];
-    for (const ConeUnit& unit : units_) {
-        ConeUnit::Vec z = unit.z, u = unit.u;
-        for (int i = 0; i < unit.size; ++i) {
-            z[i] += length * unit.dz[i] + along * unit.tz[i];
-            u[i] += length * unit.du[i] + along * unit.tu[i];
-        }
-        sum += unit.natural(z, u, {blur, hold_}, map);
-        if (sum > enough) break;
-    }
-    return sum;
-}
-
-/// The largest natural map, and as a velocity.
-ConeNewton::Left ConeNewton::worst() const {
-    Left largest;
-    double map[3];
-    for (const ConeUnit& unit : units_) {
-        const double size = std::sqrt(unit.natural(unit.z, unit.u, {}, map));
-        if (!(size <= largest.map)) largest.map = size;
-        if (!(size / unit.root <= largest.speed)) largest.speed = size / unit.root;
-    }
-    return largest;
-}
-
-double* ConeNewton::block(const ConeUnit& unit, bool row_first, bool column_first) {
-    if (row_first == column_first) return matrix_.diagonal(row_first ? unit.first : unit.second);
-    return row_first != unit.turned ? matrix_.forth(unit.edge) : matrix_.back(unit.edge);
-}
-
-/// The matrix gets what a unit of N rows adds: Gᵀ K G.
-template <int N> void ConeNewton::add(const ConeUnit& unit) {
-    Six image[N];
-    for (const bool column : {true, false}) {
-        if ((column ? unit.first : unit.second) < 0) continue;
-        stiffen<N>(unit.k, column ? unit.first_row : unit.second_row, image);
-        for (const bool row : {true, false}) {
-            if ((row ? unit.first : unit.second) < 0) continue;
-            add_stiffness<N>(row ? unit.first_row : unit.second_row, image, block(unit, row, column));
-        }
-    }
+    return laws_->merit(fours_, {blur, hold_}, length, along, enough);
 }
 
 /// Newton's direction, by a factor of M + Σ Gᵀ K G.
 bool ConeNewton::step(const MixedSystem& system, double blur) {
     matrix_.clear();
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
-    for (ConeUnit& unit : units_) {
-        unit.linearise({blur, hold_});
-        if (unit.size == 3) add<3>(unit);
-        else add<1>(unit);
-    }
+    laws_->linearise(fours_, {blur, hold_});
+    laws_->add(fours_, units_);
     ++factorisations_;
     block_operations_ += static_cast<std::uint64_t>(matrix_.operations());
     if (!matrix_.factor()) return false;
     return find_directions(blur);
 }
 
+/// to ← share × from.
+void ConeNewton::scale(double share, const ConeFour::Each* from, ConeFour::Each* to) noexcept {
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < ConeFour::most; ++i) to[k][i] = share * from[k][i];
+}
+
 /// Newton's direction, and the path's for the whole blur. False if nothing finite was found.
 bool ConeNewton::find_directions(double blur) {
-    for (ConeUnit& unit : units_) unit.lack = {-unit.map[0], -unit.map[1], -unit.map[2]};
-    if (!answer(&ConeUnit::dz, &ConeUnit::du, refined)) return false;
+    for (ConeFour& four : fours_) scale(-1.0, four.map, four.lack);
+    if (!answer(&ConeFour::dz, &ConeFour::du, refined)) return false;
     if (blur == 0.0) {  // a jump: there is no path
-        for (ConeUnit& unit : units_) unit.tz = unit.tu = {};
+        for (ConeFour& four : fours_)
+            for (int k = 0; k < 3; ++k) std::fill_n(four.tz[k], 4, 0.0), std::fill_n(four.tu[k], 4, 0.0);
         return true;
     }
-    for (ConeUnit& unit : units_) unit.lack = {blur * unit.bend[0], blur * unit.bend[1], blur * unit.bend[2]};
-    return answer(&ConeUnit::tz, &ConeUnit::tu, roughly);
+    for (ConeFour& four : fours_) scale(blur, four.bend, four.lack);
+    return answer(&ConeFour::tz, &ConeFour::tu, roughly);
 }
 
 /// The dz and du that answer what the units' laws lack, refined while that helps and more than `enough` is left.
-bool ConeNewton::answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du, double enough) {
+bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], double enough) {
     double asked = 0.0;
-    for (ConeUnit& unit : units_) {
-        unit.*dz = unit.*du = {};
-        asked += unit.square(unit.lack);
-    }
+    for (const ConeFour& four : fours_)
+        for (int i = 0; i < four.count; ++i) {
+            const double a = four.lack[0][i], b = four.lack[1][i], c = four.lack[2][i];
+            asked += a * a + b * b + c * c;
+        }
     double before = asked;
     for (int round = 0; round < 3; ++round) {
-        image_.assign(mass_factor_.size(), Vec6{});
-        for (ConeUnit& unit : units_) {
-            unit.respond(unit.lack);
-            push(unit, unit.c, image_);
-        }
+        image_.assign(mass_inverse_.size(), Vec6{});
+        laws_->respond(fours_, units_, image_.data());
         matrix_.solve(image_[0].data());
-        change_.assign(mass_factor_.size(), Vec6{});
-        for (ConeUnit& unit : units_) {
-            const ConeUnit::Vec turn = along(unit, image_);
-            for (int i = 0; i < unit.size; ++i)
-                for (int j = 0; j < unit.size; ++j) unit.c[i] -= unit.k[unit.size * i + j] * turn[j];
-            push(unit, unit.c, change_);
-        }
-        for (std::size_t b = 0; b < change_.size(); ++b)
-            image(mass_inverse_[b].data(), Six::load(change_[b].data())).store(change_[b].data());
-        double left = 0.0;
-        for (ConeUnit& unit : units_) {
-            unit.turn = speed_along(unit, change_, unit.c);
-            const ConeUnit::Vec change = unit.law(unit.c, unit.turn);
-            for (int i = 0; i < unit.size; ++i) unit.lack[i] -= change[i];
-            left += unit.square(unit.lack);
-        }
+        change_.assign(mass_inverse_.size(), Vec6{});
+        laws_->turn(fours_, units_, image_.data(), change_.data());
+        laws_->map_bodies(mass_inverse_, change_.data());
+        const double left = laws_->remain(fours_, units_, change_.data());
         if (!std::isfinite(left)) return false;
         if (round > 0 && !(left < before)) break;
-        for (ConeUnit& unit : units_)
-            for (int i = 0; i < unit.size; ++i) (unit.*dz)[i] += unit.c[i], (unit.*du)[i] += unit.turn[i];
+        for (ConeFour& four : fours_)
+            for (int k = 0; k < four.size; ++k)
+                for (int i = 0; i < ConeFour::most; ++i) {
+                    double &z = (four.*dz)[k][i], &u = (four.*du)[k][i];
+                    z = (round == 0 ? 0.0 : z) + four.c[k][i];
+                    u = (round == 0 ? 0.0 : u) + four.turn[k][i];
+                }
         if (left <= enough * asked) break;
         before = left;
     }
     return true;
 }
 
-/// to += Gᵀ z of one unit.
-void ConeNewton::push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to) {
-    for (const bool first : {true, false}) {
-        const int body = first ? unit.first : unit.second;
-        if (body < 0) continue;
-        const Vec6* rows = first ? unit.first_row : unit.second_row;
-        if (unit.size == 3) add_push<3>(rows, z.data(), to[body].data());
-        else add_push<1>(rows, z.data(), to[body].data());
-    }
-}
-
-/// G v of one unit.
-ConeUnit::Vec ConeNewton::along(const ConeUnit& unit, const std::vector<Vec6>& v) {
-    ConeUnit::Vec sum{};
-    for (const bool first : {true, false}) {
-        const int body = first ? unit.first : unit.second;
-        if (body < 0) continue;
-        const Vec6* rows = first ? unit.first_row : unit.second_row;
-        const Six speed = Six::load(v[body].data());
-        for (int i = 0; i < unit.size; ++i) sum[i] += speed.dot(Six::load(rows[i].data()));
-    }
-    return sum;
-}
-
-/// G v + Sig z of one unit.
-ConeUnit::Vec ConeNewton::speed_along(const ConeUnit& unit, const std::vector<Vec6>& v,
-                                      const ConeUnit::Vec& z) {
-    ConeUnit::Vec sum = along(unit, v);
-    for (int i = 0; i < unit.size; ++i) sum[i] += unit.softness[i] * z[i];
-    return sum;
-}
-
 /// M v = p + Gᵀ z, and u of every unit.
 void ConeNewton::measure(const MixedSystem& system) {
     velocity_ = system.momentum;
-    for (const ConeUnit& unit : units_) push(unit, unit.z, velocity_);
-    for (std::size_t b = 0; b < velocity_.size(); ++b) solve_six(mass_factor_[b], velocity_[b]);
-    for (ConeUnit& unit : units_) {
-        unit.u = speed_along(unit, velocity_, unit.z);
-        for (int i = 0; i < unit.size; ++i) unit.u[i] -= unit.right[i];
-    }
+    laws_->push(fours_, units_, velocity_.data());
+    for (std::size_t b = 0; b < velocity_.size(); ++b) solve_six(mass_[b], velocity_[b]);
+    laws_->measure(fours_, units_, velocity_.data());
 }
 
 /// What is lost of a speed beside the largest impulse: bodies squeezed without a way out push ever harder.
 double ConeNewton::rounding() const {
     double largest = 0.0;
-    for (const ConeUnit& unit : units_)
-        largest = std::max(largest, std::abs(unit.z[0]) / (unit.root * unit.root));
+    for (const ConeFour& four : fours_)
+        for (int i = 0; i < four.count; ++i)
+            largest = std::max(largest, std::abs(four.z[0][i]) / (four.root[i] * four.root[i]));
     return 1e-16 * largest;
 }
 
@@ -288,11 +226,12 @@ double ConeNewton::speed_of(const MixedSystem& system) const {
     double speed = 0.0;
     for (std::size_t b = 0; b < system.momentum.size(); ++b) {
         Vec6 v = system.momentum[b];
-        solve_six(mass_factor_[b], v);
+        solve_six(mass_[b], v);
         for (int a = 0; a < 3; ++a) speed = std::max(speed, std::abs(v[a]));
     }
-    for (const ConeUnit& unit : units_)
-        for (int i = 0; i < unit.size; ++i) speed = std::max(speed, std::abs(unit.right[i]));
+    for (const ConeFour& four : fours_)
+        for (int k = 0; k < four.size; ++k)
+            for (int i = 0; i < four.count; ++i) speed = std::max(speed, std::abs(four.right[k][i]));
     return speed;
 }
 
@@ -316,16 +255,21 @@ ConeNewton::Search ConeNewton::search(double blur) const {
 
 /// Takes down where the units stand: they are held there.
 void ConeNewton::hold() {
-    for (ConeUnit& unit : units_) {
-        unit.held = unit.scaled();
-        unit.load = std::abs(unit.held[0]);
-    }
+    for (ConeFour& four : fours_)
+        for (int i = 0; i < ConeFour::most; ++i) {
+            four.held[0][i] = four.z[0][i] * four.over[i];
+            four.held[1][i] = four.z[1][i] * four.along[i];
+            four.held[2][i] = four.z[2][i] * four.along[i];
+            four.load[i] = std::abs(four.held[0][i]);
+        }
 }
 
 void ConeNewton::move(const MixedSystem& system, const Search& found) {
     if (!(found.length > 0.0)) return;
-    for (ConeUnit& unit : units_)
-        for (int i = 0; i < unit.size; ++i) unit.z[i] += found.length * unit.dz[i] + found.along * unit.tz[i];
+    for (ConeFour& four : fours_)
+        for (int k = 0; k < four.size; ++k)
+            for (int i = 0; i < ConeFour::most; ++i)
+                four.z[k][i] += found.length * four.dz[k][i] + found.along * four.tz[k][i];
     measure(system);
 }
 
@@ -335,7 +279,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     connect();
     speed_ = speed_of(system);
     measure(system);
-    Left best = worst();
+    Left best = laws_->worst(fours_);
     keep();
     double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
     int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
@@ -353,7 +297,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         ++report.iterations;
         const Search found = jumps >= 0 ? Search{0.0, 1.0, 0.0} : search(blur);
         move(system, found);
-        const Left left = worst();
+        const Left left = laws_->worst(fours_);
         stalled = left.speed < 0.5 * best.speed || found.along > 0.3 ? 0 : stalled + 1;
         if (left.speed < best.speed) {
             best = left;
@@ -365,7 +309,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         before = left;
         if (found.along > 0.0) {
             met = found.blur;
-            for (ConeUnit& unit : units_) unit.met = unit.z;
+            for (ConeFour& four : fours_) scale(1.0, four.z, four.met);
         }
         blur = found.blur;
         const bool lost =
@@ -388,30 +332,37 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         if (met > 0.0) {
             near_ *= nearer;
             blur = back * met;
-            for (ConeUnit& unit : units_) unit.z = unit.met;
+            for (ConeFour& four : fours_) scale(1.0, four.met, four.z);
             measure(system);
         } else {
             blur *= back;
         }
     }
-    for (std::size_t k = 0; k < units_.size(); ++k) {
-        ConeUnit& unit = units_[k];
-        unit.z = best_[k].first;
-        unit.u = best_[k].second;
-        unit.finish();
-        for (int i = 0; i < unit.size; ++i) system.rows[unit.block].multiplier[unit.row + i] = unit.z[i];
+    for (std::size_t k = 0; k < fours_.size(); ++k) {
+        ConeFour& four = fours_[k];
+        scale(1.0, best_[k].z, four.z);
+        scale(1.0, best_[k].u, four.u);
+        for (int i = 0; i < four.count; ++i) {
+            four.finish(i);
+            const ConeUnit& unit = units_[four.begin + i];
+            for (int row = 0; row < unit.size; ++row)
+                system.rows[unit.block].multiplier[unit.row + row] = four.z[row][i];
+        }
     }
     measure(system);  // what is handed over, not what led to it
     system.velocity = velocity_;
-    const double speed = std::max(worst().speed, rounding());
+    const double speed = std::max(laws_->worst(fours_).speed, rounding());
     report.residual = speed_ > 0.0 ? speed / speed_ : speed;
     report.converged = report.residual <= loosest;
     return report;
 }
 
 void ConeNewton::keep() {
-    best_.resize(units_.size());
-    for (std::size_t k = 0; k < units_.size(); ++k) best_[k] = {units_[k].z, units_[k].u};
+    best_.resize(fours_.size());
+    for (std::size_t k = 0; k < fours_.size(); ++k) {
+        scale(1.0, fours_[k].z, best_[k].z);
+        scale(1.0, fours_[k].u, best_[k].u);
+    }
 }
 
 }  // namespace spook

@@ -31,6 +31,7 @@
 
 #include "contacts/cone_unit.hpp"
 #include "contacts/friction_point.hpp"
+#include "contacts/mass_factors.hpp"
 #include "linear/block_lu.hpp"
 
 namespace spook {
@@ -55,34 +56,27 @@ public:
     std::uint64_t block_operations() const noexcept { return block_operations_; }
 
 private:
-    struct Left {
-        double map = 0.0, speed = 0.0;  // √J, m/s
-    };
+    using Left = ConeLaws::Left;
     struct Search {
         double blur, length,
             along;  // the next blur, parts of Newton's direction and of the path's; 0: none is better
     };
     void prepare(MixedSystem& system, const std::vector<FrictionPoint>& points);
-    void read(const RowBlock& given, int row, const FrictionPoint* friction, ConeUnit& unit) const;
+    void read(const RowBlock& given, const FrictionPoint* friction, ConeUnit& unit, ConeFour& four,
+              int at) const;
     void connect();
     void measure(const MixedSystem& system);
     double merit(double blur, double length, double along, double enough) const;
-    Left worst() const;
     double rounding() const;
     Search search(double blur) const;
     void hold();
     void move(const MixedSystem& system, const Search& found);
     bool find_directions(double blur);
-    bool answer(ConeUnit::Vec ConeUnit::* dz, ConeUnit::Vec ConeUnit::* du, double enough);
-    static void push(const ConeUnit& unit, const ConeUnit::Vec& z, std::vector<Vec6>& to);
-    static ConeUnit::Vec along(const ConeUnit& unit, const std::vector<Vec6>& v);
-    static ConeUnit::Vec speed_along(const ConeUnit& unit, const std::vector<Vec6>& v,
-                                     const ConeUnit::Vec& z);
+    bool answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], double enough);
+    static void scale(double share, const ConeFour::Each* from, ConeFour::Each* to) noexcept;
     double speed_of(const MixedSystem& system) const;
     void keep();
     bool step(const MixedSystem& system, double blur);
-    double* block(const ConeUnit& unit, bool row_first, bool column_first);
-    template <int N> void add(const ConeUnit& unit);
 
     BlockLu matrix_;
     std::vector<std::pair<int, int>> pairs_, needed_;  // analysed, and those of this system
@@ -90,9 +84,15 @@ private:
     int bodies_ = -1;
     std::vector<const FrictionPoint*> friction_;  // of each block, while units are read
     std::vector<ConeUnit> units_;
-    std::vector<Mat6> mass_factor_, mass_inverse_;
+    std::vector<ConeFour> fours_;  // their laws
+    const ConeLaws* laws_ = nullptr;
+    MassFactors mass_;
+    std::vector<Mat6> mass_inverse_;
     std::vector<Vec6> velocity_, change_, image_;
-    std::vector<std::pair<ConeUnit::Vec, ConeUnit::Vec>> best_;  // z and u of every unit
+    struct Best {
+        ConeFour::Each z[3], u[3];
+    };
+    std::vector<Best> best_;  // of every four
     double speed_ = 0.0, hold_ = 0.0, near_ = 1.0;
     std::uint64_t factorisations_ = 0, block_operations_ = 0;
 };

@@ -54,7 +54,7 @@ struct Work {
     std::vector<FrictionPoint> start_points, swept_points;
     Answer answer;
     Acceleration acceleration;
-    std::vector<Mat6> mass_factor;
+    MassFactors mass;
     std::vector<Vec6> free_velocity, missing;
     std::vector<double> scale, used, given;
     std::vector<std::pair<int, int>> pairs;  // see is_redundant()
@@ -72,12 +72,11 @@ void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexc
     }
 }
 
-/// Turns first tangents along the slip that would be without any constraint force.
+/// Turns first tangents along the slip that would be without any constraint force. work() has the masses' factors.
 void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPoint>& points) {
     std::vector<Vec6>& free_velocity = work().free_velocity;
     free_velocity = system.momentum;
-    for (std::size_t b = 0; b < system.mass.size(); ++b)
-        solve_six(factor_six(system.mass[b]), free_velocity[b]);
+    for (std::size_t b = 0; b < system.mass.size(); ++b) solve_six(work().mass[b], free_velocity[b]);
     for (const FrictionPoint& point : points) {
         if (point.size != 2) continue;
         RowBlock& block = system.rows[point.block];
@@ -90,16 +89,16 @@ void turn_along_predicted_slip(MixedSystem& system, const std::vector<FrictionPo
 }
 
 /// Σ over the two rows of (G M⁻¹ Gᵀ)ᵢᵢ + gamma/h: an upper bound of the block's largest eigenvalue.
-double tangent_scale(const RowBlock& block, const FrictionPoint& point,
-                     const std::vector<Mat6>& mass_factor) {
-    double sum = 0.0;
-    for (int i = point.row; i < point.row + point.size; ++i) {
+double tangent_scale(const RowBlock& block, const FrictionPoint& point, const MassFactors& mass) {
+    double sum = 0.0, first[2], second[2];
+    if (block.first >= 0)
+        own_inertias(mass[block.first], &block.first_jacobian[point.row], point.size, first);
+    if (block.second >= 0)
+        own_inertias(mass[block.second], &block.second_jacobian[point.row], point.size, second);
+    for (int i = 0; i < point.size; ++i) {
         sum += point.slip_softness;
-        Vec6 x = block.first_jacobian[i];
-        if (block.first >= 0) solve_six(mass_factor[block.first], x), sum += dot(block.first_jacobian[i], x);
-        x = block.second_jacobian[i];
-        if (block.second >= 0)
-            solve_six(mass_factor[block.second], x), sum += dot(block.second_jacobian[i], x);
+        if (block.first >= 0) sum += first[i];
+        if (block.second >= 0) sum += second[i];
     }
     return sum;
 }
@@ -215,15 +214,13 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             for (int i = point.row; i < point.row + point.size; ++i)
                 system.rows[point.block].state[i] = RowState::free;
     }
-    std::vector<Mat6>& mass_factor = work().mass_factor;
     std::vector<double>& scale = work().scale;
-    mass_factor.clear();
     scale.assign(points.size(), 1.0);
     if (model == FrictionModel::cone) {
+        work().mass.find(system.mass);
         if (!effort.near) turn_along_predicted_slip(system, points);
-        for (const Mat6& mass : system.mass) mass_factor.push_back(factor_six(mass));
         for (std::size_t k = 0; k < points.size(); ++k)
-            scale[k] = tangent_scale(system.rows[points[k].block], points[k], mass_factor);
+            scale[k] = tangent_scale(system.rows[points[k].block], points[k], work().mass);
     }
     if (effort.near) start_near(system, points, scale);
 
@@ -306,10 +303,12 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 }
 
 /// Rounds that start from the answer of the step before find what rests or moves on at once, and exactly; they are
-/// asked first unless they failed lately. True when they settled; else the system is as it was.
+/// asked first unless they failed lately. True when they settled; else the system is as it was; `kept`: and work() has
+/// a copy of it.
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                    DirectSolver& direct, bool redundant, FrictionReport& report) {
+                    DirectSolver& direct, bool redundant, bool& kept, FrictionReport& report) {
     if (direct.patience.waits()) return false;
+    kept = true;
     MixedSystem& start = work().start;
     std::vector<FrictionPoint>& start_points = work().start_points;
     start = system, start_points = points;
@@ -331,29 +330,32 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
 
 /// Newton's method; where its path ends without an answer, a few sweeps choose anew who pushes and who slides, and it
 /// goes on from there. Few blocks are handed to pivoting in the end, which shares loads evenly. False if all that is
-/// poor, and the system as it was.
+/// poor, and the system as it was. `kept`: work() has a copy of it already.
 bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                     DirectSolver& direct, FrictionReport& report) {
+                     DirectSolver& direct, bool kept, FrictionReport& report) {
     MixedSystem &start = work().start, &best = work().best;
     std::vector<FrictionPoint>& start_points = work().start_points;
-    start = system, start_points = points;
+    if (!kept) start = system, start_points = points;
     report.residual = unbounded;
     const bool few = start.rows.size() <= few_blocks;
+    bool is_best = true;  // the system, of what was met so far: a copy is taken when it is to be changed
     for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : direct.newton.near_enough));
          ++turn) {
-        if (turn > 0) report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
+        if (turn > 0) {
+            if (is_best) best = system;
+            report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
+        }
         const ConeReport found = direct.newton.solve(system, points);
         report.rounds += found.iterations;
-        if (turn == 0 || found.residual < report.residual) {
-            report.residual = found.residual;
-            best = system;
-        }
+        is_best = turn == 0 || found.residual < report.residual;
+        if (is_best) report.residual = found.residual;
     }
-    system = best;
+    if (!is_best) system = best;
     for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
     report.converged = report.residual <= fair;
     if (!points.empty() && few) {
         FrictionReport polished;
+        if (is_best) best = system;
         const bool settled = settle_by_rounds(system, points, model, direct.pivot, polish, polished);
         report.rounds += polished.rounds;
         report.pivots += polished.pivots;
@@ -420,10 +422,11 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
         const bool near_none =
             (direct.foreseen || (redundant && points.empty())) && system.rows.size() > few_blocks;
         direct.newton.near_enough = redundant ? redundant_near : near;
-        if (!near_none && settle_quickly(system, points, model, direct, redundant, report)) return report;
-        if (solve_by_newton(system, points, model, direct, report)) return report;
-        start = system;
-        report.residual = unbounded;
+        bool kept = false;
+        if (!near_none && settle_quickly(system, points, model, direct, redundant, kept, report))
+            return report;
+        if (solve_by_newton(system, points, model, direct, kept, report)) return report;
+        report.residual = unbounded;  // the system is as it was, which work() has a copy of
     } else {
         start.rows.clear();
         if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),

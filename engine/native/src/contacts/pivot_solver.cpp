@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "contacts/friction_sweeps.hpp"
 #include "run/watch.hpp"
@@ -23,25 +24,6 @@ bool bilateral(const RowBlock& block, int i) noexcept {
 bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == RowState::free; }
 
 }  // namespace
-
-Mat6 factor_six(const Mat6& m) noexcept {
-    Mat6 l{};
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j <= i; ++j) {
-            double sum = m[6 * i + j];
-            for (int k = 0; k < j; ++k) sum -= l[6 * i + k] * l[7 * k] * l[6 * j + k];
-            l[6 * i + j] = i == j ? sum : sum / l[7 * j];
-        }
-    return l;
-}
-
-void solve_six(const Mat6& l, Vec6& x) noexcept {
-    for (int i = 1; i < 6; ++i)
-        for (int k = 0; k < i; ++k) x[i] -= l[6 * i + k] * x[k];
-    for (int i = 0; i < 6; ++i) x[i] /= l[7 * i];
-    for (int i = 4; i >= 0; --i)
-        for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
-}
 
 /// Whether the system's blocks tie the bodies they tied when it was analysed.
 bool PivotSolver::is_known(const MixedSystem& system) const noexcept {
@@ -111,36 +93,34 @@ bool PivotSolver::analyse(const MixedSystem& system) {
 }
 
 void PivotSolver::measure(const MixedSystem& system) {
-    std::vector<Mat6>& mass_factor = mass_factor_;
-    mass_factor.resize(system.mass.size());
+    mass_.find(system.mass);
     free_velocity_.resize(system.mass.size());
     for (std::size_t b = 0; b < system.mass.size(); ++b) {
-        mass_factor[b] = factor_six(system.mass[b]);
         free_velocity_[b] = system.momentum[b];
-        solve_six(mass_factor[b], free_velocity_[b]);
+        solve_six(mass_[b], free_velocity_[b]);
     }
     speed_ = 0.0;
     bounded_.clear();
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
+        double first[6] = {}, second[6] = {};
+        bool known = false;
         for (int i = 0; i < block.size; ++i) {
             speed_ =
                 std::max(speed_, std::abs(block.right[i]) + std::abs(row_velocity(block, i, free_velocity_)));
             if (bilateral(block, i)) continue;
+            if (!std::exchange(known, true)) {
+                if (block.first >= 0)
+                    own_inertias(mass_[block.first], block.first_jacobian.data(), block.size, first);
+                if (block.second >= 0)
+                    own_inertias(mass_[block.second], block.second_jacobian.data(), block.size, second);
+            }
             double own = 0.0;
-            if (block.first >= 0) {
-                Vec6 x = block.first_jacobian[i];
-                solve_six(mass_factor[block.first], x);
-                own += dot(block.first_jacobian[i], x);
-            }
-            if (block.second >= 0) {
-                Vec6 x = block.second_jacobian[i];
-                solve_six(mass_factor[block.second], x);
-                own += dot(block.second_jacobian[i], x);
-            }
+            if (block.first >= 0) own += first[i];
+            if (block.second >= 0) own += second[i];
             for (const Beyond& other : block.beyond) {
                 Vec6 x = other.jacobian;
-                solve_six(mass_factor[other.body], x);
+                solve_six(mass_[other.body], x);
                 own += dot(other.jacobian, x);
             }
             bounded_.push_back({static_cast<int>(k), i, own});

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "contacts/mass_factors.hpp"
 #include "contacts/pivot_system.hpp"
 #include "linear/block_ldlt.hpp"
 
@@ -86,7 +87,7 @@ private:
     double speed_ = 0.0, force_ = 0.0;                   // the scales of this system, m/s and N s
     std::vector<double> right_, state_, residual_, solution_, direction_, image_, gradient_;
     std::vector<Relieved> relieved_;
-    std::vector<Mat6> mass_factor_;
+    MassFactors mass_;
     std::vector<Vec6> free_velocity_;  // M⁻¹ p
 };
 
@@ -121,10 +122,5 @@ private:
     PivotSolver& solver_;
     int limit_;
 };
-
-/// Factor of a symmetric positive definite 6×6, L D Lᵀ with D in place of L's unit diagonal, and x ← M⁻¹ x with it.
-/// No square roots: masses scaled by a power of two scale every result exactly.
-Mat6 factor_six(const Mat6& m) noexcept;
-void solve_six(const Mat6& factor, Vec6& x) noexcept;
 
 }  // namespace spook

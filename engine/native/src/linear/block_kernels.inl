@@ -277,17 +277,42 @@ template <int U> SPOOK_INLINE void load_block(const Factor& f, const Load& item)
     }
 }
 
+/// Most blocks are bodies, or points with friction: those sizes without a call through a table.
+#ifdef __wasm__
+constexpr bool common(int, int) { return false; }
+#else
+constexpr bool common(int n, int m) { return (n == 6 || n == 3) && (m == 6 || m == 3); }
+#endif
+SPOOK_INLINE void forward_row_of(int n, int m, const double* z, const double* x, double* xr) {
+    if (!common(n, m)) return forward_row_table[n - 1][m - 1](z, x, xr);
+    if (n == 6) m == 6 ? forward_row<6, 6>(z, x, xr) : forward_row<6, 3>(z, x, xr);
+    else m == 6 ? forward_row<3, 6>(z, x, xr) : forward_row<3, 3>(z, x, xr);
+}
+SPOOK_INLINE void backward_row_of(int n, int m, const double* z, const double* xr, double* x) {
+    if (!common(n, m)) return backward_row_table[n - 1][m - 1](z, xr, x);
+    if (n == 6) m == 6 ? backward_row<6, 6>(z, xr, x) : backward_row<6, 3>(z, xr, x);
+    else m == 6 ? backward_row<3, 6>(z, xr, x) : backward_row<3, 3>(z, xr, x);
+}
+SPOOK_INLINE void forward_pivot_of(int n, const double* u, double* x) {
+    if (!common(n, n)) return forward_pivot_table[n - 1](u, x);
+    n == 6 ? forward_pivot<6>(u, x) : forward_pivot<3>(u, x);
+}
+SPOOK_INLINE void backward_pivot_of(int n, const double* u, double* x) {
+    if (!common(n, n)) return backward_pivot_table[n - 1](u, x);
+    n == 6 ? backward_pivot<6>(u, x) : backward_pivot<3>(u, x);
+}
+
 template <int U> SPOOK_INLINE void forward_column(const Factor& f, const Column& column, double* x) {
     const int n = U ? U : column.size;
     const double* u = f.values + column.at;
     double* xk = x + column.offset;
     if constexpr (U) forward_pivot<U>(u, xk);
-    else forward_pivot_table[n - 1](u, xk);
+    else forward_pivot_of(n, u, xk);
     const double* z = u + n * (n + 1) / 2;
     for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
         const int m = U ? U : f.row_size[r];
         if constexpr (U) forward_row<U, U>(z, xk, x + f.row_offset[r]);
-        else forward_row_table[n - 1][m - 1](z, xk, x + f.row_offset[r]);
+        else forward_row_of(n, m, z, xk, x + f.row_offset[r]);
         z += n * m;
     }
 }
@@ -362,11 +387,11 @@ template <int U> void backward_columns(const Factor& f, double* x) {
         for (std::int64_t r = column.first_row; r < column.first_row + column.row_count; ++r) {
             const int m = U ? U : f.row_size[r];
             if constexpr (U) backward_row<U, U>(z, x + f.row_offset[r], xk);
-            else backward_row_table[n - 1][m - 1](z, x + f.row_offset[r], xk);
+            else backward_row_of(n, m, z, x + f.row_offset[r], xk);
             z += n * m;
         }
         if constexpr (U) backward_pivot<U>(u, xk);
-        else backward_pivot_table[n - 1](u, xk);
+        else backward_pivot_of(n, u, xk);
     }
 }
 
@@ -396,19 +421,13 @@ void backward_all(const Factor& f, int uniform_size, double* x) {
 }
 
 void subtract_product(int rows, int columns, const double* b, const double* x2, double* y) {
-    if (rows == 6 && columns == 6) return backward_row<6, 6>(b, x2, y);
-    backward_row_table[rows - 1][columns - 1](b, x2, y);
+    backward_row_of(rows, columns, b, x2, y);
 }
 
 void subtract_coupling(int rows, int columns, const double* b, const double* x1, const double* x2, double* y,
                        double* z) {
-    if (rows == 6 && columns == 6) {
-        backward_row<6, 6>(b, x2, y);
-        forward_row<6, 6>(b, x1, z);
-        return;
-    }
-    backward_row_table[rows - 1][columns - 1](b, x2, y);
-    forward_row_table[rows - 1][columns - 1](b, x1, z);
+    backward_row_of(rows, columns, b, x2, y);
+    forward_row_of(rows, columns, b, x1, z);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "linear/block_lu_kernels.hpp"
 #include "linear/ordering.hpp"
 
 namespace spook {
@@ -43,6 +44,7 @@ private:
         std::int64_t at = 0;
         bool forth_is_upper = true;
     };
+    LuFactor view() noexcept;
     double* lower(std::int64_t at) noexcept { return lower_.data() + 36 * at; }
     double* upper(std::int64_t at) noexcept { return upper_.data() + 36 * at; }
 

@@ -16,6 +16,7 @@ struct Six {
     }
     void add(double s, const Six& x) noexcept { a += s * x.a, b += s * x.b, c += s * x.c; }
     void subtract(double s, const Six& x) noexcept { a -= s * x.a, b -= s * x.b, c -= s * x.c; }
+    void subtract(const Six& x) noexcept { a -= x.a, b -= x.b, c -= x.c; }
     void multiply(const Six& x) noexcept { a *= x.a, b *= x.b, c *= x.c; }
     void scale(double s) noexcept { a *= s, b *= s, c *= s; }
     double dot(const Six& x) const noexcept {
