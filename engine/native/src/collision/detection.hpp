@@ -8,6 +8,7 @@
 #include "collision/broad_phase.hpp"
 #include "collision/manifold.hpp"
 #include "collision/shape.hpp"
+#include "linear/shared_values.hpp"
 
 namespace spook {
 
@@ -16,6 +17,14 @@ struct Collider {
     int body = 0;
     Primitive shape;
     Pose part;  // in body axes
+    struct View;
+};
+
+/// The same as it is kept: its body, and a form that it may share with others.
+struct Collider::View {
+    int body;
+    const Primitive& shape;
+    const Pose& part;
 };
 
 constexpr int feature_bits = 16,
@@ -63,7 +72,9 @@ public:
     /// As touch(), with the bodies of the pair elsewhere.
     void touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
                std::vector<Contact>& out) const;
-    const Collider& collider(int index) const noexcept { return colliders_[index]; }
+    Collider::View collider(int index) const noexcept {
+        return {body_of_[index], forms_[index].shape, forms_[index].part};
+    }
     /// Where a collider stood in the last near(), world axes.
     const Pose& pose(int index) const noexcept { return poses_[index]; }
     /// Of a collider, see turning_arm().
@@ -90,12 +101,18 @@ private:
 
     static constexpr unsigned char none = 0, awake = 1, sleeps = 2, stirs = 4;
 
-    std::vector<Collider> colliders_;      // by body
+    struct Form {
+        Primitive shape;
+        Pose part;
+        bool operator==(const Form&) const noexcept = default;
+    };
+    std::vector<int> body_of_;             // of colliders, which are in the order of their bodies
+    SharedValues<Form> forms_;             // theirs
     std::vector<unsigned char> role_;      // of each body
     std::vector<std::uint64_t> excluded_;  // sorted
     std::vector<double> radius_;
     std::vector<int> bounded_, planes_,
-        sheets_;            // indices into colliders_; sheets: of fixed bodies, never moved
+        sheets_;            // colliders; sheets: of fixed bodies, never moved
     BoundsTree tree_;       // of sheets
     bool planted_ = false;  // whether it is built
     std::vector<int> hits_;

@@ -18,6 +18,7 @@ SPOOK_NAMED_ENUM(ShapeKind, sphere, capsule, box, hull, cylinder, cone, plane, t
 struct Pose {
     Vec3 position;                     // m
     Mat3 rotation = Mat3::identity();  // body axes to world axes
+    bool operator==(const Pose&) const noexcept = default;
 };
 
 /// One convex primitive; fields not named for a kind are ignored.
@@ -31,6 +32,8 @@ struct Primitive {
     std::shared_ptr<const Polytope> hull{};
     std::shared_ptr<const Mesh> mesh{};
     int triangle = 0;  // of the mesh
+
+    bool operator==(const Primitive&) const noexcept = default;
 
     static Primitive sphere(double radius) noexcept { return {ShapeKind::sphere, radius, 0.0, {}, {}, {}}; }
     static Primitive capsule(double radius, double length) noexcept {

@@ -166,7 +166,8 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         const IndexPair& pair = near[k];
         if ((k + 1) % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
-        const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
+        const Collider::View first = detection_.collider(pair.first),
+                             second = detection_.collider(pair.second);
         const double reach = search_[first.body] + search_[second.body];
         const OpenPair open = opened(pair, shared ? apart_[k] : separation_of(pair));
         const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
@@ -209,8 +210,8 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
 }
 
 ContactStage::OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) const {
-    const Collider &first = detection_.collider(pair.first), &second = detection_.collider(pair.second);
-    const auto arm = [this](int collider, const Collider& of) {
+    const Collider::View first = detection_.collider(pair.first), second = detection_.collider(pair.second);
+    const auto arm = [this](int collider, const Collider::View& of) {
         return of.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(collider);
     };
     return {pair, first.body, second.body, apart, arm(pair.first, first), arm(pair.second, second)};
@@ -306,7 +307,7 @@ Pose ContactStage::moved(int b, const std::vector<Vec6>& velocity) const {
 
 /// A collider whose body goes on from `pose`, which must outlive it.
 Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const {
-    const Collider& own = detection_.collider(collider);
+    const Collider::View own = detection_.collider(collider);
     return {own.shape, own.part, pose, linear(velocity[own.body]), angular(velocity[own.body])};
 }
 

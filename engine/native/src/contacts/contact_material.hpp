@@ -23,6 +23,7 @@ struct SurfaceMaterial {
 
     bool is_oriented() const noexcept { return dot(direction, direction) > 0.0; }
     bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }
+    bool operator==(const SurfaceMaterial&) const noexcept = default;
 };
 
 /// What two surfaces make of it: of a contact there are many, so no more than they share is in it.

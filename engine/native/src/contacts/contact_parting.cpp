@@ -303,7 +303,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
         detection_.touch(pair, poses[a], poses[b], margin, scratch_);
         for (const Contact& contact : scratch_) {
             double pressed = 0.0, before = 0.0;
-            if (combined(materials_[a], materials_[b]).compliance > 0.0) pressed = most_pressed;
+            if (materials_[a].compliance + materials_[b].compliance > 0.0) pressed = most_pressed;
             for (std::size_t k = from; k < end; ++k)
                 if (touches_[k].contact.key == contact.key)
                     pressed = touches_[k].pressed, before = touches_[k].parting;

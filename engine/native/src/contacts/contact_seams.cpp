@@ -195,7 +195,7 @@ bool ContactStage::let_pass(std::size_t from) {
             gone.push_back({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)});
     }
     for (const IndexPair& pair : gone) {
-        const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
+        const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
         open_.push_back(opened(pair, separation(one.shape, detection_.pose(pair.first), two.shape,
                                                 detection_.pose(pair.second))));
         std::erase_if(points_,

@@ -64,11 +64,11 @@ FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, doub
 
 }  // namespace
 
-ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> materials,
+ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
                            std::vector<int> unknown, const ContactOptions& options,
                            std::vector<IndexPair> joints, std::vector<char> yielding)
     : detection_(std::move(detection)),
-      materials_(std::move(materials)),
+      materials_(materials),
       unknown_(std::move(unknown)),
       options_(options),
       joints_(std::move(joints)),
@@ -82,7 +82,7 @@ ContactStage::ContactStage(Detection detection, std::vector<SurfaceMaterial> mat
     detection_.help(team_.get());
     sweeps_.help(team_.get());
     parting_sweeps_.help(team_.get());
-    for (const SurfaceMaterial& material : materials_) {
+    for (const SurfaceMaterial& material : materials_.distinct()) {
         conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
         oriented_ = oriented_ || material.is_oriented();
         resists_turning_ = resists_turning_ || material.resists_turning();

@@ -92,7 +92,7 @@ public:
     /// One material and one `unknown` per body of the scene; unknown[b] is the body's index in MixedSystem, or −1
     /// if it does not move by itself (static, kinematic). `joints` are the pairs of bodies that rows of joints tie;
     /// `yielding` tells of each block of those rows whether it gives way while overlaps are parted, as springs do.
-    ContactStage(Detection detection, std::vector<SurfaceMaterial> materials, std::vector<int> unknown,
+    ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials, std::vector<int> unknown,
                  const ContactOptions& options, std::vector<IndexPair> joints = {},
                  std::vector<char> yielding = {});
 
@@ -414,7 +414,7 @@ private:
 
     Detection detection_;
     std::shared_ptr<Team> team_;  // of several threads, or none
-    std::vector<SurfaceMaterial> materials_;
+    SharedValues<SurfaceMaterial> materials_;
     std::vector<int> unknown_;
     ContactOptions options_;
     std::vector<IndexPair> joints_;

@@ -52,7 +52,7 @@ bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
         for (; end < ordered_ && points_[end].contact.key >> feature_bits == key; ++end)
             depth = std::max(depth, -points_[end].contact.point.gap);
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
-        const Collider &one = detection_.collider(pair.first), &two = detection_.collider(pair.second);
+        const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
         if (points_[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
         const int a = one.body, b = two.body;
         const double size = std::max(detection_.radius()[a], detection_.radius()[b]);

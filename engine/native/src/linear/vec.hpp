@@ -8,6 +8,7 @@ namespace spook {
 struct Vec3 {
     double x = 0.0, y = 0.0, z = 0.0;
 
+    constexpr bool operator==(const Vec3&) const noexcept = default;
     constexpr double& operator[](int i) noexcept { return i == 0 ? x : i == 1 ? y : z; }
     constexpr double operator[](int i) const noexcept { return i == 0 ? x : i == 1 ? y : z; }
     constexpr Vec3& operator+=(Vec3 b) noexcept {
@@ -47,6 +48,7 @@ inline bool finite(Vec3 a) noexcept { return std::isfinite(a.x) && std::isfinite
 struct Mat3 {
     double m[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
 
+    constexpr bool operator==(const Mat3&) const noexcept = default;
     constexpr double& operator()(int i, int j) noexcept { return m[3 * i + j]; }
     constexpr double operator()(int i, int j) const noexcept { return m[3 * i + j]; }
     static constexpr Mat3 diagonal(Vec3 d) noexcept { return {{d.x, 0, 0, 0, d.y, 0, 0, 0, d.z}}; }
