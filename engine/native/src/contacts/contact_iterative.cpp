@@ -77,6 +77,8 @@ bool ContactStage::find_more(bool over) {
     next_.resize(unknown_.size());
     changed_.resize(unknown_.size());
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
+        changed_[b] = first;
+        if (!first && (unknown_[b] < 0 || !sweeps_.may_have_moved(unknown_[b]))) continue;
         const Vec6& now = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
         changed_[b] = first || next_[b] != now;
         next_[b] = now;
@@ -126,7 +128,7 @@ void ContactStage::take_in(std::size_t known) {
 bool ContactStage::is_settled(MixedSystem& system) {
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
-    sweeps_.write(system);
+    if (!system.rows.empty()) sweeps_.write(system);
     const RowsResidual contact = sweeps_.worst(focus * options_.unsettled_residual),
                        joint = rows_residual(system, {}, options_.friction);
     residual_ = std::max(contact.residual, joint.residual);
@@ -163,7 +165,7 @@ bool ContactStage::runs_away(const MixedSystem& system) const {
         const Mat6& mass = system.mass[unknown_[b]];
         had +=
             energy(mass, velocity_[b]) + energy(mass, sum(velocity_[b], kick_[b])) + mass[0] * speed * speed;
-        has += energy(mass, system.velocity[unknown_[b]]);
+        has += energy(mass, sweeps_.velocity(unknown_[b]));
     }
     return !(has <= too_much * had);
 }
@@ -254,6 +256,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
             }
             if (turn + 1 >= joint_turns && joint_is_worst_) break;
         }
+        sweeps_.write(system);
         if (!report.finite) break;
         if (!late_blow_) {
             if (stop_comes_first(system, begun, next_)) return true;

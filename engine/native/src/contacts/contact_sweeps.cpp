@@ -89,7 +89,7 @@ void ContactSweeps::fetch(const Due& later, const Due& soon) const noexcept {
 }
 
 void ContactSweeps::heat(int first, int second) noexcept {
-    marked_ = marked_ && marking_;
+    if (marked_ && !marking_) marked_ = false;  // threads only read it
     for (const int body : {first, second}) {
         if (body == bodies_ || (hot_[body] & now_hot) != 0) continue;
         hot_[body] |= now_hot;
@@ -115,8 +115,8 @@ void ContactSweeps::solve(Part& part, const Due* const group[4], int size, doubl
         double change[4];
         for (int k = 0; k < size; ++k) {
             four[k] = &contacts_[contact(k)];
-            slips[k] = slips_.data() + contact(k);
-            rests[k] = rests_.data() + contact(k);
+            if (!slips_.empty()) slips[k] = &slips_[contact(k)];
+            if (!rests_.empty()) rests[k] = &rests_[contact(k)];
         }
         sweep_four()({four, slips_.empty() ? nullptr : slips, rests_.empty() ? nullptr : rests,
                       joints_.bodies().data(), round_ ? nullptr : inertia_.data(), bodies_, change});
@@ -159,6 +159,7 @@ void ContactSweeps::solve_due(Part& part, std::size_t begin, std::size_t end, do
     solve_picked(part, picked, focus);
 }
 
+/// Those that were picked from a level, four at once.
 void ContactSweeps::solve_picked(Part& part, std::size_t picked, double focus) noexcept {
     for (std::size_t k = 0; k < std::min(picked, contacts_ahead); ++k)
         fetch(*part.picked[k], *part.picked[k]);

@@ -65,6 +65,10 @@ public:
     }
 
     const Vec6& velocity(int body) const noexcept { return joints_.bodies()[body].velocity; }
+    /// Whether a body may have another velocity than at the last worst().
+    bool may_have_moved(int body) const noexcept {
+        return all_touched_ || joint_count_ > 0 || touched_[body] != 0;
+    }
     const double* impulse(int contact) const noexcept { return contacts_[place_[contact]].impulse; }
     /// Multipliers of joints, and all velocities.
     void write(MixedSystem& system) const;
