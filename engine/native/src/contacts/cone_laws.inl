@@ -14,6 +14,7 @@ using Each = ConeFour::Each;
 #ifdef SPOOK_FOURS
 typedef decltype(Four{} < Four{}) FourBits;
 using Number = Four;
+constexpr int lanes = 4;
 
 SPOOK_ALWAYS bool any(const FourBits& mask) { return __builtin_ia32_movmskpd256((Four)mask) != 0; }
 SPOOK_ALWAYS Four magnitude(const Four& x) { return (Four)((FourBits)x & 0x7fffffffffffffffL); }
@@ -22,6 +23,7 @@ SPOOK_ALWAYS Four get(const Each& each, int) { return *reinterpret_cast<const Fo
 SPOOK_ALWAYS void put(Each& each, int, const Four& x) { *reinterpret_cast<FourInMemory*>(each) = x; }
 #else
 using Number = double;
+constexpr int lanes = 1;
 
 SPOOK_ALWAYS bool any(bool mask) { return mask; }
 SPOOK_ALWAYS double magnitude(double x) { return std::abs(x); }
@@ -30,7 +32,6 @@ SPOOK_ALWAYS double get(const Each& each, int i) { return each[i]; }
 SPOOK_ALWAYS void put(Each& each, int i, double x) { each[i] = x; }
 #endif
 
-constexpr int lanes = sizeof(Number) / sizeof(double);
 constexpr double no_bound = std::numeric_limits<double>::infinity();
 
 SPOOK_ALWAYS Number all(double x) { return Number{} + x; }

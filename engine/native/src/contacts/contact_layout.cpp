@@ -104,7 +104,7 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
 
 int ContactSweeps::add(const SweepContact& given) {
     const int contact = added_++;
-    if (bodies_of_.size() == static_cast<std::size_t>(joint_count_ + contact)) {
+    if (bodies_of_.size() == static_cast<std::size_t>(joint_count_) + static_cast<std::size_t>(contact)) {
         link(given.first, given.second);
         place_.push_back(contact);
         contacts_.emplace_back();

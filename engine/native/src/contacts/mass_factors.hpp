@@ -1,7 +1,6 @@
 // Factors of the masses of a system's bodies, kept while the masses stay.
 #pragma once
 
-#include <cstring>
 #include <vector>
 
 #include "contacts/pivot_system.hpp"
@@ -16,7 +15,7 @@ void solve_six(const Mat6& factor, Vec6& x) noexcept;
 /// G M⁻¹ Gᵀ of each of up to six rows of one body alone.
 void own_inertias(const Mat6& factor, const Vec6* rows, int count, double* own) noexcept;
 
-/// One island is solved several times a step, with the masses it had: those that are equal to the last bit keep their
+/// One island is solved several times a step, with the masses it had: those that are equal keep their
 /// factors.
 class MassFactors {
 public:
@@ -26,7 +25,7 @@ public:
         mass_.resize(mass.size());
         factors_.resize(mass.size());
         for (std::size_t b = 0; b < mass.size(); ++b) {
-            if (b < known && std::memcmp(mass_[b].data(), mass[b].data(), sizeof(Mat6)) == 0) continue;
+            if (b < known && mass_[b] == mass[b]) continue;
             mass_[b] = mass[b];
             factors_[b] = factor_six(mass[b]);
             changed(b);
