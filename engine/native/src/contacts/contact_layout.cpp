@@ -138,7 +138,7 @@ int ContactSweeps::add(const SweepContact& given) {
 }
 
 void ContactSweeps::arrange() {
-    schedule();
+    if (scheduled_ < bodies_of_.size()) schedule();
     contacts_.resize(place_.size());
 }
 
