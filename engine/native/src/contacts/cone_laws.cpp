@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "contacts/cone_unit.hpp"
+#include "linear/instruction_set.hpp"
 #include "linear/six.hpp"
 
 #define SPOOK_ISA portable
@@ -13,20 +14,11 @@ const ConeLaws& portable_cone_laws() noexcept { return portable::cone_table; }
 
 namespace {
 
-const ConeLaws& fastest() noexcept {
-#if defined(__x86_64__) && defined(__GNUC__)
-    if (__builtin_cpu_supports("avx2")) return avx2_cone_laws();
-#endif
-    return portable_cone_laws();
-}
-
-const ConeLaws* chosen = &fastest();
+ByMachine<ConeLaws> chosen(portable_cone_laws(), avx2_cone_laws());
 
 }  // namespace
 
 const ConeLaws& cone_laws() noexcept { return *chosen; }
-void use_portable_cone_laws(bool portable) noexcept {
-    chosen = portable ? &portable_cone_laws() : &fastest();
-}
+void use_portable_cone_laws(bool portable) noexcept { chosen.use_portable(portable); }
 
 }  // namespace spook

@@ -12,22 +12,15 @@ using Each = ConeFour::Each;
 #include "linear/six.inl"
 
 #ifdef SPOOK_FOURS
-typedef decltype(Four{} < Four{}) FourBits;
 using Number = Four;
 constexpr int lanes = 4;
 
-SPOOK_ALWAYS bool any(const FourBits& mask) { return __builtin_ia32_movmskpd256((Four)mask) != 0; }
-SPOOK_ALWAYS Four magnitude(const Four& x) { return (Four)((FourBits)x & 0x7fffffffffffffffL); }
-SPOOK_ALWAYS Four root_of(const Four& x) { return __builtin_ia32_sqrtpd256(x); }
 SPOOK_ALWAYS Four get(const Each& each, int) { return *reinterpret_cast<const FourInMemory*>(each); }
 SPOOK_ALWAYS void put(Each& each, int, const Four& x) { *reinterpret_cast<FourInMemory*>(each) = x; }
 #else
 using Number = double;
 constexpr int lanes = 1;
 
-SPOOK_ALWAYS bool any(bool mask) { return mask; }
-SPOOK_ALWAYS double magnitude(double x) { return std::abs(x); }
-SPOOK_ALWAYS double root_of(double x) { return std::sqrt(x); }
 SPOOK_ALWAYS double get(const Each& each, int i) { return each[i]; }
 SPOOK_ALWAYS void put(Each& each, int i, double x) { each[i] = x; }
 #endif

@@ -45,7 +45,7 @@ public:
     /// The same, with the masses that `other` was started with.
     void start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model);
     /// Announces a contact that add() will bring, in the same order; after arrange() those announced have their places, one
-    /// behind the other as they are swept. Memory in order is read at half the cost of memory at random.
+    /// behind the other as they are swept: memory at random is what large heaps cost.
     void announce(int first, int second) { link(first, second); }
     void arrange();
     /// Adds a contact; its index counts from 0. What was not announced is kept in the order it was given.

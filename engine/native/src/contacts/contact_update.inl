@@ -6,19 +6,7 @@
 namespace spook::SPOOK_ISA {
 namespace {
 
-SPOOK_ALWAYS bool any(bool mask) { return mask; }
-SPOOK_ALWAYS double magnitude(double x) { return std::abs(x); }
-SPOOK_ALWAYS double root_of(double x) { return std::sqrt(x); }
-
-#ifdef SPOOK_FOURS
-typedef double Four __attribute__((vector_size(32)));
-typedef double FourInMemory __attribute__((vector_size(32), aligned(8), may_alias));
-typedef decltype(Four{} < Four{}) FourBits;
-
-SPOOK_ALWAYS bool any(const FourBits& mask) { return __builtin_ia32_movmskpd256((Four)mask) != 0; }
-SPOOK_ALWAYS Four magnitude(const Four& x) { return (Four)((FourBits)x & 0x7fffffffffffffffL); }
-SPOOK_ALWAYS Four root_of(const Four& x) { return __builtin_ia32_sqrtpd256(x); }
-#endif
+#include "linear/fours.inl"
 
 template <class R> struct Three {
     R x, y, z;

@@ -15,7 +15,10 @@ Mat6 factor_six(const Mat6& m) noexcept {
     return l;
 }
 
-void solve_six(const Mat6& l, Vec6& x) noexcept {
+namespace {
+
+/// x ← M⁻¹ x, of one vector or of several side by side: each rounds as it would alone.
+template <class Number> void substitute(const Mat6& l, Number* x) noexcept {
     for (int i = 1; i < 6; ++i)
         for (int k = 0; k < i; ++k) x[i] -= l[6 * i + k] * x[k];
     for (int i = 0; i < 6; ++i) x[i] /= l[7 * i];
@@ -23,9 +26,12 @@ void solve_six(const Mat6& l, Vec6& x) noexcept {
         for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
 }
 
+}  // namespace
+
+void solve_six(const Mat6& l, Vec6& x) noexcept { substitute(l, x.data()); }
+
 void own_inertias(const Mat6& l, const Vec6* rows, int count, double* own) noexcept {
-    typedef double Four
-        __attribute__((vector_size(32)));  // four rows side by side; each rounds as it would alone
+    typedef double Four __attribute__((vector_size(32)));
     if (count == 1) {
         Vec6 x = rows[0];
         solve_six(l, x);
@@ -40,11 +46,7 @@ void own_inertias(const Mat6& l, const Vec6* rows, int count, double* own) noexc
             for (int k = 0; k < left; ++k) row[i][k] = rows[from + k][i];
             x[i] = row[i];
         }
-        for (int i = 1; i < 6; ++i)
-            for (int k = 0; k < i; ++k) x[i] -= l[6 * i + k] * x[k];
-        for (int i = 0; i < 6; ++i) x[i] /= l[7 * i];
-        for (int i = 4; i >= 0; --i)
-            for (int k = i + 1; k < 6; ++k) x[i] -= l[6 * k + i] * x[k];
+        substitute(l, x);
         Four sum = row[0] * x[0];
         for (int i = 1; i < 6; ++i) sum += row[i] * x[i];
         for (int k = 0; k < left; ++k) own[from + k] = sum[k];

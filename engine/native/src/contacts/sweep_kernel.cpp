@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "linear/instruction_set.hpp"
+
 #define SPOOK_ISA portable
 #include "contacts/contact_update.inl"
 
@@ -22,12 +24,7 @@ void portable_sweep_four(const SweepGroup& group) {
 
 namespace {
 
-SweepFour fastest() noexcept {
-#if defined(__x86_64__) && defined(__GNUC__)
-    if (__builtin_cpu_supports("avx2")) return avx2_sweep_four;
-#endif
-    return portable_sweep_four;
-}
+SweepFour fastest() noexcept { return has_avx2() ? avx2_sweep_four : portable_sweep_four; }
 
 SweepFour chosen = fastest();
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/instruction_set.hpp"
+
 #define SPOOK_ISA portable
 #include "linear/block_kernels.inl"
 
@@ -12,19 +14,12 @@ const Kernels& portable_kernels() noexcept { return portable::table; }
 
 namespace {
 
-const Kernels& fastest() noexcept {
-#if defined(__x86_64__) && defined(__GNUC__)
-    if (__builtin_cpu_supports("avx2")) return avx2_kernels();
-#endif
-    return portable_kernels();
-}
-
-const Kernels* chosen = &fastest();
+ByMachine<Kernels> chosen(portable_kernels(), avx2_kernels());
 
 }  // namespace
 
 const Kernels& kernels() noexcept { return *chosen; }
-void use_portable_kernels(bool portable) noexcept { chosen = portable ? &portable_kernels() : &fastest(); }
-void use_kernels(const Kernels& kernels) noexcept { chosen = &kernels; }
+void use_portable_kernels(bool portable) noexcept { chosen.use_portable(portable); }
+void use_kernels(const Kernels& kernels) noexcept { chosen.use(kernels); }
 
 }  // namespace spook::kernel

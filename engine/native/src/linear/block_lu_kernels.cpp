@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/instruction_set.hpp"
 #include "linear/pieces.hpp"
 #include "linear/six.hpp"
 
@@ -15,18 +16,11 @@ const LuKernels& portable_lu() noexcept { return portable::lu_table; }
 
 namespace {
 
-const LuKernels& fastest() noexcept {
-#if defined(__x86_64__) && defined(__GNUC__)
-    if (__builtin_cpu_supports("avx2")) return avx2_lu();
-#endif
-    return portable_lu();
-}
-
-const LuKernels* chosen = &fastest();
+ByMachine<LuKernels> chosen(portable_lu(), avx2_lu());
 
 }  // namespace
 
 const LuKernels& lu_kernels() noexcept { return *chosen; }
-void use_portable_lu(bool portable) noexcept { chosen = portable ? &portable_lu() : &fastest(); }
+void use_portable_lu(bool portable) noexcept { chosen.use_portable(portable); }
 
 }  // namespace spook

@@ -2,10 +2,9 @@
 // instruction set, where SPOOK_FOURS says whether vectors of four are at hand: elementwise operations and sums in the
 // order of linear/six.hpp, so all round alike.
 
-#ifdef SPOOK_FOURS
-typedef double Four __attribute__((vector_size(32)));
-typedef double FourInMemory __attribute__((vector_size(32), aligned(8), may_alias));
+#include "linear/fours.inl"
 
+#ifdef SPOOK_FOURS
 struct Six {
     typedef ::spook::Six::Pair Pair;
     Four a;
