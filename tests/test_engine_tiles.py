@@ -187,6 +187,10 @@ def test_who_sinks_before_sweeps_hold_him_meets_no_edge(
         ("cone", 0.25 * math.pi, 0.03, 1 / 60, 20),
         ("cone", 1e-3, 0.03, 1 / 60, 20),
         ("cylinder", 0.1, 0.5, 1 / 120, 10),
+        # One slide in sixty is still thrown: a defect. A bound that cures it makes piles sink.
+        pytest.param(
+            "cylinder", 0.1, 0.5, 1 / 60, 10, marks=pytest.mark.xfail(strict=True, reason="thrown at a side")
+        ),
         ("cylinder across", 0.0, 0.25, 1 / 60, 200),
         ("cylinder along", 0.0, -2.7, 1 / 60, 200),
     ],
