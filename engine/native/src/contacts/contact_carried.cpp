@@ -28,14 +28,16 @@ bool is_along(Vec3 kick, Vec3 velocity) {
 }  // namespace
 
 /// Takes down which way the forces press the bodies of a closed point, if they do not part faster.
-void ContactStage::note_pressing(const Point& point) {
+void ContactStage::note_pressing(Point& point) {
     const int a = point.contact.first, b = point.contact.second;
     const Vec3 n = point.contact.point.normal;
     const double first = dot(contact_row(n, point.first_arm), kick_[a]),
                  second = -dot(contact_row(n, point.second_arm), kick_[b]),
-                 approach = relative(point, n, velocity_, false),
                  least = pressed_by * (norm(linear(kick_[a])) + norm(linear(kick_[b])));
-    const auto presses = [&](double push) { return push < -least && approach + push < 0.0; };
+    point.approach = relative(point, n, velocity_, false);
+    point.push = first + second;
+    point.measured = changes_;
+    const auto presses = [&](double push) { return push < -least && point.approach + push < 0.0; };
     const bool both = unknown_[a] >= 0 && unknown_[b] >= 0 && presses(first + second);
     pressing_.push_back({a, b, both || presses(first), both || presses(second), both});
 }
@@ -80,6 +82,7 @@ void ContactStage::let_go(int body, const Vec6& velocity) {
     const Vec3 kick = linear(kick_[body]), before = linear(velocity_[body]);
     if (is_along(kick, before) || !is_along(kick, linear(velocity) - before)) return;
     supported_[body] = 0;
+    changed_at_[body] = ++changes_;
     lead_[body] = event_time_[body] / options_.time_step;
     for (int i = 0; i < 6; ++i) carried_kick_[body][i] = lead_[body] * kick_[body][i];
     for (double& k : kick_[body]) k *= 1.0 - lead_[body];

@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "collision/sweep.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "linear/ahead.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
@@ -63,6 +65,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     if (team_) team_->refresh();
     poses_ = poses;
     velocity_ = velocity;
+    changed_at_.assign(bodies, changes_ = 0);
     kick_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b) {
         kick_[b] = sum(free_velocity[b], velocity[b], -1.0);
@@ -78,6 +81,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     correction_.clear();
     parting_.velocity.clear();
     points_.clear();
+    touch_keys_.clear();
     roused_.clear();
     impact_needed_ = plastic_first_ = false;
     settling_ = ran_away_ = false;  // of a step that was taken back, or is over
@@ -164,6 +168,10 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
     }
     for (std::size_t k = 0; k < near.size(); ++k) {
         const IndexPair& pair = near[k];
+        if (k + ahead < near.size()) {
+            ask_for(detection_.pose(near[k + ahead].first));
+            ask_for(detection_.pose(near[k + ahead].second));
+        }
         if ((k + 1) % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider::View first = detection_.collider(pair.first),
@@ -204,12 +212,16 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         std::sort(open_.begin() + unmet, open_.end(),
                   [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; });
     for (std::size_t k = before; k < points_.size(); ++k) {
+        if (k + ahead < points_.size()) {
+            const Contact& later = points_[k + ahead].contact;
+            for (const int body : {later.first, later.second}) ask_for(velocity_[body]), ask_for(kick_[body]);
+        }
         note_pressing(points_[k]);
         for (const int b : {points_[k].contact.first, points_[k].contact.second}) supported_[b] = 1;
     }
 }
 
-ContactStage::OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) const {
+OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) const {
     const Collider::View first = detection_.collider(pair.first), second = detection_.collider(pair.second);
     const auto arm = [this](int collider, const Collider::View& of) {
         return of.shape.kind == ShapeKind::plane ? -1.0 : detection_.arm(collider);
@@ -284,9 +296,8 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
     return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
 }
 
-/// When an open pair meets along `velocity`, s; negative if it does not in this step.
+/// When an open pair that does not surely pass meets along `velocity`, s; negative if it does not in this step.
 double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const {
-    if (passes(open, velocity)) return -1.0;
     const Pose at_first = moved(open.first, velocity), at_second = moved(open.second, velocity);
     const Mover first = mover(open.pair.first, at_first, velocity),
                 second = mover(open.pair.second, at_second, velocity);
@@ -330,7 +341,17 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
             asked[count] = k;
             count += !late || (changed_[open_bodies_[k].first] | changed_[open_bodies_[k].second]) != 0;
         }
+        const std::size_t all = std::exchange(count, 0);
+        for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
+            asked[count] = asked[at];
+            count += !passes(open_[asked[at]], velocity);
+        }
         for (std::size_t at = 0; at < count; ++at) {
+            if (at + ahead < count) {
+                const OpenPair& later = open_[asked[at + ahead]];
+                for (const int body : {later.first, later.second})
+                    ask_for(poses_[body]), ask_for(kick_[body]);
+            }
             if (end - begin == open_.size() && (at + 1) % pairs_a_look == 0) Watch::look();  // on one thread
             if (const double time = meeting(open_[asked[at]], velocity, late); !(time < 0.0))
                 meetings_[part].push_back({asked[at], time});

@@ -4,6 +4,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "linear/ahead.hpp"
 #include "linear/regularisation.hpp"
 
 namespace spook {
@@ -30,6 +31,12 @@ void ContactStage::hand_over() {
     sweeps_.arrange();
     for (; handed_over_ < points_.size(); ++handed_over_) {
         Point& point = points_[handed_over_];
+        if (handed_over_ + ahead < points_.size()) {
+            sweeps_.expect(handed_over_ + ahead);
+            const Point& later = points_[handed_over_ + ahead];
+            for (const int body : {later.contact.first, later.contact.second})
+                if (later.measured < 0) ask_for(velocity_[body]), ask_for(kick_[body]);
+        }
         const PairMaterial& material = point.material;
         SweepContact row;
         row.first = unknown_[point.contact.first];
@@ -74,15 +81,14 @@ void ContactStage::note_sinking() {
 bool ContactStage::find_more(bool over) {
     settling_ = !over;
     const bool first = next_.empty();  // look of this step
-    next_.resize(unknown_.size());
-    changed_.resize(unknown_.size());
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        changed_[b] = first;
-        if (!first && (unknown_[b] < 0 || !sweeps_.may_have_moved(unknown_[b]))) continue;
-        const Vec6& now = unknown_[b] >= 0 ? sweeps_.velocity(unknown_[b]) : velocity_[b];
+    if (first) next_ = velocity_;
+    changed_.assign(unknown_.size(), first);
+    sweeps_.visit_moved([&](int moving) {
+        const int b = body_of_[moving];
+        const Vec6& now = sweeps_.velocity(moving);
         changed_[b] = first || next_[b] != now;
         next_[b] = now;
-    }
+    });
     if (outrun(next_)) find_open_again();
     if (swings_) note_sinking();
     const std::size_t known = points_.size();
@@ -110,12 +116,13 @@ void ContactStage::order_touches() {
 /// Hands the points found since `known` to the sweeps, with what they did in the step before.
 void ContactStage::take_in(std::size_t known) {
     counters_.contacts += points_.size() - known;
+    if (touch_keys_.size() != touches_.size())
+        for (const Touch& touch : touches_) touch_keys_.push_back(touch.contact.key);
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];
-        const auto old =
-            std::lower_bound(touches_.begin(), touches_.end(), point.contact.key,
-                             [](const Touch& touch, std::uint64_t key) { return touch.contact.key < key; });
-        if (old == touches_.end() || old->contact.key != point.contact.key) continue;
+        const auto key = std::lower_bound(touch_keys_.begin(), touch_keys_.end(), point.contact.key);
+        if (key == touch_keys_.end() || *key != point.contact.key) continue;
+        const auto old = touches_.begin() + (key - touch_keys_.begin());
         point.before = old->normal;
         point.parting_before = old->parting;
         point.pressed_before = old->pressed;
@@ -296,6 +303,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0 && event_time_[b] >= 0.0) held_[unknown_[b]] = 1;
     touches_.clear();
+    touch_keys_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         double impulse[3];

@@ -78,12 +78,14 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     parts_.resize(team_ != nullptr ? static_cast<std::size_t>(team_->size()) : 1);
     for (Part& part : parts_) {
         part.change.assign(bodies_ + 1, 0.0);
+        part.touched.clear();
+        part.touched.reserve(bodies_);
         part.none.first = part.none.second = bodies_;
     }
     bodies_of_.clear();
     roots_.clear();
     known_.assign(bodies_ + 1, 0);
-    scheduled_ = 0;
+    scheduled_ = listed_ = sized_ = 0;
     order_.clear();
     level_end_.clear();
     swept_ = joined_ = false;
@@ -132,8 +134,8 @@ int ContactSweeps::add(const SweepContact& given) {
         add_slip(given, place);
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0) push(c, impulse);
     heat(c.first, c.second);
-    if (c.first < bodies_) touched_[c.first] = 1;
-    if (c.second < bodies_) touched_[c.second] = 1;
+    touch(parts_[0], c.first);
+    touch(parts_[0], c.second);
     return contact;
 }
 

@@ -87,6 +87,7 @@ void ContactStage::find_events() {
         if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
         if (climbing[island] > may_climb[island]) continue;
         event_time_[b] = when[island];
+        changed_at_[b] = ++changes_;
         if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
         velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);
         for (double& k : kick_[b]) k *= 1.0 - lead_[b];
@@ -124,6 +125,15 @@ void ContactStage::order_points() {
     ordered_ = points_.size();
 }
 
+/// Approach and push, from the current velocities: found once for all who ask.
+void ContactStage::measure(Point& point) const {
+    if (std::max(changed_at_[point.contact.first], changed_at_[point.contact.second]) <= point.measured)
+        return;
+    point.approach = relative(point, point.contact.point.normal, velocity_, false);
+    point.push = relative(point, point.contact.point.normal, kick_, false);
+    point.measured = changes_;
+}
+
 /// Approach, push and part in the impact of every point, from the current velocities.
 void ContactStage::measure_points() {
     const double h = options_.time_step;
@@ -131,8 +141,7 @@ void ContactStage::measure_points() {
     for (Point& point : points_) {
         const Contact& contact = point.contact;
         const double gap = contact.point.gap;
-        point.approach = relative(point, contact.point.normal, velocity_, false);
-        point.push = relative(point, contact.point.normal, kick_, false);
+        measure(point);
         const double psi = point.material.restitution, speed = -point.approach;
         point.bounce = -1.0;
         if (is_closed(contact)) {

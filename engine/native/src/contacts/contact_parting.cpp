@@ -4,6 +4,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "linear/ahead.hpp"
 #include "linear/regularisation.hpp"
 #include "run/watch.hpp"
 
@@ -295,6 +296,10 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             most_pressed = std::max(most_pressed, touches_[end].pressed);
             overlapped = overlapped || touches_[end].contact.point.gap < -rounding;
         }
+        if (from + ahead < touches_.size()) {
+            const Contact& later = touches_[from + ahead].contact;
+            for (const int body : {later.first, later.second}) ask_for(poses[body]), ask_for(poses_[body]);
+        }
         if (!is_looked_at(a, b)) continue;
         if (margin == 0.0 && !overlapped && moved(a) + moved(b) < 0.1 * rounding) continue;
         if (++seen % pairs_a_look == 0) Watch::look();
@@ -424,7 +429,8 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
     for (const Lap& lap : laps_)
         parting_sweeps_.announce(unknown_[lap.contact.first], unknown_[lap.contact.second]);
     parting_sweeps_.arrange();
-    for (const Lap& lap : laps_) {
+    for (std::size_t k = 0; k < laps_.size(); ++k) {
+        const Lap& lap = laps_[k];
         SweepContact row;
         row.first = unknown_[lap.contact.first];
         row.second = unknown_[lap.contact.second];

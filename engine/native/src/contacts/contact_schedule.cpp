@@ -1,6 +1,6 @@
 // In which order contacts are swept: islands, and levels of contacts that share no body.
 #include <algorithm>
-#include <numeric>
+#include <utility>
 
 #include "contacts/contact_sweeps.hpp"
 
@@ -39,7 +39,7 @@ void ContactSweeps::join(int first, int second) {
 void ContactSweeps::schedule() {
     const std::size_t items = bodies_of_.size();
     if (items - scheduled_ > few_late * static_cast<double>(items)) {  // all anew, or levels would be short
-        scheduled_ = 0;
+        scheduled_ = listed_ = sized_ = 0;
         order_.clear();
         level_end_.clear();
         roots_.clear();
@@ -49,6 +49,7 @@ void ContactSweeps::schedule() {
         for (Due& due : order_) due.island = root(std::min(due.first, due.second));
         std::erase_if(roots_, [this](int island) { return parent_[island] != island; });
         joined_ = false;
+        sized_ = 0;
     }
     next_level_.assign(bodies_ + 1, 0);
     level_.resize(items);
@@ -96,25 +97,23 @@ void ContactSweeps::schedule() {
     for (int& place : place_)
         if (place < 0) place = next++;  // neither body moves
     scheduled_ = items;
-    size_.assign(bodies_ + 1, 0);
-    for (const Due& due : order_) ++size_[due.island];
-    due_begin_.clear();
+    if (sized_ == 0) size_.assign(bodies_ + 1, 0);
+    for (; sized_ < order_.size(); ++sized_) ++size_[order_[sized_].island];
     marked_ = false;
     select();
 }
 
 /// Contacts of hot bodies, in this sweep and, from then on, the next.
 void ContactSweeps::mark_hot() {
-    if (due_begin_.empty()) {
-        due_begin_.assign(bodies_ + 2, 0);
-        for (const Due& due : order_) ++due_begin_[due.first + 1], ++due_begin_[due.second + 1];
-        std::partial_sum(due_begin_.begin(), due_begin_.end(), due_begin_.begin());
-        due_of_.resize(2 * order_.size());
-        for (std::size_t place = order_.size(); place-- > 0;)
-            for (const int body : {order_[place].first, order_[place].second})
-                due_of_[--due_begin_[body + 1]] = static_cast<int>(place);
-        due_begin_.erase(due_begin_.begin());
-        due_begin_.push_back(static_cast<int>(due_of_.size()));
+    if (listed_ == 0) first_due_.assign(bodies_, -1);
+    next_due_.resize(2 * order_.size());
+    for (; listed_ < order_.size(); ++listed_) {
+        const int bodies[2] = {order_[listed_].first, order_[listed_].second};
+        for (std::size_t side = 0; side < 2; ++side) {
+            if (bodies[side] == bodies_) continue;
+            const std::size_t at = 2 * listed_ + side;
+            next_due_[at] = std::exchange(first_due_[bodies[side]], static_cast<int>(at));
+        }
     }
     due_now_.assign(order_.size() / 64 + 1, 0);
     due_next_.assign(order_.size() / 64 + 1, 0);
@@ -127,10 +126,11 @@ void ContactSweeps::mark_hot() {
 }
 
 void ContactSweeps::mark(int body) noexcept {
-    for (int k = due_begin_[body]; k < due_begin_[body + 1]; ++k) {
-        const std::uint64_t bit = std::uint64_t{1} << (due_of_[k] % 64);
-        due_now_[due_of_[k] / 64] |= bit;
-        due_next_[due_of_[k] / 64] |= bit;
+    for (int at = first_due_[body]; at >= 0; at = next_due_[at]) {
+        const std::size_t place = static_cast<std::size_t>(at) / 2;
+        const std::uint64_t bit = std::uint64_t{1} << (place % 64);
+        due_now_[place / 64] |= bit;
+        due_next_[place / 64] |= bit;
     }
 }
 

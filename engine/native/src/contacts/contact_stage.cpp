@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "contacts/contact_geometry.hpp"
 #include "linear/regularisation.hpp"
@@ -88,6 +89,11 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
         resists_turning_ = resists_turning_ || material.resists_turning();
     }
     const std::size_t bodies = unknown_.size();
+    for (std::size_t b = 0; b < bodies; ++b) {
+        if (unknown_[b] < 0) continue;
+        body_of_.resize(std::max(body_of_.size(), static_cast<std::size_t>(unknown_[b]) + 1));
+        body_of_[unknown_[b]] = static_cast<int>(b);
+    }
     margin_.assign(bodies, 0.0);
     prescribed_.assign(bodies, Vec6{});
     jointed_.assign(bodies, 0);
@@ -237,10 +243,7 @@ double ContactStage::gap(const Contact& contact) const noexcept {
 /// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
 double ContactStage::resting_right(Point& point) const {
     const double h = options_.time_step, gap = this->gap(point.contact);
-    point.approach = relative(point, point.contact.point.normal, velocity_, false);
-    point.push = relative(point, point.contact.point.normal, kick_, false);
-    // A plastic hit is met by the resting row itself, so that friction gets its share of the whole blow.
-    if (point.approach < -point.rounding) point.approach = 0.0;
+    measure(point);
     const bool touching = is_closed(point.contact);
     if (point.event)  // another point of a pair that meets may still be open
         return -(touching ? 0.0 : gap / time_left(point));
@@ -248,7 +251,7 @@ double ContactStage::resting_right(Point& point) const {
     const Regularisation row = regularise(point.material.compliance, point.material.damping, h);
     const double depth = -row.violation_gain * std::max(gap, -explained_depth(point));
     // A rigid contact that opens is not pushed after its own speed.
-    return point.material.compliance > 0.0 ? depth + row.upsilon * point.approach : depth;
+    return point.material.compliance > 0.0 ? depth + row.upsilon * point.resting_approach() : depth;
 }
 
 /// Whether a point is likely to push: what a solver starts from.
@@ -257,7 +260,7 @@ bool ContactStage::is_pressed(const Point& point) const noexcept {
     if (point.solved) return point.normal > 0.0;
     return point.before > 0.0 || point.strike >= 0.0 ||
            (point.before < 0.0 &&
-            (is_closed(point.contact) || gap + h * (point.approach + point.push) < 0.0));
+            (is_closed(point.contact) || gap + h * (point.resting_approach() + point.push) < 0.0));
 }
 
 /// The resting row of a point; the tangents' bounds are left to the friction law.
@@ -285,7 +288,9 @@ RowBlock ContactStage::resting_row(Point& point) const {
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
-    velocity_ = velocity;
+    for (std::size_t b = 0; b < velocity.size(); ++b)
+        if (std::memcmp(&velocity_[b], &velocity[b], sizeof(Vec6)) != 0)
+            velocity_[b] = velocity[b], changed_at_[b] = ++changes_;
     foreseen_ = ends_passed_ = ran_away_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) {
         bool left = false;
@@ -356,6 +361,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     }
 
     touches_.clear();
+    touch_keys_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         Point& point = points_[k];
         const Vec3 along = read_back(system.rows[joints + k], point);

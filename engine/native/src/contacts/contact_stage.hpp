@@ -48,13 +48,13 @@
 #include <vector>
 
 #include "collision/detection.hpp"
-#include "collision/sweep.hpp"
 #include "contacts/contact_arrays.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_material.hpp"
 #include "contacts/contact_sweeps.hpp"
 #include "contacts/friction_direct.hpp"
 #include "contacts/friction_sweeps.hpp"
+#include "contacts/step_points.hpp"
 #include "linear/large_array.hpp"
 #include "run/named_enum.hpp"
 #include "run/team.hpp"
@@ -243,37 +243,7 @@ public:
     bool unsettled_sunk() const noexcept { return sunk_; }          // and not for what a row is off by
 
 private:
-    struct Point {
-        Contact contact;  // of a strike: where it will touch, the gap along that normal
-        PairMaterial material;
-        Vec3 first_arm, second_arm;      // from the centres of mass, m
-        Vec3 tangent;                    // first tangent along world axes or the material's direction, unit
-        double stretch[2] = {1.0, 1.0};  // of the tangents' rows: what makes an ellipse of friction a disc
-        double strike = -1.0;            // when it touches within the step, s; negative if the pair is closed
-        bool event = false;              // acts at that time, not at the start of the step
-        double meeting_gap = 0.0;        // then, m: other points of the pair may still be open
-        double begun = 0.0;              // gap along its normal with both bodies where the step began, m
-        double approach = 0.0;           // C v, m/s, negative when closing
-        double push = 0.0;               // C (free velocity − v), m/s, negative when pressed together
-        double bounce = -1.0;            // psi' if the point takes part in the impact, else −1
-        double rounding = 0.0;           // approaches slower than this are none, m/s
-        double before = -1.0;            // normal impulse of the step before, −1 if the point is new
-        double guessed = -1.0;           // and what the box takes in its stead, −1 if it has not yet
-        double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
-        double parting_before = 0.0, pressed_before = 0.0;
-        bool solved = false;    // in an earlier round of this step: these start the next
-        bool answered = false;  // the same, by a solve and not by foresee()
-        double normal = 0.0, tangents[2] = {0.0, 0.0}, turning[3] = {0.0, 0.0, 0.0};
-        double impact = 0.0;
-        Vec3 impact_impulse;
-        bool is_stretched() const noexcept { return stretch[0] != stretch[1]; }
-    };
-    struct OpenPair {  // apart at the start of the step; they may still meet
-        IndexPair pair;
-        int first, second;  // bodies
-        Separation apart;
-        double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
-    };
+    using Point = StepPoint;
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
     void lie_as(const Memory& memory);
     void rouse(const Contact& contact);
@@ -296,7 +266,7 @@ private:
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
     // contact_carried.cpp
-    void note_pressing(const Point& point);
+    void note_pressing(Point& point);
     void find_carried();
     bool climbs(int body) const;
     bool lifts(const Point& point) const;
@@ -305,6 +275,7 @@ private:
     void book_carried(const MixedSystem& system);
     void order_points();
     void measure_points();
+    void measure(Point& point) const;
     double margin_of(std::size_t body, const std::vector<Vec6>& velocity,
                      const std::vector<Vec6>& other) const;
     bool reachable(const Contact& contact) const;
@@ -415,7 +386,7 @@ private:
     Detection detection_;
     std::shared_ptr<Team> team_;  // of several threads, or none
     SharedValues<SurfaceMaterial> materials_;
-    std::vector<int> unknown_;
+    std::vector<int> unknown_, body_of_;  // index of a body in MixedSystem, or −1; and back
     ContactOptions options_;
     std::vector<IndexPair> joints_;
     std::vector<char> jointed_;  // bodies with rows of joints
@@ -444,11 +415,15 @@ private:
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
     Unanswered unanswered_;
     std::vector<Touch> unordered_;
+    std::vector<std::uint64_t> touch_keys_;  // of touches_, once they are searched
     LargeArray<OpenPair> merged_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
+    std::vector<int>
+        changed_at_;  // when a body got others of the first two, counted by changes_ in this step
+    int changes_ = 0;
     LargeArray<OpenPair> open_;
     std::vector<IndexPair> open_bodies_;  // of each, to look through many that nobody moved; empty: not yet
     std::vector<Separation> apart_;       // of pairs, found on several threads

@@ -74,17 +74,11 @@ double ContactSweeps::update(std::size_t contact) noexcept {
 
 /// Asks for what the contacts behind this one will read: in large heaps they come from far away.
 void ContactSweeps::fetch(const Due& later, const Due& soon) const noexcept {
-    const auto ask = [](const auto& what) {  // each begins where a line does
-        constexpr std::size_t line = 64;
-        static_assert(alignof(std::remove_cvref_t<decltype(what)>) == line);
-        const char* const at = reinterpret_cast<const char*>(&what);
-        for (std::size_t byte = 0; byte < sizeof(what); byte += line) __builtin_prefetch(at + byte);
-    };
-    ask(contacts_[later.item - joint_count_]);
-    if (!slips_.empty()) ask(slips_[later.item - joint_count_]);
+    ask_for(contacts_[later.item - joint_count_]);
+    if (!slips_.empty()) ask_for(slips_[later.item - joint_count_]);
     for (const int at : {soon.first, soon.second}) {
-        ask(body(at));
-        if (!round_) ask(inertia_[at]);
+        ask_for(body(at));
+        if (!round_) ask_for(inertia_[at]);
     }
 }
 
@@ -97,11 +91,17 @@ void ContactSweeps::heat(int first, int second) noexcept {
     }
 }
 
+void ContactSweeps::touch(Part& part, int body) noexcept {
+    if (body == bodies_ || touched_[body] != 0) return;
+    touched_[body] = 1;
+    part.touched.push_back(body);  // has room for all
+}
+
 void ContactSweeps::note(Part& part, const Due& due, double change, double focus) noexcept {
     part.change[due.island] = larger(part.change[due.island], change);
     if (!spent_[due.island] || change == 0.0) return;
-    if (due.first < bodies_) touched_[due.first] = 1;
-    if (due.second < bodies_) touched_[due.second] = 1;
+    touch(part, due.first);
+    touch(part, due.second);
     if (!(change <= focus)) heat(due.first, due.second);
 }
 
@@ -314,36 +314,50 @@ void ContactSweeps::write(MixedSystem& system) const {
 RowsResidual ContactSweeps::worst(double focus) {
     done_ += measuring * static_cast<double>(bodies_of_.size());
     all_touched_ = all_touched_ || joint_count_ > 0;  // whose rows may have moved others
-    residual_.resize(contacts_.size());
-    for (Part& part : parts_) part.worst = {0.0, -1};
-    share_out(team_, contacts_.size(), worth_threads, [&](int part, std::size_t begin, std::size_t end) {
-        parts_[part].worst = worst_of(parts_[part], begin, end, focus);
-    });
-    std::fill(touched_.begin(), touched_.end(), 0);
+    find_residuals();
+    for (Part& part : parts_) {
+        for (const int body : part.touched) touched_[body] = 0;
+        part.touched.clear();
+    }
     all_touched_ = false;
     RowsResidual worst{0.0, -1};
-    for (Part& part : parts_) {
-        for (const int place : part.off) heat(contacts_[place].first, contacts_[place].second);
-        part.off.clear();
-        const RowsResidual& found = part.worst;
-        if (!(found.residual <= worst.residual) && !std::isnan(worst.residual)) worst = found;
+    const auto is_off = [&](double residual) { return !(residual <= focus); };
+    const auto is_worse = [&](double residual) {
+        return !(residual <= worst.residual) && !std::isnan(worst.residual);
+    };
+    constexpr std::size_t some = 16;  // are looked at together: nearly always nothing is to be told
+    for (std::size_t begin = 0; begin < residual_.size(); begin += some) {
+        const std::size_t end = std::min(begin + some, residual_.size());
+        const double least = std::min(focus, worst.residual);
+        bool any = std::isnan(worst.residual);
+        for (std::size_t k = begin; k < end; ++k) any |= !(residual_[k] <= least);
+        for (std::size_t k = begin; any && k < end; ++k) {
+            if (is_off(residual_[k])) heat(contacts_[k].first, contacts_[k].second);
+            if (is_worse(residual_[k])) worst = {residual_[k], static_cast<int>(k)};
+        }
     }
     if (worst.row >= 0)
         worst.row = static_cast<int>(std::find(place_.begin(), place_.end(), worst.row) - place_.begin());
     return worst;
 }
 
-RowsResidual ContactSweeps::worst_of(Part& part, std::size_t begin, std::size_t end, double focus) {
-    RowsResidual worst{0.0, -1};
-    for (std::size_t k = begin; k < end; ++k) {
-        const SweptContact& c = contacts_[k];
-        if (all_touched_ || touched_[c.first] || touched_[c.second]) residual_[k] = residual_of(k);
-        const double residual = residual_[k];
-        if (!(residual <= focus)) part.off.push_back(static_cast<int>(k));
-        const bool worse = !(residual <= worst.residual) && !std::isnan(worst.residual);
-        if (worse) worst = {residual, static_cast<int>(k)};
+/// Brings residual_ up to date.
+void ContactSweeps::find_residuals() {
+    residual_.resize(contacts_.size());
+    if (all_touched_) {
+        share_out(team_, contacts_.size(), worth_threads, [this](int, std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) residual_[k] = residual_of(k);
+        });
+    } else {
+        share_out(team_, order_.size(), worth_threads, [this](int, std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) {
+                const Due& due = order_[k];
+                const auto contact = static_cast<std::size_t>(due.item - joint_count_);
+                if (touched_[due.first] != 0 || touched_[due.second] != 0)
+                    residual_[contact] = residual_of(contact);
+            }
+        });
     }
-    return worst;
 }
 
 /// How far a contact is from its law, as rows_residual() measures it, m/s.

@@ -8,6 +8,7 @@
 #include "contacts/friction_point.hpp"
 #include "contacts/sweep_kernel.hpp"
 #include "contacts/sweep_rows.hpp"
+#include "linear/ahead.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
 #include "run/team.hpp"
@@ -50,6 +51,11 @@ public:
     void arrange();
     /// Adds a contact; its index counts from 0. What was not announced is kept in the order it was given.
     int add(const SweepContact& contact);
+    /// Of an announced contact: add() will bring it soon.
+    void expect(std::size_t contact) const noexcept {
+        ask_for(contacts_[place_[contact]]);
+        if (place_[contact] < static_cast<int>(slips_.size())) ask_for(slips_[place_[contact]]);
+    }
 
     /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
     /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep, and with true when all is done: it may
@@ -65,9 +71,13 @@ public:
     }
 
     const Vec6& velocity(int body) const noexcept { return joints_.bodies()[body].velocity; }
-    /// Whether a body may have another velocity than at the last worst().
-    bool may_have_moved(int body) const noexcept {
-        return all_touched_ || joint_count_ > 0 || touched_[body] != 0;
+    /// Tells of every body that may have another velocity than at the last worst().
+    template <class Visit> void visit_moved(const Visit& visit) const {
+        if (all_touched_ || joint_count_ > 0)
+            for (int body = 0; body < bodies_; ++body) visit(body);
+        else
+            for (const Part& part : parts_)
+                for (const int body : part.touched) visit(body);
     }
     const double* impulse(int contact) const noexcept { return contacts_[place_[contact]].impulse; }
     /// Multipliers of joints, and all velocities.
@@ -112,17 +122,17 @@ private:
                     hot = 0;         // of fresh islands; of spent ones; those of them that were swept
         std::vector<double> change;  // by root
         std::vector<const Due*> picked;
-        std::vector<int> off;  // contacts that worst() found far off
-        RowsResidual worst;    // of its share
-        SweptContact none{};   // fills a group
+        std::vector<int> touched;  // bodies, see touched_
+        SweptContact none{};       // fills a group
     };
+    void touch(Part& part, int body) noexcept;
     void note(Part& part, const Due& due, double change, double focus) noexcept;
     void solve(Part& part, const Due* const group[4], int size, double focus) noexcept;
     void solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
     void solve_due(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
     void solve_picked(Part& part, std::size_t picked, double focus) noexcept;
     void sweep(double focus) noexcept;
-    RowsResidual worst_of(Part& part, std::size_t begin, std::size_t end, double focus);
+    void find_residuals();
     double residual_of(std::size_t contact) const noexcept;
 
     Team* team_ = nullptr;
@@ -152,10 +162,13 @@ private:
         hot_;  // bodies whose rows were changed much: 2 in this sweep, 1 in the one before
     // Where few are due: the contacts of hot bodies by their place in order_, a bit each, in this sweep and the next.
     std::vector<std::uint64_t> due_now_, due_next_;
-    std::vector<int> due_of_, due_begin_;    // by body
+    std::vector<int> first_due_,
+        next_due_;            // of each body a list of twice those places, plus one for the second body
+    std::size_t listed_ = 0;  // places in those lists
     bool marked_ = false, marking_ = false;  // these are right; a sweep goes by them
-    std::vector<int> size_;                  // contacts, by root
-    // What worst() found of each contact, and whose velocities have changed since.
+    std::vector<int> size_;                  // contacts, by root, of so many in order_
+    std::size_t sized_ = 0;
+    // What worst() found of each contact, by place, and whose velocities have changed since.
     std::vector<double> residual_;
     std::vector<unsigned char> touched_;
     bool all_touched_ = true;

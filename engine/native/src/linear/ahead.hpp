@@ -1,0 +1,18 @@
+// Memory that will be read soon: in large heaps what a loop over contacts reads of their bodies has left the caches since
+// the loop before.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace spook {
+
+inline constexpr std::size_t ahead = 8;  // passes of such a loop
+
+/// Asks for all lines of it; of what does not begin where a line does, for all but what the last may hold of it.
+template <class T> void ask_for(const T& what) noexcept {
+    const char* const at = reinterpret_cast<const char*>(&what);
+    for (std::size_t byte = 0; byte < sizeof(what); byte += 64) __builtin_prefetch(at + byte);
+}
+
+}  // namespace spook
