@@ -136,7 +136,8 @@ bool ContactStage::is_settled(MixedSystem& system) {
     unsettled_body_ = -1;
     unsettled_by_ = 0.0;
     if (!system.rows.empty()) sweeps_.write(system);
-    const RowsResidual contact = sweeps_.worst(focus * options_.unsettled_residual),
+    const RowsResidual contact =
+                           sweeps_.worst(focus * options_.unsettled_residual, options_.unsettled_residual),
                        joint = rows_residual(system, {}, options_.friction);
     residual_ = std::max(contact.residual, joint.residual);
     joint_is_worst_ = joint.residual > contact.residual;

@@ -24,6 +24,8 @@ constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while
 constexpr std::size_t narrow = 32;  // contacts of a level for each thread: fewer are not worth to wait for
 constexpr std::size_t narrow_due = 96;      // the same where only some of them are due
 constexpr std::size_t worth_threads = 512;  // contacts, where nothing is waited for
+constexpr double few_off = 1.0 / 16.0;      // of the contacts are further off than the next sweeps care for
+constexpr double nearly = 0.9;              // of what is allowed: then they care for what is that far off
 constexpr double few_left = 0.75;           // of the contacts in the list: a shorter one is made
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
@@ -311,7 +313,7 @@ void ContactSweeps::write(MixedSystem& system) const {
     else joints_.write_velocities(system);
 }
 
-RowsResidual ContactSweeps::worst(double focus) {
+RowsResidual ContactSweeps::worst(double focus, double allowed) {
     done_ += measuring * static_cast<double>(bodies_of_.size());
     all_touched_ = all_touched_ || joint_count_ > 0;  // whose rows may have moved others
     find_residuals();
@@ -321,6 +323,7 @@ RowsResidual ContactSweeps::worst(double focus) {
     }
     all_touched_ = false;
     RowsResidual worst{0.0, -1};
+    off_.clear();
     const auto is_off = [&](double residual) { return !(residual <= focus); };
     const auto is_worse = [&](double residual) {
         return !(residual <= worst.residual) && !std::isnan(worst.residual);
@@ -332,10 +335,15 @@ RowsResidual ContactSweeps::worst(double focus) {
         bool any = std::isnan(worst.residual);
         for (std::size_t k = begin; k < end; ++k) any |= !(residual_[k] <= least);
         for (std::size_t k = begin; any && k < end; ++k) {
-            if (is_off(residual_[k])) heat(contacts_[k].first, contacts_[k].second);
+            if (is_off(residual_[k])) off_.push_back(static_cast<int>(k));
             if (is_worse(residual_[k])) worst = {residual_[k], static_cast<int>(k)};
         }
     }
+    // Where many are off, what nearly is would be next. In a large heap a few always are, and ask for more than they bring.
+    const bool few = static_cast<double>(off_.size()) <= few_off * static_cast<double>(contacts_.size());
+    const double least = few ? larger(focus, nearly * allowed) : focus;
+    for (const int place : off_)
+        if (!(residual_[place] <= least)) heat(contacts_[place].first, contacts_[place].second);
     if (worst.row >= 0)
         worst.row = static_cast<int>(std::find(place_.begin(), place_.end(), worst.row) - place_.begin());
     return worst;

@@ -83,8 +83,10 @@ public:
     /// Multipliers of joints, and all velocities.
     void write(MixedSystem& system) const;
     /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index. Those
-    /// further off than `focus` [m/s] are where the next run goes on.
-    RowsResidual worst(double focus);
+    /// further off than `focus` [m/s] are where the next run goes on; where they are few, only those that are as far off
+    /// as nearly what is `allowed`.
+    RowsResidual worst(double focus, double allowed);
+    RowsResidual worst(double focus) { return worst(focus, focus); }
 
 private:
     struct Box {                    // what only boxes and stretched friction read
@@ -170,6 +172,7 @@ private:
     std::size_t sized_ = 0;
     // What worst() found of each contact, by place, and whose velocities have changed since.
     std::vector<double> residual_;
+    std::vector<int> off_;
     std::vector<unsigned char> touched_;
     bool all_touched_ = true;
     double done_ = 0.0;   // items swept, and looked at for less
