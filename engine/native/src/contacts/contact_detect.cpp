@@ -1,8 +1,7 @@
-// The contact stage's first part: which points are closed, which pairs will meet, and when.
+// The contact stage's first part: which points are closed, and which pairs are near enough to meet.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <utility>
 
 #include "collision/sweep.hpp"
 #include "contacts/contact_geometry.hpp"
@@ -14,14 +13,9 @@ namespace spook {
 
 namespace {
 
-constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
-constexpr unsigned pairs_a_look = 256;    // of shapes, between two looks at the clock
-constexpr std::size_t many_pairs = 512;   // worth several threads
-constexpr double vanishing = 1e-8;        // a direction so steep on the surface has no shadow
-constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
-constexpr double other_side = 0.5;        // the same
+constexpr double vanishing = 1e-8;  // a direction so steep on the surface has no shadow
 
 }  // namespace
 
@@ -294,200 +288,6 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
     if (!(speed * options_.time_step > open.apart.gap)) return open.apart.gap > 0.0;
     const double slop = this->slop(open);
     return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
-}
-
-/// When an open pair that does not surely pass meets along `velocity`, s; negative if it does not in this step.
-double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const {
-    const Pose at_first = moved(open.first, velocity), at_second = moved(open.second, velocity);
-    const Mover first = mover(open.pair.first, at_first, velocity),
-                second = mover(open.pair.second, at_second, velocity);
-    const double time = first_touch(first, second, options_.time_step, slop(open));
-    if (time < 0.0 || is_seam(first, open.first, second, open, velocity, time, late) ||
-        is_seam(second, open.second, first, open, velocity, time, late))
-        return -1.0;
-    return time;
-}
-
-/// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
-Pose ContactStage::moved(int b, const std::vector<Vec6>& velocity) const {
-    Pose pose = poses_[b];
-    if (event_time_[b] >= 0.0)
-        pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
-    return pose;
-}
-
-/// A collider whose body goes on from `pose`, which must outlive it.
-Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const {
-    const Collider::View own = detection_.collider(collider);
-    return {own.shape, own.part, pose, linear(velocity[own.body]), angular(velocity[own.body])};
-}
-
-/// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
-/// for an impact: if they need one, late_blow_ tells so, see blows_come_first().
-int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
-    meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
-    for (auto& meetings : meetings_) meetings.clear();
-    if (swings_ && !open_.empty()) index_points();
-    if (open_bodies_.size() != open_.size()) {
-        open_bodies_.clear();
-        for (const OpenPair& open : open_) open_bodies_.emplace_back(open.first, open.second);
-    }
-    arrays_.asked.resize(meetings_.size());
-    share_out(team_.get(), open_.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
-        std::vector<std::size_t>& asked = arrays_.asked[part];
-        asked.resize(end - begin + 1);
-        std::size_t count = 0;
-        for (std::size_t k = begin; k < end; ++k) {  // the others were judged before
-            asked[count] = k;
-            count += !late || (changed_[open_bodies_[k].first] | changed_[open_bodies_[k].second]) != 0;
-        }
-        const std::size_t all = std::exchange(count, 0);
-        for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
-            asked[count] = asked[at];
-            count += !passes(open_[asked[at]], velocity);
-        }
-        for (std::size_t at = 0; at < count; ++at) {
-            if (at + ahead < count) {
-                const OpenPair& later = open_[asked[at + ahead]];
-                for (const int body : {later.first, later.second})
-                    ask_for(poses_[body]), ask_for(kick_[body]);
-            }
-            if (end - begin == open_.size() && (at + 1) % pairs_a_look == 0) Watch::look();  // on one thread
-            if (const double time = meeting(open_[asked[at]], velocity, late); !(time < 0.0))
-                meetings_[part].push_back({asked[at], time});
-        }
-    });
-    std::vector<Meeting>& all = meetings_[0];
-    for (std::size_t part = 1; part < meetings_.size(); ++part)
-        all.insert(all.end(), meetings_[part].begin(), meetings_[part].end());
-    leave_out_what_others_keep_off(all, velocity);
-    int found = 0;
-    for (const auto& [k, time] : all) {
-        OpenPair& open = open_[k];
-        const Pose first = moved(open.first, velocity), second = moved(open.second, velocity);
-        const std::size_t known = points_.size();
-        const bool met =
-            add_strike(open.pair, mover(open.pair.first, first, velocity).body_at(time),
-                       mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
-        const Vec3 led =
-            (first.position - poses_[open.first].position) - (second.position - poses_[open.second].position);
-        for (std::size_t i = known; i < points_.size(); ++i)
-            points_[i].begun -= dot(points_[i].contact.point.normal, led);
-        if (!met) continue;
-        open.first = -1;
-        ++found;
-    }
-    if (found > 0) {
-        std::erase_if(open_, [](const OpenPair& open) { return open.first < 0; });
-        open_bodies_.clear();
-    }
-    return found;
-}
-
-bool ContactStage::meets(const std::vector<Vec6>& next, bool struck, bool rebounds) {
-    plastic_first_ = rebounds;  // blows that a stop's rebound leads to are found again after it
-    late_blow_ = false;
-    changed_ = jointed_;  // others have been swept with what they fly with
-    if (outrun(next)) find_open_again();
-    const std::size_t closed_points = points_.size();
-    int found = find_strikes(next, true);
-    if (late_blow_ && struck && !plastic_first_) {  // as are those to a body that it only stops
-        plastic_first_ = true;
-        found += find_strikes(next, true);
-    }
-    if (found > 0) take_back_strikes(closed_points, next);
-    if (points_.empty()) return false;
-    counters_.contacts += points_.size();
-    order_points();
-    return true;
-}
-
-/// The points of a pair that meets at `time`, with the bodies where they will be then.
-bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
-                              const std::vector<Vec6>& velocity, bool late) {
-    const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-    const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
-    scratch_.clear();
-    detection_.touch(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius), scratch_);
-    bool met = false;
-    for (const Contact& contact : scratch_) {
-        add_point(contact, first, second, time);
-        Point& point = points_.back();
-        const double closing = -relative(point, contact.point.normal, velocity, false);
-        // What forces give to one of them in this step is no blow, though both got it before one was held.
-        const double push = std::max({std::abs(relative(point, contact.point.normal, kick_, false)),
-                                      std::abs(dot(contact.point.normal, linear(kick_[contact.first]))),
-                                      std::abs(dot(contact.point.normal, linear(kick_[contact.second])))});
-        if (late && !plastic_first_ && point.material.restitution > 0.0 && closing > 4.0 * push) {
-            late_blow_ = true;
-            points_.pop_back();
-            continue;
-        }
-        point.meeting_gap = contact.point.gap;
-        point.begun = contact.point.gap + time * closing;
-        point.contact.point.gap = std::max(0.0, point.begun);
-        met = true;
-    }
-    return met;
-}
-
-/// A strike that is no event acts with the bodies at the start of the step, or the angular momentum of both would
-/// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
-/// taken back half-way between both bodies, or with the one that moves by itself.
-void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity) {
-    const double h = options_.time_step;
-    strikes_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
-    points_.resize(from);
-    for (std::size_t k = 0; k < strikes_.size();) {
-        const Contact meeting = strikes_[k].contact;
-        const double strike = strikes_[k].strike;
-        std::size_t end = k;
-        while (end < strikes_.size() &&
-               (strikes_[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
-            ++end;
-        if (strike < 0.0 || strikes_[k].event) {
-            for (; k < end; ++k) points_.push_back(strikes_[k]);
-            continue;
-        }
-        const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
-                             static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
-        scratch_.clear();
-        detection_.touch(pair, search_[meeting.first] + search_[meeting.second], scratch_);
-        const std::size_t old = points_.size();
-        bool stops = false;
-        // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
-        const bool fixed = std::min(unknown_[meeting.first], unknown_[meeting.second]) < 0;
-        const double same =
-            fixed ? same_side
-            : have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape)
-                ? other_side
-                : -unbounded;
-        if (std::any_of(scratch_.begin(), scratch_.end(), [&](const Contact& contact) {
-                return dot(contact.point.normal, meeting.point.normal) < same;
-            }))
-            scratch_.clear();
-        for (const Contact& contact : scratch_) {
-            add_point(contact, poses_[contact.first], poses_[contact.second], strike);
-            stops =
-                stops ||
-                contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
-        }
-        if (stops) {
-            k = end;
-            continue;
-        }
-        points_.resize(old);
-        for (; k < end; ++k) {
-            Point& p = points_.emplace_back(strikes_[k]);
-            const int a = p.contact.first, b = p.contact.second;
-            const bool alone = std::min(unknown_[a], unknown_[b]) < 0;  // then its arm is that of the meeting
-            const Vec3 own = linear(velocity[unknown_[a] < 0 ? b : a]);
-            p.contact.point.position -= p.strike * (alone ? own : 0.5 * (own + linear(velocity[b])));
-            if (alone) continue;
-            p.first_arm = p.contact.point.position - poses_[a].position;
-            p.second_arm = p.contact.point.position - poses_[b].position;
-        }
-    }
 }
 
 }  // namespace spook

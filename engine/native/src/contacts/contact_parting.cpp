@@ -23,7 +23,6 @@ constexpr double around = 4.0;           // of the deepest overlap: gaps that pa
 constexpr double aside = 1e-5;           // of the smaller body's radius: who parts by less pushes nobody else
 constexpr double aside_by_sweeps = 5e-4;  // the same where every row more leads fifty sweeps less far
 constexpr double same_place = 0.1;        // of the larger body's radius: one point, seen again
-constexpr unsigned pairs_a_look = 256;    // between two looks at the clock
 
 }  // namespace
 

@@ -263,6 +263,7 @@ private:
     bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
     bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
                     const std::vector<Vec6>& velocity, bool late);
+    bool add_strike_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
     void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
     // contact_carried.cpp

@@ -21,6 +21,7 @@ struct StepPoint {
     double push = 0.0;               // C (free velocity − v), m/s, negative when pressed together
     int measured = -1;               // when these were found, see ContactStage::measure()
     bool event = false;              // acts at the time of its strike, not at the start of the step
+    bool at_start = false;           // a strike with the point of the step's start already
     bool solved = false;             // in an earlier round of this step: these start the next
     bool answered = false;           // the same, by a solve and not by foresee()
     double bounce = -1.0;            // psi' if the point takes part in the impact, else −1
