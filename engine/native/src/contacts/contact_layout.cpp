@@ -35,10 +35,13 @@ void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
         body(b).inverse_mass = 1.0 / system.mass[b][0];
         body(b).round = inertia_[b].xx;
     }
+    relaxation_ = 1.0;
     begin(system, model);
 }
 
-void ContactSweeps::start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model) {
+void ContactSweeps::start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model,
+                                 double relaxation) {
+    relaxation_ = relaxation;
     bodies_ = other.bodies_;
     round_ = other.round_;
     if (!round_) inertia_ = other.inertia_;
@@ -122,7 +125,7 @@ int ContactSweeps::add(const SweepContact& given) {
     const Vec3 first = cross(c.first_arm, c.normal), second = cross(c.second_arm, c.normal);
     c.own = body(c.first).inverse_mass + body(c.second).inverse_mass +
             (dot(first, turned(c.first, first)) + dot(second, turned(c.second, second))) + given.softness;
-    c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
+    c.own_inverse = c.own > 0.0 ? relaxation_ / c.own : 0.0;
     Vec3 impulse = (c.impulse[0] = given.impulse[0]) * c.normal;
     if (given.friction > 0.0) {
         c.impulse[1] = given.impulse[1], c.impulse[2] = given.impulse[2];

@@ -19,8 +19,9 @@ constexpr double joint_share = 1e-3;     // and of what the contacts do
 constexpr double least_give = 1e-12;     // of its row's own inertia: repeated joints share a load by it
 constexpr std::size_t most_beside = 32;  // bodies of a ring: where more part at once, the next step will tell
 constexpr int rings = 4;                 // of neighbours that parting sees
-constexpr double around = 4.0;           // of the deepest overlap: gaps that parting may close
-constexpr double aside = 1e-5;           // of the smaller body's radius: who parts by less pushes nobody else
+constexpr double over_relaxation = 1.25;  // of sweeps that part balls, not boxes
+constexpr double around = 4.0;            // of the deepest overlap: gaps that parting may close
+constexpr double aside = 1e-5;  // of the smaller body's radius: who parts by less pushes nobody else
 constexpr double aside_by_sweeps = 5e-4;  // the same where every row more leads fifty sweeps less far
 constexpr double same_place = 0.1;        // of the larger body's radius: one point, seen again
 
@@ -424,7 +425,7 @@ bool ContactStage::part_directly(MixedSystem& parting, bool again) {
 }
 
 bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
-    parting_sweeps_.start_beside(sweeps_, parting, options_.friction);
+    parting_sweeps_.start_beside(sweeps_, parting, options_.friction, swings_ ? 1.0 : over_relaxation);
     for (const Lap& lap : laps_)
         parting_sweeps_.announce(unknown_[lap.contact.first], unknown_[lap.contact.second]);
     parting_sweeps_.arrange();

@@ -43,8 +43,10 @@ public:
 
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
-    /// The same, with the masses that `other` was started with.
-    void start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model);
+    /// The same, with the masses that `other` was started with; each change of a normal impulse is `relaxation` times what
+    /// its own row asks for, between 0 and 2: what is spread over many rows gets there sooner with a little more than 1.
+    void start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model,
+                      double relaxation);
     /// Announces a contact that add() will bring, in the same order; after arrange() those announced have their places, one
     /// behind the other as they are swept: memory at random is what large heaps cost.
     void announce(int first, int second) { link(first, second); }
@@ -143,7 +145,8 @@ private:
     Sweeper joints_;
     int joint_count_ = 0, bodies_ = 0;
     LargeArray<SweptInertia> inertia_;
-    bool round_ = true;       // all bodies are
+    bool round_ = true;  // all bodies are
+    double relaxation_ = 1.0;
     std::vector<int> place_;  // of each contact, by index, in the arrays that follow
     int added_ = 0;
     LargeArray<SweptContact> contacts_;
