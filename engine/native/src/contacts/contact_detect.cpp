@@ -67,6 +67,10 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     }
     supplies_ = conveys_ || std::any_of(prescribed_.begin(), prescribed_.end(),
                                         [](const Vec6& v) { return v != Vec6{}; });
+    // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
+    for (std::vector<char>* flags : {&parting_.grounded, &parting_.supplied, &arrays_.parted_far})
+        flags->reserve(bodies);
+    arrays_.sums.reserve(bodies);
     std::fill(lead_.begin(), lead_.end(), 0.0);
     std::fill(event_time_.begin(), event_time_.end(), -1.0);
     std::fill(supported_.begin(), supported_.end(), 0);

@@ -28,6 +28,7 @@ constexpr double nearly_held = 1e-11;  // and what may be left where rounding is
 constexpr int most_halvings = 4;       // of the displacement
 constexpr double rounding = 4e-16;     // of the energy
 constexpr int most_partings = 4;       // of a step
+constexpr std::size_t few_parted = 8;  // bodies of an island: most are no larger
 
 double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
     return body.mass * dot(s.velocity, s.velocity) +
@@ -118,10 +119,12 @@ double RigidSystem::fundable(int island) const {
 void RigidSystem::gather_islands() {
     const Islands& islands = parting_->islands;
     const auto count = static_cast<std::size_t>(islands.count);
-    if (parted_.size() < count)
-        parted_.resize(count), parted_blocks_.resize(count);  // lists keep their memory
-    for (std::vector<int>& members : parted_) members.clear();
-    for (std::vector<int>& blocks : parted_blocks_) blocks.clear();
+    if (parted_.size() < count) {  // lists keep their memory; later there may be more, of a few bodies each
+        parted_.resize(tied_.size()), parted_blocks_.resize(tied_.size());
+        for (std::vector<int>& members : parted_) members.reserve(few_parted);
+        taken_.reserve(tied_.size());
+    }
+    for (std::size_t k = 0; k < count; ++k) parted_[k].clear(), parted_blocks_[k].clear();
     for (std::size_t k = 0; k < tied_.size(); ++k)
         if (islands.of_body[k] >= 0) parted_[islands.of_body[k]].push_back(static_cast<int>(k));
     const auto blocks = joints_.blocks();
