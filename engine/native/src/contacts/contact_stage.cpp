@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "contacts/contact_geometry.hpp"
 #include "linear/regularisation.hpp"
@@ -288,9 +287,10 @@ RowBlock ContactStage::resting_row(Point& point) const {
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
-    for (std::size_t b = 0; b < velocity.size(); ++b)
-        if (std::memcmp(&velocity_[b], &velocity[b], sizeof(Vec6)) != 0)
-            velocity_[b] = velocity[b], changed_at_[b] = ++changes_;
+    for (std::size_t b = 0; b < velocity.size(); ++b) {
+        if (velocity_[b] != velocity[b]) changed_at_[b] = ++changes_;
+        velocity_[b] = velocity[b];
+    }
     foreseen_ = ends_passed_ = ran_away_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) {
         bool left = false;
