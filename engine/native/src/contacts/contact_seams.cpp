@@ -25,10 +25,16 @@ constexpr double together = 0.05;         // of a step: which of two meetings co
 constexpr double same_way = 1.0 - 1e-12;  // the same of one face met twice
 constexpr double unheld = 3.0;            // of a fall in a step: what sinks before sweeps hold it
 constexpr double hum = 10.0;              // of that overlap: what they leave of motion where all is at rest
+constexpr double a_side = 0.5;  // cosine of the normal of a meeting: no more of it is along what holds
 
 /// How far the lowest point along n is above the origin, m; of a triangle infinite.
 double height(const Mover& of, double time, Vec3 n) noexcept {
     return separation(of.shape, of.at(time), Primitive::plane(n), {}).gap;
+}
+
+/// Whether two meet with a side, seen from a face whose normal is n: what lands on another one falls as far, and meets it.
+bool meets_a_side(const Mover& one, const Mover& other, double time, Vec3 n) noexcept {
+    return std::abs(dot(n, separation(one.shape, one.at(time), other.shape, other.at(time)).normal)) < a_side;
 }
 
 }  // namespace
@@ -58,7 +64,8 @@ void ContactStage::index_points() {
 }
 
 /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
-/// the normal they touch with already, if they do. Between sweeps a body may also sink on the way.
+/// the normal they touch with already, if they do. Between sweeps a body may also sink on the way, and to the side of another
+/// as far as settled sweeps may have left it falling.
 bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
                            const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing) const {
     if (!have_sides(moving.shape, other.shape)) return false;
@@ -93,8 +100,11 @@ bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, co
                 const double rises = std::max(part * dot(n, leads), top - height(other, part, -n));
                 falls = std::max(falls, now + rises - height(moving, part, n));
             }
-            const double most = h * (options_.unsettled_residual + unheld * norm(linear(kick_[body])));
-            falls = std::min(falls, settling_ ? std::max(begun, most + sinking) : hum * slop);
+            const double left = h * options_.unsettled_residual;
+            double most = hum * slop;
+            if (settling_) most = std::max(begun, left + h * unheld * norm(linear(kick_[body])) + sinking);
+            else if (falls > most && meets_a_side(moving, other, time, n)) most = left;
+            falls = std::min(falls, most);
             depth = std::max(depth, begun + falls);
             if (settling_) depth += slop;  // it met the other with as much
         }
