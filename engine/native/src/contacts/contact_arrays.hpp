@@ -64,7 +64,6 @@ struct Lap {
     Vec3 first_arm, second_arm;  // from the centres of mass, m
     double damping = 0.0;        // of the pair
     double push = 0.0;           // how deep it is, m; negative where bodies are apart
-    double parting_before = 0.0;
 };
 
 /// Of the search for strikes that act at their own time; by an island's first body.

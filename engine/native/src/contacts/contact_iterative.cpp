@@ -124,7 +124,6 @@ void ContactStage::take_in(std::size_t known) {
         if (key == touch_keys_.end() || *key != point.contact.key) continue;
         const auto old = touches_.begin() + (key - touch_keys_.begin());
         point.before = old->normal;
-        point.parting_before = old->parting;
         point.pressed_before = old->pressed;
         std::copy_n(old->tangent, 2, point.tangent_before);
     }

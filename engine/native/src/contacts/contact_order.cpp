@@ -117,7 +117,6 @@ void ContactStage::order_points() {
         while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
         if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
         point.before = touches_[old].normal;
-        point.parting_before = touches_[old].parting;
         point.pressed_before = touches_[old].pressed;
         std::copy_n(touches_[old].tangent, 2, point.tangent_before);
         std::copy_n(touches_[old].turning, 3, point.turning_before);

@@ -262,7 +262,7 @@ bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
     return fresh;
 }
 
-Lap& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess) {
+void ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess) {
     if (!asleep_.empty()) rouse(contact);
     Lap& lap = laps_.emplace_back();
     lap.contact = contact;
@@ -270,7 +270,6 @@ Lap& ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& pose
     lap.first_arm = contact.point.position - poses[contact.first].position;
     lap.second_arm = contact.point.position - poses[contact.second].position;
     lap.push = excess;
-    return lap;
 }
 
 /// Points of the step's pairs, up to gaps of `margin`, with the bodies at `poses`, into laps_; their largest overlap that
@@ -307,16 +306,15 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
         detection_.touch(pair, poses[a], poses[b], margin, scratch_);
         for (const Contact& contact : scratch_) {
-            double pressed = 0.0, before = 0.0;
+            double pressed = 0.0;
             if (materials_[a].compliance + materials_[b].compliance > 0.0) pressed = most_pressed;
             for (std::size_t k = from; k < end; ++k)
-                if (touches_[k].contact.key == contact.key)
-                    pressed = touches_[k].pressed, before = touches_[k].parting;
+                if (touches_[k].contact.key == contact.key) pressed = touches_[k].pressed;
             double excess = -contact.point.gap - pressed - rounding;
             if (again && excess > 0.0 && given_.contains(key))
                 excess = std::max(0.0, excess - given_.at(key));
             deepest = std::max(deepest, excess);
-            if (margin > 0.0) add_lap(contact, poses, excess).parting_before = before;
+            if (margin > 0.0) add_lap(contact, poses, excess);
         }
     }
     if (!again && margin > 0.0) find_beside(poses, margin, std::cref(moved));
@@ -438,7 +436,6 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
         row.first_arm = lap.first_arm;
         row.second_arm = lap.second_arm;
         row.right[0] = parting_speed(lap, again);
-        if (!again) row.impulse[0] = lap.parting_before;  // what is left is another load
         if (!parting.rows.empty()) row.softness = give_of(lap.contact, gives_);
         parting_sweeps_.add(row);
     }
@@ -449,12 +446,8 @@ bool ContactStage::part_by_sweeps(MixedSystem& parting, bool again) {
     parting_sweeps_.write(parting);
     for (std::size_t k = 0; k < laps_.size(); ++k) {
         const Contact& contact = laps_[k].contact;
-        const double impulse = parting_sweeps_.impulse(static_cast<int>(k))[0];
-        const auto touch =
-            std::lower_bound(touches_.begin(), touches_.end(), contact.key,
-                             [](const Touch& t, std::uint64_t key) { return t.contact.key < key; });
-        if (!again && touch != touches_.end() && touch->contact.key == contact.key) touch->parting = impulse;
-        if (impulse != 0.0) arrays_.parted.tie(unknown_[contact.first], unknown_[contact.second]);
+        if (parting_sweeps_.impulse(static_cast<int>(k))[0] != 0.0)
+            arrays_.parted.tie(unknown_[contact.first], unknown_[contact.second]);
     }
     return true;
 }

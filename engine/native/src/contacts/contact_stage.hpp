@@ -175,7 +175,6 @@ public:
         double impact = 0.0;             // normal impulse of the impact, N s
         double tangent[2] = {0.0, 0.0};  // of the resting stage along the tangents, for a warm start
         double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
-        double parting = 0.0;            // of the parting of overlaps by sweeps, for a warm start
         double pressed = 0.0;            // how far its bodies have pressed it in by the step's end, m
         double friction = 0.0;           // mu of the pair, along its direction if it has one
         bool active = false;             // pushes, or closed
@@ -357,7 +356,7 @@ private:
     void find_given();
     void note_given();
     void find_beside(const std::vector<Pose>& poses, double margin, const std::function<double(int)>& moved);
-    Lap& add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
+    void add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
     double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
     double find_overlaps_beside(const std::vector<Pose>& poses, double margin);
     bool keep_parted(const std::vector<Pose>& poses);

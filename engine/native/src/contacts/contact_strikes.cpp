@@ -83,7 +83,13 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         all.insert(all.end(), meetings_[part].begin(), meetings_[part].end());
     leave_out_what_others_keep_off(all, velocity);
     int found = 0;
-    for (const auto& [k, time] : all) {
+    for (std::size_t at = 0; at < all.size(); ++at) {
+        if (at + ahead < all.size()) {
+            const OpenPair& later = open_[all[at + ahead].open];
+            ask_for(detection_.pose(later.pair.first)), ask_for(detection_.pose(later.pair.second));
+            for (const int body : {later.first, later.second}) ask_for(poses_[body]), ask_for(velocity[body]);
+        }
+        const auto& [k, time] = all[at];
         OpenPair& open = open_[k];
         if (late && add_strike_at_start(open, time, velocity)) {
             open.first = -1;
@@ -192,6 +198,10 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
     strikes_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
     points_.resize(from);
     for (std::size_t k = 0; k < strikes_.size();) {
+        if (k + ahead < strikes_.size()) {
+            const Contact& later = strikes_[k + ahead].contact;
+            for (const int body : {later.first, later.second}) ask_for(poses_[body]), ask_for(velocity[body]);
+        }
         const Contact meeting = strikes_[k].contact;
         const double strike = strikes_[k].strike;
         std::size_t end = k;

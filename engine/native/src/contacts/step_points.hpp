@@ -29,7 +29,7 @@ struct StepPoint {
     double before = -1.0;            // normal impulse of the step before, −1 if the point is new
     double guessed = -1.0;           // and what the box takes in its stead, −1 if it has not yet
     double tangent_before[2] = {0.0, 0.0}, turning_before[3] = {0.0, 0.0, 0.0};
-    double parting_before = 0.0, pressed_before = 0.0;
+    double pressed_before = 0.0;
     double normal = 0.0, tangents[2] = {0.0, 0.0}, turning[3] = {0.0, 0.0, 0.0};
     double impact = 0.0;
     Vec3 impact_impulse;
