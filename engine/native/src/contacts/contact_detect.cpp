@@ -79,6 +79,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     correction_.clear();
     parting_.velocity.clear();
     points_.clear();
+    rests_.clear();
     touch_keys_.clear();
     roused_.clear();
     impact_needed_ = plastic_first_ = false;
@@ -230,7 +231,7 @@ OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) co
 void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double strike) {
     Point& point = points_.emplace_back();
     point.contact = contact;
-    point.material = combined(materials_[contact.first], materials_[contact.second]);
+    point.friction = material(contact).friction;
     point.first_arm = contact.point.position - first.position;
     point.second_arm = contact.point.position - second.position;
     point.tangent = world_tangent(contact.point.normal);
@@ -245,12 +246,12 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
 /// sees that. The slip's work is the same in both, so what is opposite to the slip on the disc dissipates most on the
 /// ellipse, and energy is only lost. A direction that stands askew on the surface counts less, by the square of its
 /// shadow; no residual is told too small, rows being stretched, never shrunk.
-void ContactStage::orient(Point& point, const Pose& first, const Pose& second) const {
+void ContactStage::orient(Point& point, const Pose& first, const Pose& second) {
     const Contact& contact = point.contact;
     const bool of_first = materials_[contact.first].is_oriented();
     const SurfaceMaterial& own = materials_[of_first ? contact.first : contact.second];
     const SurfaceMaterial& other = materials_[of_first ? contact.second : contact.first];
-    const double mu = point.material.friction;
+    const double mu = point.friction;
     if (!own.is_oriented() || !(mu > 0.0)) return;
     const Vec3 n = contact.point.normal, whole = (of_first ? first : second).rotation * own.direction;
     const Vec3 shadow = whole - dot(whole, n) * n;
@@ -260,9 +261,10 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) c
         point.tangent = point.tangent - dot(point.tangent, n) * n;
     }
     const double along = std::sqrt(across * across + (mu * mu - across * across) * length * length);
-    point.material.friction = std::min(along, across);
-    point.stretch[0] = along / point.material.friction;
-    point.stretch[1] = across / point.material.friction;
+    point.friction = std::min(along, across);
+    PointRest& rest = own_rest(point);
+    rest.stretch[0] = along / point.friction;
+    rest.stretch[1] = across / point.friction;
 }
 
 /// The overlap at which a pair counts as met, m. Bodies that sink while sweeps have not settled meet the sides of the next

@@ -307,15 +307,15 @@ void ContactStage::impact(MixedSystem& system) {
     returned.assign(who.size(), {});
     for (std::size_t j = 0; j < who.size(); ++j) {
         const Point& point = points_[who[j]];
-        RowBlock block = row_block(point, point.material.friction > 0.0 ? 3 : 1);
+        RowBlock block = row_block(point, point.friction > 0.0 ? 3 : 1);
         if (std::any_of(block.right.begin(), block.right.begin() + block.size,
                         [](double r) { return r != 0.0; }))
             pushed.push_back(hit.rows.size());
         block.right[0] += std::max(0.0, -point.bounce * point.approach);
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
         if (block.size == 3) {
-            friction.push_back({static_cast<int>(hit.rows.size()), point.material.friction, 0.0, -1.0});
-            friction.back().stretched = point.is_stretched();
+            friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
+            friction.back().stretched = rest(point).is_stretched();
             const double slip = point.bounce > 0.0 && is_blow(point)
                                     ? std::max(materials_[point.contact.first].tangential_restitution,
                                                materials_[point.contact.second].tangential_restitution)
@@ -369,7 +369,7 @@ void ContactStage::impact(MixedSystem& system) {
             impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
         }
         point.impact += normal;
-        point.impact_impulse += impulse;
+        own_rest(point).impact_impulse += impulse;
     }
     after_impact(system);
 }

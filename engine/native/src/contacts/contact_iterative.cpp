@@ -37,24 +37,23 @@ void ContactStage::hand_over() {
             for (const int body : {later.contact.first, later.contact.second})
                 if (later.measured < 0) ask_for(velocity_[body]), ask_for(kick_[body]);
         }
-        const PairMaterial& material = point.material;
+        const PairMaterial material = this->material(point.contact);
+        const PointRest& rest = this->rest(point);
         SweepContact row;
         row.first = unknown_[point.contact.first];
         row.second = unknown_[point.contact.second];
         row.normal = point.contact.point.normal;
-        row.tangent = point.stretch[0] * point.tangent;
-        row.across = point.stretch[1] * cross(row.normal, point.tangent);
-        row.stretched = point.is_stretched();
+        row.tangent = rest.stretch[0] * point.tangent;
+        row.across = rest.stretch[1] * cross(row.normal, point.tangent);
+        row.stretched = rest.is_stretched();
         row.first_arm = point.first_arm;
         row.second_arm = point.second_arm;
         row.softness = regularise(material.compliance, material.damping, h).softness;
         row.slip_softness = material.slip_compliance / h;
-        row.friction = material.friction;
+        row.friction = point.friction;
         row.normal_before = point.before;
         row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
-        for (int i = 0; i < 2; ++i)
-            row.impulse[i + 1] =
-                (point.solved ? point.tangents[i] : point.tangent_before[i]) / point.stretch[i];
+        for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangents[i] / rest.stretch[i];
         if (conveys_ || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, row.across};
             for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
@@ -125,7 +124,7 @@ void ContactStage::take_in(std::size_t known) {
         const auto old = touches_.begin() + (key - touch_keys_.begin());
         point.before = old->normal;
         point.pressed_before = old->pressed;
-        std::copy_n(old->tangent, 2, point.tangent_before);
+        std::copy_n(old->tangent, 2, point.tangents);
     }
     hand_over();
 }
@@ -227,7 +226,7 @@ void ContactStage::foresee(MixedSystem& system, std::size_t known, int round) {
         const double* impulse = sweeps_.impulse(static_cast<int>(k));
         point.solved = true;
         point.normal = impulse[0];
-        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * point.stretch[i];
+        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * rest(point).stretch[i];
     }
 }
 
@@ -312,8 +311,9 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
             for (double& z : impulse)
                 z *= share[std::max(unknown_[point.contact.first], unknown_[point.contact.second])];
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
+        const double* const stretch = rest(point).stretch;
         record(system, point, impulse[0],
-               (impulse[1] * point.stretch[0]) * point.tangent + (impulse[2] * point.stretch[1]) * across);
+               (impulse[1] * stretch[0]) * point.tangent + (impulse[2] * stretch[1]) * across);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;

@@ -178,7 +178,7 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
-        if (pushes[k] && (is_supplied(point.contact) || point.material.compliance > 0.0))
+        if (pushes[k] && (is_supplied(point.contact) || material(point.contact).compliance > 0.0))
             driven(unknown_[point.contact.first], unknown_[point.contact.second]);
     }
     std::vector<Vec6>& free = arrays_.free_velocity;

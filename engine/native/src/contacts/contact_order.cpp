@@ -63,7 +63,7 @@ void ContactStage::find_events() {
         if (struck[island] != 0 && struck[island] != pair) plain[island] = 0;
         struck[island] = pair;
         when[island] = point.strike;
-        bouncy[island] = bouncy[island] || point.material.restitution > 0.0;
+        bouncy[island] = bouncy[island] || material(point.contact).restitution > 0.0;
     }
     // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
     // others will: bodies led to an event's time would not be where such rows expect them. Nor are successive blows among
@@ -118,8 +118,9 @@ void ContactStage::order_points() {
         if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
         point.before = touches_[old].normal;
         point.pressed_before = touches_[old].pressed;
-        std::copy_n(touches_[old].tangent, 2, point.tangent_before);
-        std::copy_n(touches_[old].turning, 3, point.turning_before);
+        if (point.solved) continue;
+        std::copy_n(touches_[old].tangent, 2, point.tangents);
+        if (resists_turning_) std::copy_n(touches_[old].turning, 3, own_rest(point).turning);
     }
     ordered_ = points_.size();
 }
@@ -141,7 +142,7 @@ void ContactStage::measure_points() {
         const Contact& contact = point.contact;
         const double gap = contact.point.gap;
         measure(point);
-        const double psi = point.material.restitution, speed = -point.approach;
+        const double psi = material(contact).restitution, speed = -point.approach;
         point.bounce = -1.0;
         if (is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;

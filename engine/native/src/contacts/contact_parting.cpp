@@ -29,7 +29,7 @@ constexpr double same_place = 0.1;        // of the larger body's radius: one po
 
 /// How far a compliant contact is pressed in at the end of the step: where it was, and the way its bodies go.
 double ContactStage::pressed(const MixedSystem& system, const Point& point) const {
-    if (!(point.material.compliance > 0.0)) return 0.0;
+    if (!(material(point.contact).compliance > 0.0)) return 0.0;
     const Contact& contact = point.contact;
     double speed = 0.0;
     for (const int b : {contact.first, contact.second}) {

@@ -135,8 +135,9 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
     block.first = unknown_[contact.first];
     block.second = unknown_[contact.second];
     block.size = std::min(rows, 3);
-    const Vec3 directions[3] = {contact.point.normal, point.stretch[0] * point.tangent,
-                                point.stretch[1] * cross(contact.point.normal, point.tangent)};
+    const double* const stretch = rest(point).stretch;
+    const Vec3 directions[3] = {contact.point.normal, stretch[0] * point.tangent,
+                                stretch[1] * cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
@@ -168,14 +169,14 @@ void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
 
 /// The rows of a block that friction bounds.
 void ContactStage::add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const {
-    const PairMaterial& material = point.material;
+    const PairMaterial material = this->material(point.contact);
     const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
     double normal = point.before;
-    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? point.guessed : normal;
+    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? rest(point).guessed : normal;
     else if (point.solved) normal = point.normal;
-    if (material.friction > 0.0) {
-        friction.push_back({block, material.friction, soft, normal});
-        friction.back().stretched = point.is_stretched();
+    if (point.friction > 0.0) {
+        friction.push_back({block, point.friction, soft, normal});
+        friction.back().stretched = rest(point).is_stretched();
     }
     if (material.rolling > 0.0) friction.push_back({block, material.rolling / scale, 0.0, normal, 3, 2});
     if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
@@ -247,10 +248,11 @@ double ContactStage::resting_right(Point& point) const {
     if (point.event)  // another point of a pair that meets may still be open
         return -(touching ? 0.0 : gap / time_left(point));
     if (!touching) return -gap / h;
-    const Regularisation row = regularise(point.material.compliance, point.material.damping, h);
+    const PairMaterial material = this->material(point.contact);
+    const Regularisation row = regularise(material.compliance, material.damping, h);
     const double depth = -row.violation_gain * std::max(gap, -explained_depth(point));
     // A rigid contact that opens is not pushed after its own speed.
-    return point.material.compliance > 0.0 ? depth + row.upsilon * point.resting_approach() : depth;
+    return material.compliance > 0.0 ? depth + row.upsilon * point.resting_approach() : depth;
 }
 
 /// Whether a point is likely to push: what a solver starts from.
@@ -265,23 +267,21 @@ bool ContactStage::is_pressed(const Point& point) const noexcept {
 /// The resting row of a point; the tangents' bounds are left to the friction law.
 RowBlock ContactStage::resting_row(Point& point) const {
     const double h = options_.time_step;
-    const PairMaterial& material = point.material;
+    const PairMaterial material = this->material(point.contact);
     const bool turning = material.resists_turning();
-    RowBlock block = row_block(point, turning ? 6 : material.friction > 0.0 ? 3 : 1);
-    if (turning && !(material.friction > 0.0))
+    RowBlock block = row_block(point, turning ? 6 : point.friction > 0.0 ? 3 : 1);
+    if (turning && !(point.friction > 0.0))
         for (int i = 1; i <= 2; ++i) block.lower[i] = block.upper[i] = 0.0;
     block.right[0] += resting_right(point);
     block.softness[0] = regularise(material.compliance, material.damping, h).softness;
     block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
     block.multiplier[0] = point.solved ? point.normal : std::max(0.0, point.before);
-    if (material.friction > 0.0) {
+    const PointRest& rest = this->rest(point);
+    if (point.friction > 0.0) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
-        for (int i = 1; i <= 2; ++i)
-            block.multiplier[i] =
-                (point.solved ? point.tangents[i - 1] : point.tangent_before[i - 1]) / point.stretch[i - 1];
+        for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangents[i - 1] / rest.stretch[i - 1];
     }
-    for (int i = 3; i < block.size; ++i)
-        block.multiplier[i] = point.solved ? point.turning[i - 3] : point.turning_before[i - 3];
+    for (int i = 3; i < block.size; ++i) block.multiplier[i] = rest.turning[i - 3];
     return block;
 }
 
@@ -321,7 +321,9 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         report = run(system, friction, resting_solver_, options_.friction, late ? &answered : nullptr);
         report.rounds += before.rounds, report.sweeps += before.sweeps;
         report.converged = report.converged && before.converged;  // islands may have been left as they were
-        for (const FrictionPoint& point : friction) points_[point.block - joints].guessed = point.normal;
+        if (options_.friction == FrictionModel::box)
+            for (const FrictionPoint& point : friction)
+                own_rest(points_[point.block - joints]).guessed = point.normal;
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();
@@ -366,14 +368,14 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         Point& point = points_[k];
         const Vec3 along = read_back(system.rows[joints + k], point);
         Touch& touch = record(system, point, point.normal, along);
-        std::copy_n(point.turning, 3, touch.turning);
+        std::copy_n(rest(point).turning, 3, touch.turning);
     }
     if (report.finite) correct_events(system);
     return report.finite;
 }
 
 /// What a solve found for a point, along world tangents: it may have turned its own. Gives the impulse along the surface.
-Vec3 ContactStage::read_back(const RowBlock& block, Point& point) const {
+Vec3 ContactStage::read_back(const RowBlock& block, Point& point) {
     Vec3 along, turning;
     for (int i = 1; i < block.size; ++i) {
         const Vec6& row = block.first >= 0 ? block.first_jacobian[i] : block.second_jacobian[i];
@@ -387,9 +389,12 @@ Vec3 ContactStage::read_back(const RowBlock& block, Point& point) const {
     point.normal = block.multiplier[0];
     point.tangents[0] = dot(along, t);
     point.tangents[1] = dot(along, cross(n, t));
-    point.turning[0] = scale * dot(turning, t);
-    point.turning[1] = scale * dot(turning, cross(n, t));
-    point.turning[2] = scale * dot(turning, n);
+    if (block.size > 3) {
+        double* const own = own_rest(point).turning;
+        own[0] = scale * dot(turning, t);
+        own[1] = scale * dot(turning, cross(n, t));
+        own[2] = scale * dot(turning, n);
+    }
     return along;
 }
 
@@ -402,10 +407,10 @@ ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point
     touch.normal = normal;
     touch.pressed = pressed(system, point);
     touch.impact = point.impact;
-    touch.impulse = normal * n + along + point.impact_impulse;
+    touch.impulse = normal * n + along + rest(point).impact_impulse;
     touch.tangent[0] = dot(along, point.tangent);
     touch.tangent[1] = dot(along, cross(n, point.tangent));
-    touch.friction = point.stretch[0] * point.material.friction;
+    touch.friction = rest(point).stretch[0] * point.friction;
     touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
     return touch;
 }

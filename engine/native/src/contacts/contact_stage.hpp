@@ -247,7 +247,21 @@ private:
     void lie_as(const Memory& memory);
     void rouse(const Contact& contact);
     bool sleeps(int body) const noexcept { return asleep_[body] != 0; }
-    void orient(Point& point, const Pose& first, const Pose& second) const;
+    void orient(Point& point, const Pose& first, const Pose& second);
+    PairMaterial material(const Contact& contact) const noexcept {
+        return combined(materials_[contact.first], materials_[contact.second]);
+    }
+    const PointRest& rest(const Point& point) const noexcept {
+        static constexpr PointRest none{};
+        return point.rest < 0 ? none : rests_[point.rest];
+    }
+    PointRest& own_rest(Point& point) {
+        if (point.rest < 0) {
+            point.rest = static_cast<int>(rests_.size());
+            rests_.emplace_back();
+        }
+        return rests_[point.rest];
+    }
     void find_open();
     void find_open_again();
     bool is_blow(const Point& point) const noexcept;
@@ -326,7 +340,7 @@ private:
     RowBlock resting_row(Point& point) const;
     Touch& record(const MixedSystem& system, const Point& point, double normal, Vec3 along);
     double pressed(const MixedSystem& system, const Point& point) const;
-    Vec3 read_back(const RowBlock& block, Point& point) const;
+    Vec3 read_back(const RowBlock& block, Point& point);
     // contact_iterative.cpp: the same by sweeps over compact contacts
     bool solve_by_sweeps(MixedSystem& system, bool& left);
     void foresee(MixedSystem& system, std::size_t known, int round);
@@ -449,6 +463,7 @@ private:
     std::vector<double> clock_;  // of successive blows: up to when a body's way in the step is known, s
     std::vector<Vec6> way_;      // and that way, m and rad
     LargeArray<Point> points_, strikes_;
+    std::vector<PointRest> rests_;  // of points, in no order
     std::vector<std::pair<std::uint64_t, std::size_t>> places_, parted_places_;  // of points, by key
     std::vector<Touch> touches_;           // of the last step until the end of solve()
     std::vector<Touch> kept_;              // of sleepers

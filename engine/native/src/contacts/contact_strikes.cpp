@@ -175,7 +175,7 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
         const double push = std::max({std::abs(relative(point, contact.point.normal, kick_, false)),
                                       std::abs(dot(contact.point.normal, linear(kick_[contact.first]))),
                                       std::abs(dot(contact.point.normal, linear(kick_[contact.second])))});
-        if (late && !plastic_first_ && point.material.restitution > 0.0 && closing > 4.0 * push) {
+        if (late && !plastic_first_ && material(contact).restitution > 0.0 && closing > 4.0 * push) {
             late_blow_ = true;
             points_.pop_back();
             continue;

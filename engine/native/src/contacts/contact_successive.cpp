@@ -110,7 +110,7 @@ void ContactStage::find_earliest_blows(MixedSystem& system, std::vector<std::siz
     for (const std::size_t k : who) {
         Point& point = points_[k];
         point.approach = relative(point, point.contact.point.normal, velocity_, false);
-        if (point.event) point.bounce = point.material.restitution;
+        if (point.event) point.bounce = material(point.contact).restitution;
     }
 }
 
