@@ -20,6 +20,29 @@ template <class T> std::vector<T>& filled(std::vector<T>& array, std::size_t cou
     return array;
 }
 
+/// Sorts what has contacts by their keys; those of one key stay as they are. What comes first is in order already: the rest
+/// is sorted in `rest`, and merged with it from behind, so that of long items few are moved far.
+template <class Items>
+void order_by_key(Items& items, Items& rest, std::vector<std::pair<std::uint64_t, std::size_t>>& places) {
+    const auto key = [](const auto& item) { return item.contact.key; };
+    const auto end = std::is_sorted_until(items.begin(), items.end(), [&](const auto& a, const auto& b) {
+        return key(a) < key(b);
+    });
+    auto ordered = static_cast<std::size_t>(end - items.begin());
+    if (ordered == items.size()) return;
+    places.clear();
+    for (std::size_t k = ordered; k < items.size(); ++k) places.emplace_back(key(items[k]), k);
+    std::sort(places.begin(), places.end());
+    rest.clear();
+    rest.reserve(items.capacity());
+    for (const auto& [own, place] : places) rest.push_back(items[place]);
+    for (std::size_t left = rest.size(); left > 0;) {
+        const bool later = ordered == 0 || !(key(rest[left - 1]) < key(items[ordered - 1]));
+        items[ordered + left - 1] = later ? rest[left - 1] : items[ordered - 1];
+        --(later ? left : ordered);
+    }
+}
+
 /// Of an open pair, by its place; s.
 struct Meeting {
     std::size_t open;

@@ -99,19 +99,6 @@ bool ContactStage::find_more(bool over) {
     return true;
 }
 
-/// Touches by key; those of one key as they came.
-void ContactStage::order_touches() {
-    const auto in_order = [](const Touch& a, const Touch& b) { return a.contact.key < b.contact.key; };
-    if (std::is_sorted(touches_.begin(), touches_.end(), in_order)) return;
-    places_.clear();
-    for (std::size_t k = 0; k < touches_.size(); ++k) places_.emplace_back(touches_[k].contact.key, k);
-    std::sort(places_.begin(), places_.end());
-    unordered_.clear();
-    unordered_.reserve(touches_.capacity());
-    for (const auto& [key, place] : places_) unordered_.push_back(touches_[place]);
-    touches_.swap(unordered_);
-}
-
 /// Hands the points found since `known` to the sweeps, with what they did in the step before.
 void ContactStage::take_in(std::size_t known) {
     counters_.contacts += points_.size() - known;
@@ -319,7 +306,7 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
             if (unknown_[body] >= 0) held_[unknown_[body]] = 1;
     }
     if (report.finite) correct_events(system);
-    order_touches();
+    order_by_key(touches_, unordered_, places_);
     return report.finite;
 }
 

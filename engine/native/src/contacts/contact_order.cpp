@@ -102,16 +102,7 @@ void ContactStage::find_events() {
 
 /// Sorts the points by key and finds each one's predecessor in the step before.
 void ContactStage::order_points() {
-    const auto in_order = [](const Point& a, const Point& b) { return a.contact.key < b.contact.key; };
-    if (!std::is_sorted(points_.begin(), points_.end(), in_order)) {  // closed ones come so
-        places_.resize(points_.size());  // a point is long: sorted are their places, and each is moved once
-        for (std::size_t k = 0; k < points_.size(); ++k) places_[k] = {points_[k].contact.key, k};
-        std::sort(places_.begin(), places_.end());
-        strikes_.clear();
-        strikes_.reserve(points_.capacity());
-        for (const auto& [key, place] : places_) strikes_.push_back(points_[place]);
-        points_.swap(strikes_);
-    }
+    order_by_key(points_, strikes_, places_);
     std::size_t old = 0;
     for (Point& point : points_) {
         while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;

@@ -351,7 +351,6 @@ private:
         std::size_t largest = 0;          // points of one of those
     };
     const Unanswered& find_unanswered(std::size_t bodies, std::size_t known);
-    void order_touches();
     bool find_more(bool over);
     void take_in(std::size_t known);
     void note_sinking();
