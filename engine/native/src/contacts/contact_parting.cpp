@@ -1,6 +1,5 @@
 // The contact stage's last part: which bodies overlap where the step ends, and by which displacements they part.
 #include <algorithm>
-#include <functional>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
@@ -149,8 +148,7 @@ void ContactStage::note_far() {
 
 /// Pairs without points, near enough to what parts, or to who that pushes, to be pushed into each other: one neighbour
 /// after the other, `rings` of them.
-void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
-                               const std::function<double(int)>& moved) {
+void ContactStage::find_beside(const std::vector<Pose>& poses, double margin) {
     beside_.clear();
     seams_.clear();
     std::vector<char>& reached = arrays_.reached;  // in which round, from one on
@@ -160,7 +158,7 @@ void ContactStage::find_beside(const std::vector<Pose>& poses, double margin,
         if (reached[b] || unknown_[b] < 0) return;
         reached[b] = round;
         grown_.push_back(b);
-        search_[b] = std::max(search_[b], margin + moved(b));
+        search_[b] = std::max(search_[b], margin + way(b, poses));
     };
     grown_.clear();
     for (const Lap& lap : laps_)
@@ -272,17 +270,35 @@ void ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& pose
     lap.push = excess;
 }
 
-/// Points of the step's pairs, up to gaps of `margin`, with the bodies at `poses`, into laps_; their largest overlap that
-/// nothing explains. With no margin, pairs that have not moved against each other are left out.
-double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin, bool again) {
+/// How far some point of a body has gone in the step, m.
+double ContactStage::way(int b, const std::vector<Pose>& poses) const {
+    double turned = 0.0;
+    for (int i = 0; i < 9; ++i)
+        turned = std::max(turned, std::abs(poses[b].rotation.m[i] - poses_[b].rotation.m[i]));
+    return norm(poses[b].position - poses_[b].position) + (turned > 0.0 ? 3.0 * turned * radius(b) : 0.0);
+}
+
+/// Points of the step's pairs, up to gaps of `around` times their largest overlap that nothing explains, with the bodies at
+/// `poses`, into laps_; that overlap. None of them if there is no overlap. Balls have the same points however near one
+/// looks, and are looked at once: as near as the last step lets expect.
+double ContactStage::find_overlaps(const std::vector<Pose>& poses, bool again) {
+    const double expected = swings_ || !asleep_.empty() ? 0.0 : 2.0 * around * expected_overlap_;
+    double deepest = look_for_overlaps(poses, expected, again);
+    if (again) deepest = std::max(deepest, find_overlaps_beside(poses, 0.0));
+    expected_overlap_ = deepest;
+    if (!(deepest > 0.0)) return deepest;
+    const double margin = around * deepest;
+    if (margin > expected) look_for_overlaps(poses, margin, again);
+    else std::erase_if(laps_, [margin](const Lap& lap) { return lap.contact.point.gap > margin; });
+    if (!again) find_beside(poses, margin);
+    find_overlaps_beside(poses, margin);
+    return deepest;
+}
+
+/// The same up to gaps of `margin`; without one, only the overlap. It does not count pairs that have not moved against each
+/// other and did not overlap before.
+double ContactStage::look_for_overlaps(const std::vector<Pose>& poses, double margin, bool again) {
     laps_.clear();
-    const std::vector<double>& radius = detection_.radius();
-    const auto moved = [&](int b) {
-        double turned = 0.0;
-        for (int i = 0; i < 9; ++i)
-            turned = std::max(turned, std::abs(poses[b].rotation.m[i] - poses_[b].rotation.m[i]));
-        return norm(poses[b].position - poses_[b].position) + (turned > 0.0 ? 3.0 * turned * radius[b] : 0.0);
-    };
     double deepest = 0.0;
     unsigned seen = 0;
     for (std::size_t from = 0, end = 0; from < touches_.size(); from = end) {
@@ -300,7 +316,8 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             for (const int body : {later.first, later.second}) ask_for(poses[body]), ask_for(poses_[body]);
         }
         if (!is_looked_at(a, b)) continue;
-        if (margin == 0.0 && !overlapped && moved(a) + moved(b) < 0.1 * rounding) continue;
+        const auto is_still = [&] { return !overlapped && way(a, poses) + way(b, poses) < 0.1 * rounding; };
+        if (margin == 0.0 && is_still()) continue;
         if (++seen % pairs_a_look == 0) Watch::look();
         scratch_.clear();
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
@@ -313,12 +330,10 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, double margin
             double excess = -contact.point.gap - pressed - rounding;
             if (again && excess > 0.0 && given_.contains(key))
                 excess = std::max(0.0, excess - given_.at(key));
-            deepest = std::max(deepest, excess);
+            if (excess > deepest && (margin == 0.0 || !is_still())) deepest = excess;
             if (margin > 0.0) add_lap(contact, poses, excess);
         }
     }
-    if (!again && margin > 0.0) find_beside(poses, margin, std::cref(moved));
-    if (again || margin > 0.0) deepest = std::max(deepest, find_overlaps_beside(poses, margin));
     return deepest;
 }
 
@@ -364,13 +379,12 @@ bool ContactStage::part(const MixedSystem& system, std::size_t joints, const std
     if (again && !far_) return false;
     if (again) std::swap(laps_, parted_);
     else looked_at_.clear();
-    parting_.deepest = find_overlaps(poses, 0.0, again);
+    parting_.deepest = find_overlaps(poses, again);
     if (!(parting_.deepest > 0.0)) {
         if (!again) given_.clear();
         return false;
     }
     if (!again) ++counters_.corrections;
-    find_overlaps(poses, around * parting_.deepest, again);
     const bool fresh = again && keep_parted(poses);
     if (again && !fresh && !(parting_.deepest < 0.5 * last)) return false;
     MixedSystem& parting = parting_system_;

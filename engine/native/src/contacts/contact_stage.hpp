@@ -368,9 +368,11 @@ private:
     // contact_parting.cpp
     void find_given();
     void note_given();
-    void find_beside(const std::vector<Pose>& poses, double margin, const std::function<double(int)>& moved);
+    double way(int body, const std::vector<Pose>& poses) const;
+    void find_beside(const std::vector<Pose>& poses, double margin);
     void add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
-    double find_overlaps(const std::vector<Pose>& poses, double margin, bool again);
+    double find_overlaps(const std::vector<Pose>& poses, bool again);
+    double look_for_overlaps(const std::vector<Pose>& poses, double margin, bool again);
     double find_overlaps_beside(const std::vector<Pose>& poses, double margin);
     bool keep_parted(const std::vector<Pose>& poses);
     bool parts_far(const Lap& lap) const noexcept;
@@ -415,6 +417,7 @@ private:
     Parting parting_;
     std::vector<char> yielding_;
     std::vector<double> gives_;      // of contacts of jointed bodies, see find_gives(), 1/kg
+    double expected_overlap_ = 0.0;  // of the last step: how near to look at balls, no more
     LargeArray<Lap> laps_, parted_;  // points of the step's pairs where it ends; of all its partings
     std::vector<Pose> lap_poses_;    // where bodies were at the last of them
     bool far_ = false;               // the last may not have been enough, see parts_far()
