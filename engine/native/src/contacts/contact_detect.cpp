@@ -122,6 +122,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
 /// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
 void ContactStage::find_open() {
     open_.clear();
+    met_ = 0;
     look_at(detection_.near(poses_, search_));
 }
 

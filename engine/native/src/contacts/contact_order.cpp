@@ -76,6 +76,7 @@ void ContactStage::find_events() {
     }
     const auto island = [&](int b) { return unknown_[b] >= 0 ? root(b) : b; };
     for (const OpenPair& open : open_) {
+        if (open.has_met()) continue;
         const int a = island(open.first), b = island(open.second);
         if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
         plain[a] = plain[a] && bouncy[a] && !successive;

@@ -441,6 +441,7 @@ private:
         changed_at_;  // when a body got others of the first two, counted by changes_ in this step
     int changes_ = 0;
     LargeArray<OpenPair> open_;
+    int met_ = 0;                         // of them
     std::vector<IndexPair> open_bodies_;  // of each, to look through many that nobody moved; empty: not yet
     std::vector<Separation> apart_;       // of pairs, found on several threads
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
 constexpr double other_side = 0.5;        // the same
+constexpr double most_met = 0.1;          // of the open pairs: more are not carried along
 
 }  // namespace
 
@@ -49,7 +50,9 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
     for (auto& meetings : meetings_) meetings.clear();
     if (swings_ && !open_.empty()) index_points();
-    if (open_bodies_.size() != open_.size()) {
+    if (open_bodies_.size() != open_.size() || met_ > most_met * static_cast<double>(open_.size())) {
+        std::erase_if(open_, [](const OpenPair& open) { return open.has_met(); });
+        met_ = 0;
         open_bodies_.clear();
         for (const OpenPair& open : open_) open_bodies_.emplace_back(open.first, open.second);
     }
@@ -65,7 +68,8 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         const std::size_t all = std::exchange(count, 0);
         for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
             asked[count] = asked[at];
-            count += !passes(open_[asked[at]], velocity);
+            const OpenPair& open = open_[asked[at]];
+            count += !open.has_met() && !passes(open, velocity);
         }
         for (std::size_t at = 0; at < count; ++at) {
             if (at + ahead < count) {
@@ -109,10 +113,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         open.first = -1;
         ++found;
     }
-    if (found > 0) {
-        std::erase_if(open_, [](const OpenPair& open) { return open.first < 0; });
-        open_bodies_.clear();
-    }
+    met_ += found;
     return found;
 }
 

@@ -69,7 +69,8 @@ void ContactStage::find_earliest_blows(MixedSystem& system, std::vector<std::siz
     for (const RowBlock& block : system.rows) arrays_.hanging.tie(block);
     for (const Point& point : points_)
         arrays_.hanging.tie(unknown_[point.contact.first], unknown_[point.contact.second]);
-    for (const OpenPair& open : open_) arrays_.hanging.tie(unknown_[open.first], unknown_[open.second]);
+    for (const OpenPair& open : open_)
+        if (!open.has_met()) arrays_.hanging.tie(unknown_[open.first], unknown_[open.second]);
     const Islands& islands = arrays_.hanging.find();
     const auto is_blow = [](const Point& point) {
         return point.bounce >= 0.0 && point.approach < -point.rounding;

@@ -47,9 +47,10 @@ struct PointRest {
 /// Two that are apart at the start of the step; they may still meet.
 struct OpenPair {
     IndexPair pair;
-    int first, second;  // bodies
+    int first, second;  // bodies; the first is negative once they have met: they have points then
     Separation apart;
     double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
+    bool has_met() const noexcept { return first < 0; }
 };
 
 }  // namespace spook
