@@ -36,7 +36,6 @@ void ContactStage::note_pressing(Point& point) {
                  least = pressed_by * (norm(linear(kick_[a])) + norm(linear(kick_[b])));
     point.approach = relative(point, n, velocity_, false);
     point.push = first + second;
-    point.measured = changes_;
     const auto presses = [&](double push) { return push < -least && point.approach + push < 0.0; };
     const bool both = unknown_[a] >= 0 && unknown_[b] >= 0 && presses(first + second);
     pressing_.push_back({a, b, both || presses(first), both || presses(second), both});
@@ -82,7 +81,6 @@ void ContactStage::let_go(int body, const Vec6& velocity) {
     const Vec3 kick = linear(kick_[body]), before = linear(velocity_[body]);
     if (is_along(kick, before) || !is_along(kick, linear(velocity) - before)) return;
     supported_[body] = 0;
-    changed_at_[body] = ++changes_;
     lead_[body] = event_time_[body] / options_.time_step;
     for (int i = 0; i < 6; ++i) carried_kick_[body][i] = lead_[body] * kick_[body][i];
     for (double& k : kick_[body]) k *= 1.0 - lead_[body];

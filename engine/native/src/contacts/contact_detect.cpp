@@ -59,7 +59,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     if (team_) team_->refresh();
     poses_ = poses;
     velocity_ = velocity;
-    changed_at_.assign(bodies, changes_ = 0);
     kick_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b) {
         kick_[b] = sum(free_velocity[b], velocity[b], -1.0);

@@ -380,7 +380,6 @@ void ContactStage::after_impact(const MixedSystem& system) {
         if (unknown_[b] >= 0 && held_[unknown_[b]]) {
             let_go(static_cast<int>(b), system.velocity[unknown_[b]]);
             velocity_[b] = system.velocity[unknown_[b]];
-            changed_at_[b] = ++changes_;
         }
     std::vector<Vec6>& next = arrays_.blow.next = velocity_;
     for (std::size_t b = 0; b < next.size(); ++b)

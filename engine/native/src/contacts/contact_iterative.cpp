@@ -32,10 +32,8 @@ void ContactStage::hand_over() {
     for (; handed_over_ < points_.size(); ++handed_over_) {
         Point& point = points_[handed_over_];
         if (handed_over_ + ahead < points_.size()) {
-            sweeps_.expect(handed_over_ + ahead);
-            const Point& later = points_[handed_over_ + ahead];
-            for (const int body : {later.contact.first, later.contact.second})
-                if (later.measured < 0) ask_for(velocity_[body]), ask_for(kick_[body]);
+            const Contact& later = points_[handed_over_ + ahead].contact;
+            for (const int body : {later.first, later.second}) ask_for(velocity_[body]), ask_for(kick_[body]);
         }
         const PairMaterial material = this->material(point.contact);
         const PointRest& rest = this->rest(point);

@@ -88,7 +88,6 @@ void ContactStage::find_events() {
         if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
         if (climbing[island] > may_climb[island]) continue;
         event_time_[b] = when[island];
-        changed_at_[b] = ++changes_;
         if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
         velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);
         for (double& k : kick_[b]) k *= 1.0 - lead_[b];
@@ -117,13 +116,10 @@ void ContactStage::order_points() {
     ordered_ = points_.size();
 }
 
-/// Approach and push, from the current velocities: found once for all who ask.
+/// Approach and push, from the current velocities.
 void ContactStage::measure(Point& point) const {
-    if (std::max(changed_at_[point.contact.first], changed_at_[point.contact.second]) <= point.measured)
-        return;
     point.approach = relative(point, point.contact.point.normal, velocity_, false);
     point.push = relative(point, point.contact.point.normal, kick_, false);
-    point.measured = changes_;
 }
 
 /// Approach, push and part in the impact of every point, from the current velocities.

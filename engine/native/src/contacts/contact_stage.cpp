@@ -287,10 +287,7 @@ RowBlock ContactStage::resting_row(Point& point) const {
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
-    for (std::size_t b = 0; b < velocity.size(); ++b) {
-        if (velocity_[b] != velocity[b]) changed_at_[b] = ++changes_;
-        velocity_[b] = velocity[b];
-    }
+    velocity_ = velocity;
     foreseen_ = ends_passed_ = ran_away_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) {
         bool left = false;

@@ -437,9 +437,6 @@ private:
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
-    std::vector<int>
-        changed_at_;  // when a body got others of the first two, counted by changes_ in this step
-    int changes_ = 0;
     LargeArray<OpenPair> open_;
     int met_ = 0;                         // of them
     std::vector<IndexPair> open_bodies_;  // of each, to look through many that nobody moved; empty: not yet

@@ -55,7 +55,6 @@ void ContactStage::lead_forces(std::size_t b, MixedSystem& system) {
     lead_[b] = lead;
     const Vec6 more = sum(Vec6{}, kick_[b], part);
     velocity_[b] = sum(velocity_[b], more);
-    changed_at_[b] = ++changes_;
     for (double& k : kick_[b]) k *= 1.0 - part;
     const Mat6& mass = system.mass[unknown_[b]];
     for (int i = 0; i < 6; ++i)

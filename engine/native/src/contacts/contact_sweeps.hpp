@@ -53,11 +53,6 @@ public:
     void arrange();
     /// Adds a contact; its index counts from 0. What was not announced is kept in the order it was given.
     int add(const SweepContact& contact);
-    /// Of an announced contact: add() will bring it soon.
-    void expect(std::size_t contact) const noexcept {
-        ask_for(contacts_[place_[contact]]);
-        if (place_[contact] < static_cast<int>(slips_.size())) ask_for(slips_[place_[contact]]);
-    }
 
     /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
     /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep, and with true when all is done: it may

@@ -18,7 +18,6 @@ struct StepPoint {
     double begun = 0.0;              // gap along its normal with both bodies where the step began, m
     double approach = 0.0;           // C v, m/s, negative when closing
     double push = 0.0;               // C (free velocity − v), m/s, negative when pressed together
-    int measured = -1;               // when these were found, see ContactStage::measure()
     int rest = -1;                   // the place of its PointRest, −1 if it has none
     bool event = false;              // acts at the time of its strike, not at the start of the step
     bool at_start = false;           // a strike with the point of the step's start already
