@@ -79,7 +79,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     parting_.velocity.clear();
     points_.clear();
     rests_.clear();
-    touch_keys_.clear();
     roused_.clear();
     impact_needed_ = plastic_first_ = false;
     settling_ = ran_away_ = false;  // of a step that was taken back, or is over

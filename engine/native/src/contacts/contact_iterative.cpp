@@ -100,13 +100,12 @@ bool ContactStage::find_more(bool over) {
 /// Hands the points found since `known` to the sweeps, with what they did in the step before.
 void ContactStage::take_in(std::size_t known) {
     counters_.contacts += points_.size() - known;
-    if (touch_keys_.size() != touches_.size())
-        for (const Touch& touch : touches_) touch_keys_.push_back(touch.contact.key);
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];
-        const auto key = std::lower_bound(touch_keys_.begin(), touch_keys_.end(), point.contact.key);
-        if (key == touch_keys_.end() || *key != point.contact.key) continue;
-        const auto old = touches_.begin() + (key - touch_keys_.begin());
+        const auto old =
+            std::lower_bound(touches_.begin(), touches_.end(), point.contact.key,
+                             [](const Touch& t, std::uint64_t key) { return t.contact.key < key; });
+        if (old == touches_.end() || old->contact.key != point.contact.key) continue;
         point.before = old->normal;
         point.pressed_before = old->pressed;
         std::copy_n(old->tangent, 2, point.tangents);
@@ -287,7 +286,6 @@ bool ContactStage::solve_by_sweeps(MixedSystem& system, bool& left) {
     for (std::size_t b = 0; b < unknown_.size(); ++b)
         if (unknown_[b] >= 0 && event_time_[b] >= 0.0) held_[unknown_[b]] = 1;
     touches_.clear();
-    touch_keys_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         double impulse[3];

@@ -360,7 +360,6 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     }
 
     touches_.clear();
-    touch_keys_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         Point& point = points_[k];
         const Vec3 along = read_back(system.rows[joints + k], point);

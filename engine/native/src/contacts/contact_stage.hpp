@@ -431,7 +431,6 @@ private:
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
     Unanswered unanswered_;
     std::vector<Touch> unordered_;
-    std::vector<std::uint64_t> touch_keys_;  // of touches_, once they are searched
     LargeArray<OpenPair> merged_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
