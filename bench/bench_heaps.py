@@ -43,7 +43,7 @@ TIME_STEP = 1.0 / 60.0  # s
 GRAVITY = 9.81  # m/s²
 ROUGH = Material(friction=0.5)
 GROUND = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
-GROWTH = 1.2  # × the cost per contact of 1000, for 10 000: what is asked; 1.15 where the caches are our own
+GROWTH = 1.2  # × the cost per contact of 1000, for 10 000: what is asked
 WIDER = 1.6  # the same for other sizes: what sorting pairs and leaving the cache may cost
 REST = 0.5  # × one step of a stack that is hit: at rest no matrix is factored
 OFTEN = 0.25  # of the steps of knocked stacks may have an answer that is near only,

@@ -25,9 +25,8 @@ template <class T> std::vector<T>& filled(std::vector<T>& array, std::size_t cou
 template <class Items>
 void order_by_key(Items& items, Items& rest, std::vector<std::pair<std::uint64_t, std::size_t>>& places) {
     const auto key = [](const auto& item) { return item.contact.key; };
-    const auto end = std::is_sorted_until(items.begin(), items.end(), [&](const auto& a, const auto& b) {
-        return key(a) < key(b);
-    });
+    const auto end = std::is_sorted_until(items.begin(), items.end(),
+                                          [&](const auto& a, const auto& b) { return key(a) < key(b); });
     auto ordered = static_cast<std::size_t>(end - items.begin());
     if (ordered == items.size()) return;
     places.clear();

@@ -462,7 +462,7 @@ private:
     std::vector<double> clock_;  // of successive blows: up to when a body's way in the step is known, s
     std::vector<Vec6> way_;      // and that way, m and rad
     LargeArray<Point> points_, strikes_;
-    std::vector<PointRest> rests_;  // of points, in no order
+    std::vector<PointRest> rests_;                                               // of points, in no order
     std::vector<std::pair<std::uint64_t, std::size_t>> places_, parted_places_;  // of points, by key
     std::vector<Touch> touches_;           // of the last step until the end of solve()
     std::vector<Touch> kept_;              // of sleepers

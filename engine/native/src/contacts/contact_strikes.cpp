@@ -135,24 +135,25 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool struck, bool reboun
     return true;
 }
 
-/// What add_strike() and take_back_strikes() make of two balls, or of a ball and a plane, without a point at their meeting:
-/// half of the contacts of a heap that moves come so. False if they may rebound, or were led to an event, or if the point
-/// of the step's start does not stop them.
+/// What add_strike() and take_back_strikes() make of spheres and planes without a point at their meeting: half of the
+/// contacts of a heap that moves come so. False if they may rebound, if another side of what does not move by itself may be
+/// met than is faced at the start, or if the point of the start does not stop them.
 bool ContactStage::add_strike_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity) {
-    const int bodies[2] = {open.first, open.second};
-    if (std::min(unknown_[open.first], unknown_[open.second]) < 0 && ball_[open.first] && ball_[open.second])
-        return false;  // it may face another side of the one that stands still
+    bool elsewhere = std::min(unknown_[open.first], unknown_[open.second]) < 0;
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection_.collider(collider);
-        const bool flat = own.shape.kind == ShapeKind::plane && angular(velocity[own.body]) == Vec3{};
-        if ((!flat && ball_[own.body] == 0) || event_time_[own.body] >= 0.0) return false;
+        const bool flat = own.shape.kind == ShapeKind::plane;
+        if (!flat && own.shape.kind != ShapeKind::sphere) return false;
         if (!plastic_first_ && materials_[own.body].restitution > 0.0) return false;
+        if (flat && angular(velocity[own.body]) == Vec3{}) elsewhere = false;
     }
+    if (elsewhere) return false;
+    const int a = open.first, b = open.second;
     scratch_.clear();
-    detection_.touch(open.pair, search_[bodies[0]] + search_[bodies[1]], scratch_);
-    if (scratch_.size() != 1) return false;
+    detection_.touch(open.pair, search_[a] + search_[b], scratch_);
+    if (scratch_.empty()) return false;
     const Contact& contact = scratch_.front();
-    add_point(contact, poses_[bodies[0]], poses_[bodies[1]], time);
+    add_point(contact, poses_[a], poses_[b], time);
     const double closing = relative(points_.back(), contact.point.normal, velocity, false);
     const bool stops = contact.point.gap + options_.time_step * closing < 0.0;
     if (stops) points_.back().at_start = true;
