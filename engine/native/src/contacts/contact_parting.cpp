@@ -261,7 +261,6 @@ bool ContactStage::keep_parted(const std::vector<Pose>& poses) {
 }
 
 void ContactStage::add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess) {
-    if (!asleep_.empty()) rouse(contact);
     Lap& lap = laps_.emplace_back();
     lap.contact = contact;
     lap.damping = std::max(materials_[contact.first].damping, materials_[contact.second].damping);
@@ -282,7 +281,7 @@ double ContactStage::way(int b, const std::vector<Pose>& poses) const {
 /// `poses`, into laps_; that overlap. None of them if there is no overlap. Balls have the same points however near one
 /// looks, and are looked at once: as near as the last step lets expect.
 double ContactStage::find_overlaps(const std::vector<Pose>& poses, bool again) {
-    const double expected = swings_ || !asleep_.empty() ? 0.0 : 2.0 * around * expected_overlap_;
+    const double expected = swings_ ? 0.0 : 2.0 * around * expected_overlap_;
     double deepest = look_for_overlaps(poses, expected, again);
     if (again) deepest = std::max(deepest, find_overlaps_beside(poses, 0.0));
     expected_overlap_ = deepest;
@@ -292,6 +291,8 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, bool again) {
     else std::erase_if(laps_, [margin](const Lap& lap) { return lap.contact.point.gap > margin; });
     if (!again) find_beside(poses, margin);
     find_overlaps_beside(poses, margin);
+    if (!asleep_.empty())
+        for (const Lap& lap : laps_) rouse(lap.contact);
     return deepest;
 }
 
