@@ -143,3 +143,11 @@ def test_who_comes_down_on_another_is_no_slider_at_its_side(seed: int, restituti
     friction = 0.0 if seed == 91 else 0.4
     fall = falling_pile.read(simulate, seed, restitution, friction, falling_pile.SWEEPS)
     assert (fall.depth - fall.bent).max() < 1e-7
+
+
+@pytest.mark.parametrize("seed", [46, 61, 146, 233, 234, 256])
+def test_who_is_let_past_a_side_on_the_way_is_met_if_he_comes_there(seed: int) -> None:
+    """Between sweeps he was taken for one that slides by, as fast as he still fell; his velocity was the one that they ended
+    with, and nobody asked again: he came to lie 3 to 80 mm in the other."""
+    fall = falling_pile.read(simulate, seed, 0.0, 0.0, falling_pile.SWEEPS)
+    assert (fall.depth - fall.bent).max() < 1e-7

@@ -76,14 +76,16 @@ void ContactStage::note_sinking() {
 
 /// Pairs that meet because of what the sweeps have found so far get rows in the same solve.
 bool ContactStage::find_more(bool over) {
-    settling_ = !over;
     const bool first = next_.empty();  // look of this step
     if (first) next_ = velocity_;
-    changed_.assign(unknown_.size(), first);
+    // On the way bodies are let past the sides of others that they do meet in the end, and need not have changed since.
+    const bool was_settling = std::exchange(settling_, !over);
+    const bool all = first || (was_settling && over && swings_);
+    changed_.assign(unknown_.size(), all);
     sweeps_.visit_moved([&](int moving) {
         const int b = body_of_[moving];
         const Vec6& now = sweeps_.velocity(moving);
-        changed_[b] = first || next_[b] != now;
+        changed_[b] = all || next_[b] != now;
         next_[b] = now;
     });
     if (outrun(next_)) find_open_again();
