@@ -183,16 +183,20 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     }
     std::vector<Vec6>& free = arrays_.free_velocity;
     free = system.momentum;
+    share_out(team_.get(), bodies, many_bodies, [&](int, std::size_t begin, std::size_t end) {
+        for (std::size_t u = begin; u < end; ++u)
+            if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
+    });
     for (std::size_t b = 0; b < unknown_.size(); ++b) {
         const int u = unknown_[b];
         if (u < 0 || islands.of_body[u] < 0) continue;
-        solve_six(factor_six(system.mass[u]), free[u]);
         const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
                    kick = sum(free[u], velocity_[b], -1.0);
         EnergySums& own = sums[islands.of_body[u]];
         for (int i = 0; i < 6; ++i)
             for (int j = 0; j < 6; ++j) {
                 const double m = system.mass[u][6 * i + j];
+                if (m == 0.0) continue;
                 own.square += 0.5 * m * by_contacts[i] * by_contacts[j];
                 own.linear += m * by_contacts[i] * velocity_[b][j];
                 own.fall += 0.5 * m * kick[i] * kick[j];
