@@ -257,7 +257,7 @@ def threaded(count: int, steps: int) -> bool:
         ]
         walls = [math.inf, math.inf]
         ends: list[dict[str, bytes]] = [{}, {}]
-        for _ in range(4):  # side by side: what slows the machine down for a while slows both
+        for _ in range(6):  # side by side: what slows the machine down for a while slows both
             for k, program in enumerate(programs):
                 begin = time.perf_counter()
                 result = program.run(steps)
