@@ -77,21 +77,30 @@ def loose(tiles: list[RigidBody], mass: float) -> list[RigidBody]:
     return [ground, *(replace(tile, motion="dynamic", mass=mass) for tile in tiles)]
 
 
+def slider_at(
+    slider: str, y: float, velocity: tuple[float, float, float], lift: float = 0.0, spin: float = 0.0
+) -> RigidBody:
+    """A slider of 1 kg, `lift` [m] above the floor."""
+    shape, z, orientation = SLIDERS[slider]
+    return RigidBody(
+        name="slider",
+        mass=1.0,
+        shape=shape,
+        position=(0.0, y, z + lift),
+        orientation=orientation,
+        velocity=velocity,
+        angular_velocity=(0.0, 0.0, spin),
+    )
+
+
 def slide(
     slider: str, heading: float, y: float, h: float, method: Method, duration: float = 0.9, mass: float = 0.0
 ) -> tuple[float, float]:
     """The largest change of a velocity [m/s, rad/s] and of the height [m] at 5 m/s without friction; over tiles that
     stand still, or of `mass` [kg]."""
-    shape, z, orientation = SLIDERS[slider]
+    z = SLIDERS[slider][1]
     velocity = (5.0 * math.cos(heading), 5.0 * math.sin(heading), 0.0)
-    body = RigidBody(
-        name="slider",
-        mass=1.0,
-        shape=shape,
-        position=(0.0, y, z),
-        orientation=orientation,
-        velocity=velocity,
-    )
+    body = slider_at(slider, y, velocity)
     seen = {
         "v": Trace(quantity=Velocity("slider")),
         "w": Trace(quantity=AngularVelocity("slider")),
@@ -157,17 +166,8 @@ def test_who_sinks_before_sweeps_hold_him_meets_no_edge(
 ) -> None:
     """On the way to an answer bodies fall further, and rock, than settled sweeps let them: at the side of a tile that was
     1.9 to 4.7 m/s. What settled sweeps may leave is a tenth."""
-    shape, z, orientation = SLIDERS[slider]
     velocity = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
-    body = RigidBody(
-        name="slider",
-        mass=1.0,
-        shape=shape,
-        position=(0.0, y, z),
-        orientation=orientation,
-        velocity=velocity,
-        angular_velocity=(0.0, 0.0, spin),
-    )
+    body = slider_at(slider, y, velocity, spin=spin)
     result = simulate(
         Scene(bodies=(*floor(size=size), body), gravity=GRAVITY),
         time_step=h,
@@ -210,7 +210,6 @@ def test_sweeps_over_tiles_that_can_move_meet_no_edge(
 @pytest.mark.parametrize("slider", ["box", "cylinder", "pyramid"])
 def test_sweeps_over_tiles_that_can_move_meet_an_edge_that_stands_out(slider: str, sweeps: int) -> None:
     """Settled sweeps may leave .1 m/s, which leads 1.7 mm in a step: an edge far lower than that is no fall, and is met."""
-    shape, z, orientation = SLIDERS[slider]
     high = 1e-4
     tiles = [
         replace(tile, shape=Box((1.0, 1.0, 0.5 + high)), position=(2.0, tile.position[1], -0.25 + 0.5 * high))
@@ -218,14 +217,7 @@ def test_sweeps_over_tiles_that_can_move_meet_an_edge_that_stands_out(slider: st
         else tile
         for tile in floor()
     ]
-    body = RigidBody(
-        name="slider",
-        mass=1.0,
-        shape=shape,
-        position=(0, 0.03, z),
-        orientation=orientation,
-        velocity=(5.0, 0, 0),
-    )
+    body = slider_at(slider, 0.03, (5.0, 0.0, 0.0))
     result = simulate(
         Scene(bodies=(*loose(tiles, 1000.0), body), gravity=GRAVITY),
         time_step=1 / 60,
@@ -248,15 +240,7 @@ def test_tiles_that_can_move_are_one_floor(solver: str) -> None:
 @pytest.mark.parametrize("slider", ["box", "cylinder", "pyramid"])
 def test_an_edge_that_stands_out_is_met(slider: str, solver: str) -> None:
     """The same slide where the third row is 5 mm higher: nobody goes on as if it were not there."""
-    shape, z, orientation = SLIDERS[slider]
-    body = RigidBody(
-        name="slider",
-        mass=1.0,
-        shape=shape,
-        position=(0, 0.03, z),
-        orientation=orientation,
-        velocity=(5.0, 0, 0),
-    )
+    body = slider_at(slider, 0.03, (5.0, 0.0, 0.0))
     scene = Scene(bodies=(*floor(raised=0.005), body), gravity=GRAVITY)
     result = simulate(
         scene,
@@ -340,7 +324,7 @@ def test_who_falls_onto_tiles_lands_on_their_plane(
     """Swept to the end of the step it would be through the first tile, and at the side of the next: one landing in ten was
     a blow against that side, and one in five that rebounded. Settled sweeps may leave a tenth of a metre per second."""
     rng = np.random.default_rng(7)
-    shape, z, orientation = SLIDERS[slider]
+    z = SLIDERS[slider][1]
     for _ in range(12):
         h, drop = float(rng.choice((1 / 60, 1 / 240))), float(rng.choice((1e-3, 0.01, 0.1, 0.3)))
         heading, speed, y = (
@@ -349,14 +333,7 @@ def test_who_falls_onto_tiles_lands_on_their_plane(
             float(rng.uniform(-3, 0)),
         )
         velocity = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
-        body = RigidBody(
-            name="slider",
-            mass=1.0,
-            shape=shape,
-            position=(0.0, y, z + drop),
-            orientation=orientation,
-            velocity=velocity,
-        )
+        body = slider_at(slider, y, velocity, lift=drop)
         seen = {"v": Trace(quantity=Velocity("slider")), "x": Trace(quantity=Position("slider"))}
         result = simulate(
             Scene(
