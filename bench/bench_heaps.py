@@ -273,11 +273,11 @@ def threaded(count: int, steps: int) -> bool:
 
 
 def huge(count: int, steps: int) -> bool:
-    """A heap that is out of reach of a night: the whole fall by twenty sweeps a step, settled and within OVERLAP."""
+    """A heap that is out of reach of a night: the whole fall by ten sweeps a step, settled and within OVERLAP."""
     print(
-        f"{count} spheres, 20 sweeps, {steps} steps: CPU a step, overlap, contacts and load / weight at the end"
+        f"{count} spheres, 10 sweeps, {steps} steps: CPU a step, overlap, contacts and load / weight at the end"
     )
-    cost, result = run(heap(count), steps, Method(solver="iterative", iterations=20))
+    cost, result = run(heap(count), steps, Method(solver="iterative", iterations=10))
     line(f"{count} bodies", cost, result, count)
     print(f"    {steps * cost:.0f} s of CPU in all, residual at most {result.residual:.3g} m/s")
     if not result.completed:

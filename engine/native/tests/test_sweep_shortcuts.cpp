@@ -464,6 +464,19 @@ void over_relaxation_gets_there_sooner() {
     EXPECT(off_after(20'000, 1.25) < 1e-12);
 }
 
+/// One row alone, over-relaxed, swings about its answer; the last two of four sweeps are plain, and end on it.
+void what_over_relaxed_sweeps_push_too_far_comes_back() {
+    MixedSystem system = resting(1);
+    ContactSweeps other, parting;
+    other.start(system, FrictionModel::cone);
+    parting.start_beside(other, system, FrictionModel::cone, 1.25);
+    SweepContact contact = between(0, -1, {0, 0, 1}, 0.0);
+    contact.right[0] = 0.1;
+    parting.add(contact);
+    parting.run(4, 0.0, 0.0, nothing_more);
+    EXPECT(std::abs(parting.velocity(0)[2] - 0.1) < 1e-15);
+}
+
 }  // namespace
 
 int main() {
@@ -479,5 +492,6 @@ int main() {
     the_worst_contact_is_found_where_it_is();
     what_is_nearly_off_is_left_alone_where_it_is_rare();
     over_relaxation_gets_there_sooner();
+    what_over_relaxed_sweeps_push_too_far_comes_back();
     return report();
 }

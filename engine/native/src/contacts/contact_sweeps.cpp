@@ -27,6 +27,7 @@ constexpr std::size_t worth_threads = 512;  // contacts, where nothing is waited
 constexpr double few_off = 1.0 / 16.0;      // of the contacts are further off than the next sweeps care for
 constexpr double nearly = 0.9;              // of what is allowed: then they care for what is that far off
 constexpr double few_left = 0.75;           // of the contacts in the list: a shorter one is made
+constexpr int plain_sweeps = 2;             // the last ones, which are not over-relaxed
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 
@@ -275,6 +276,7 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
     for (int round = 1, until = iterations;; ++round) {
         Watch::look();
         bool any = false;
+        if (round > iterations - plain_sweeps) relax_no_more();
         sweep(focus);
         for (const int island : roots_) {
             if (!active_[island]) continue;
@@ -306,6 +308,11 @@ FrictionReport ContactSweeps::run(int iterations, double tolerance, double focus
     report.converged = report.converged && report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
     return report;
+}
+
+void ContactSweeps::relax_no_more() {
+    if (std::exchange(relaxation_, 1.0) == 1.0) return;
+    for (SweptContact& c : contacts_) c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
 }
 
 void ContactSweeps::write(MixedSystem& system) const {

@@ -44,7 +44,8 @@ public:
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
     /// The same, with the masses that `other` was started with; each change of a normal impulse is `relaxation` times what
-    /// its own row asks for, between 0 and 2: what is spread over many rows gets there sooner with a little more than 1.
+    /// its own row asks for, between 0 and 2: what is spread over many rows gets there sooner with a little more than 1. The
+    /// last two sweeps are plain, so that what was pushed too far comes back.
     void start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model,
                       double relaxation);
     /// Announces a contact that add() will bring, in the same order; after arrange() those announced have their places, one
@@ -131,6 +132,7 @@ private:
     void solve_due(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
     void solve_picked(Part& part, std::size_t picked, double focus) noexcept;
     void sweep(double focus) noexcept;
+    void relax_no_more();
     void find_residuals();
     double residual_of(std::size_t contact) const noexcept;
 
