@@ -119,7 +119,7 @@ def test_the_night_the_comparison_and_the_pages_are_red_with_the_same_word(
     assert f"{word}" in told.output
     for page in ("regressions.html", "tests/fall.html", "compare.html"):
         assert f"value became {word}: while it was timed" in (out / page).read_text(encoding="utf-8")
-    assert "Something became worse tonight" in (out / "index.html").read_text(encoding="utf-8")
+    assert "One commit lost one value tonight" in (out / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_night_that_is_timed_again_is_green_again(monkeypatch, tmp_path):

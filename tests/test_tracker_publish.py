@@ -97,7 +97,7 @@ def test_the_index_says_what_is_red_with_unit_limit_and_margin(site: Path) -> No
     text = " ".join(" ".join(Reader((site / "index.html").read_text()).texts).split())
 
     assert "One limit is broken tonight" in text
-    assert "6 of 7 gates of the thesis’ seven tests hold." in text
+    assert "6 of 7 limits from the thesis are kept." in text
     assert "1.635 m ≤ 4.904 m 33.3 % of the limit PASS" in text
     assert "0.5003 0.4999 … 0.5001 3 times the limit FAIL" in text
 
@@ -351,7 +351,7 @@ def test_a_night_of_one_test_does_not_pass_for_the_others(tmp_path: Path) -> Non
     publish(DocumentHistory([whole, short]), tmp_path / "public")
     text = " ".join(" ".join(Reader((tmp_path / "public" / "index.html").read_text()).texts).split())
 
-    assert "1 test was put to spook 0.1.1. 6 were not run tonight." in text
+    assert "1 test ran on spook 0.1.1. 6 were not run tonight." in text
     assert text.count("of 2026-10-01, not run tonight") == 6
 
 

@@ -53,6 +53,20 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     return f"{text}\N{NARROW NO-BREAK SPACE}{clean(unit)}"
 
 
+def times(factor: float, of: str, more: str) -> str:
+    """A factor in words: "18.7 × its limit", or from .9 to 1.1 the difference: "2.1 % beyond its limit"."""
+    if 0.9 < factor < 1.1:
+        return f"{number(100.0 * abs(factor - 1.0), 2)} % {more}"
+    return f"{number(factor, 3)} × {of}"
+
+
+def pair(before: float, after: float, unit: str, digits: int = 5) -> tuple[str, str]:
+    """Two values with enough digits that they read unlike, as many as a double has at most."""
+    while digits < 17 and before != after and number(before, digits) == number(after, digits):
+        digits += 1
+    return quantity(before, unit, digits), quantity(after, unit, digits)
+
+
 def seconds(value: float) -> str:
     """A run time with a fitting prefix: 1.2 ms, 340 ns."""
     if not math.isfinite(value):

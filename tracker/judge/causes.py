@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.document.wording import number
+from spook_tracker.tracker.document.wording import number, times
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.series_history import Judged, Told, blame
+from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.tonight import Finding
-from spook_tracker.tracker.judge.verdict import badness, half_width
+from spook_tracker.tracker.judge.verdict import badness, limit_ratio
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 Standing = Literal["detected", "accepted", "fixed", "recovered"]
@@ -43,7 +44,7 @@ class Hit:
 
     @property
     def margin(self) -> float:
-        """How many times its limit the value is, or the value before where there is no limit to be outside of.
+        """How many times its limit the value is, or the value before where it has no limit to be outside of.
 
         Infinite where there is no value; NaN where neither says how bad it is. Used to rank, and to be shown.
         """
@@ -51,28 +52,35 @@ class Hit:
             return math.nan
         if not math.isfinite(self.value):
             return math.inf
-        half = half_width(self.definition)
-        if self.stands == "fail" and half:
-            limit = self.definition.limit
-            middle = 0.5 * sum(limit) if isinstance(limit, tuple) else 0.0
-            return abs(self.value - middle) / half
-        own = badness(self.definition, self.value)
-        old = badness(self.definition, self.before)
+        if self.stands == "fail" and not math.isnan(ratio := limit_ratio(self.definition, self.value)):
+            return ratio
+        own, old = badness(self.definition, self.value), badness(self.definition, self.before)
         if own is None or old is None or not math.isfinite(old) or 0.0 in (own, old):
             return math.nan
         return old / own if own < 0.0 else own / old
 
     @property
+    def of_limit(self) -> bool:
+        """Whether the margin is in limits."""
+        d = self.definition
+        return self.stands == "fail" and d is not None and not math.isnan(limit_ratio(d, self.value))
+
+    @property
     def measure(self) -> str:
         """The margin in words, empty where there is none."""
-        if math.isinf(self.margin):
+        d, margin = self.definition, self.margin
+        if math.isinf(margin):
             return "no value"
-        if math.isnan(self.margin):
+        if math.isnan(margin) or d is None or (d.kind == "order" and not self.of_limit):
             return ""
-        of = "its limit" if self.stands == "fail" and self.definition and self.definition.limit else "before"
-        if 1.0 < self.margin < 1.1:
-            return f"{number(100.0 * (self.margin - 1.0), 2)} % above {of}"
-        return f"{number(self.margin, 3)} × {of}"
+        if self.of_limit:
+            return times(margin, "its limit", "beyond its limit")
+        if d.reference is not None and d.better == "inside":
+            of = number(d.reference)
+            return times(margin, f"as far from {of}", f"further from {of}")
+        if d.better == "larger" and self.value > 0.0:
+            return times(1.0 / margin, "before", "below before")
+        return times(margin, "before", "above before")
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,9 +233,9 @@ def _cause(hits: list[Hit], order: Mapping[str, int]) -> Cause:
 
 
 def _rank(hit: Hit) -> tuple[int, int, bool, float, str]:
-    """Of one class what decides before what is only followed, as in comparisons: a lost rung says less than a limit."""
+    """Of one class what has a limit before what is only followed, a lost rung says less; then by margin alone."""
     margin = 0.0 if math.isnan(hit.margin) else hit.margin
-    decides = hit.definition is not None and hit.definition.role == "gate"
+    decides = hit.definition is not None and expected(hit.definition)
     return STANDINGS.index(hit.standing), CLASS_RANK[hit.stands], not decides, -margin, hit.series
 
 

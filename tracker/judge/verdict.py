@@ -213,6 +213,19 @@ def half_width(definition: SeriesDefinition) -> float | None:
     return abs(definition.limit)
 
 
+def limit_ratio(definition: SeriesDefinition, value: float) -> float:
+    """How many times its limit a value is, above 1 where it is broken; NaN where no ratio says it."""
+    bound, half = definition.limit, half_width(definition)
+    if isinstance(bound, tuple):
+        return abs(value - 0.5 * sum(bound)) / half if half else math.nan
+    if half is not None:
+        return abs(value) / half if half else math.nan
+    if bound is None or bound * value <= 0.0:
+        return math.nan
+    larger_is_worse = (definition.better == "smaller") == (bound > 0.0)
+    return value / bound if larger_is_worse else bound / value
+
+
 def _deep_inside(definition: SeriesDefinition, smaller: float) -> float:
     """Below this magnitude growth is no regression; -inf where there is no limit to be inside of."""
     half = half_width(definition)

@@ -16,7 +16,7 @@ from spook_tracker.tracker.document.wording import (
     conditions,
     limit,
     named,
-    quantity,
+    pair,
     short_hash,
     version,
 )
@@ -194,10 +194,11 @@ def hit_row(hit: Hit, book: Book) -> dict[str, Any]:
         found = next((m for m in test.maps if map_key(m) == hit.series), None)
         title = f"{found.title} ({found.configuration})" if found else hit.series
         return row | {"what": f"map: {title}", "before": "–", "after": "–", "limit": "", "kept": ""}
+    before, after = pair(hit.before, hit.value, d.unit)
     return row | {
         "what": f"{named(d)[0]} ({conditions(d)})",
-        "before": quantity(hit.before, d.unit, 5) if math.isfinite(hit.before) else "–",
-        "after": quantity(hit.value, d.unit, 5) if math.isfinite(hit.value) else "no value",
+        "before": before if math.isfinite(hit.before) else "–",
+        "after": after if math.isfinite(hit.value) else "no value",
         "limit": "" if d.limit is None else limit(d),
     }
 

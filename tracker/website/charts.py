@@ -25,6 +25,7 @@ class Line:
     style: Style = "both"
     colour: int = 0  # slot of the palette
     notes: tuple[str, ...] = ()  # what a reader sees at each point, if anything
+    labels: tuple[str, ...] = ()  # what stands beside each point
     quiet: bool = False  # left out of the legend
     upto: tuple[float, ...] = ()  # how far each point reaches along x: the slowest repeat
     night: str = ""  # the choice of an earlier night it belongs to
@@ -84,6 +85,7 @@ class Grid:
     thesis: str = field(default="")
 
 
+HALF_NAME = 0.035  # half the height of a name on a line, as a share of a small chart's
 LARGEST = 1e300  # what is larger cannot be drawn: the ends of its axis would overflow
 
 
@@ -149,11 +151,33 @@ def drawable(chart: Chart) -> Chart:
     return replace(chart, lines=tuple(lines), note=note)
 
 
-def names_on_lines(chart: Chart) -> list[tuple[float, str]]:
-    """Height and name of each horizontal line that carries its name."""
+@dataclass(frozen=True)
+class NameOnLine:
+    """The name that a horizontal line carries."""
+
+    y: float
+    name: str
+    below: bool  # of two lines close together the lower is named below itself
+
+
+def names_on_lines(chart: Chart) -> list[NameOnLine]:
+    """The names of horizontal lines that carry them; what would lie on another is left out, the legend aside."""
     if not chart.direct:
         return []
-    return [(line.y[0], line.name) for line in chart.lines if line.style in ("limit", "reference") and line.y]
+    (_, (low, high)) = chart.ends()
+    log = chart.y_scale == "log"
+    found: list[NameOnLine] = []
+    places: list[float] = []  # of the text, as a share of the axis
+    named = [line for line in chart.lines if line.style in ("limit", "reference") and line.y]
+    for line in sorted(named, key=lambda line: -line.y[0]):
+        y = line.y[0]
+        share = ((math.log10(y) if log else y) - low) / (high - low or 1.0)
+        for below, place in ((False, share + HALF_NAME), (True, share - HALF_NAME)):
+            if all(abs(place - other) >= 2.0 * HALF_NAME for other in places):
+                found.append(NameOnLine(y, line.name, below))
+                places.append(place)
+                break
+    return found
 
 
 def flattened(chart: Chart) -> Chart:

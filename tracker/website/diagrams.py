@@ -152,12 +152,12 @@ def trend_chart(
             )
         bands = (Band(low=low, high=high, name="set point"),)
     kept = [at[i] for i in thinned(len(at), 4)]
-    magnitude = "magnitude of " if scale == "log" and any(v < 0.0 for v in values) else ""
+    magnitude = "magnitude" if scale == "log" and any(v < 0.0 for v in values) else ""
     return Chart(
         name=f"v-{slug(definition.key)}",
         title=(f"{title}: " if title else "") + f"{named(definition)[0]} ({conditions(definition)})",
         x_label=each,
-        y_label=f"{magnitude}value" + (f" [{definition.unit}]" if definition.unit != "1" else ""),
+        y_label=", ".join(filter(None, (magnitude, definition.unit if definition.unit != "1" else ""))),
         lines=tuple(lines),
         y_scale=scale,
         bands=bands,
@@ -182,6 +182,7 @@ def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
         style="points",
         colour=3,
         notes=tuple(notes),
+        labels=tuple(short_hash(event.first.engine)[:7] for event in events),
     )
 
 

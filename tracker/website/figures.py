@@ -70,9 +70,10 @@ def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
         }
     if chart.polar:
         _polar(layout, chart)
-    for y, name in names_on_lines(chart):
-        at = math.log10(y) if chart.y_scale == "log" else y
-        layout["annotations"].append({"meta": "line", "y": at, "text": plain(name)})
+    for one in names_on_lines(chart):
+        at = math.log10(one.y) if chart.y_scale == "log" else one.y
+        side = {"yanchor": "top"} if one.below else {}
+        layout["annotations"].append({"meta": "line", "y": at, "text": plain(one.name), **side})
     for band in chart.bands:
         low = band.low if chart.y_scale == "linear" or band.low > 0.0 else None
         layout["shapes"].append({"meta": "band", "low": low, "high": band.high, "name": plain(band.name)})
@@ -224,5 +225,8 @@ def _trace(line: Line) -> dict[str, Any]:
         trace["error_x"] = {"type": "data", "symmetric": False, "array": far, "arrayminus": [0.0] * len(far),
                             "thickness": 1, "width": 0}  # fmt: skip
     if line.notes:
-        trace |= {"text": _all_plain(line.notes), "hoverinfo": "text"}
+        trace |= {"hovertext": _all_plain(line.notes), "hoverinfo": "text"}
+    if line.labels:
+        trace |= {"mode": "markers+text", "text": _all_plain(line.labels), "textposition": "top left",
+                  "cliponaxis": False}  # fmt: skip
     return trace

@@ -66,20 +66,54 @@ SEEN = 0.05  # of half the picture: what an eye sees (as replay.js has it)
 WORLD = -1  # among the bodies of a link
 
 
+@dataclass(frozen=True)
+class Parting:
+    """How two motions of a scene part: the body that gets furthest from where it was."""
+
+    body: int
+    time: float  # s, from when on it is a tenth of its largest distance away, or as far as an eye sees
+    furthest: float  # m
+    end: float  # m, in the last sample
+    share: float  # of half the diagonal of what the first shows
+
+
 @lru_cache(maxsize=256)  # causes share nights, and stand on three pages
-def apart(one: Trajectory, other: Trajectory) -> float:
-    """The largest distance along an axis between two motions of a scene, as a share of half the diagonal of what the
-    first shows: its bodies, and the places in the world they hang from. 0 if they are of different scenes."""
-    if (one.count, one.step, one.bodies) != (other.count, other.step, other.bodies):
-        return 0.0
+def parting(one: Trajectory, other: Trajectory) -> Parting | None:
+    """Where two motions part, by straight distance; None if they are of different scenes, or nowhere."""
+    if (one.count, one.step, one.bodies) != (other.count, other.step, other.bodies) or not one.bodies:
+        return None
     mine, theirs = (_values(motion, "position") for motion in (one, other))
-    fixed = [link.anchors[end] for link in one.links for end in (0, 1) if link.bodies[end] == WORLD]
-    ends = [
-        [place[axis] for place in fixed] + list(filter(math.isfinite, mine[axis::3])) for axis in range(3)
+    away = [
+        [
+            math.dist(mine[at : at + 3], theirs[at : at + 3])
+            for at in range(3 * body, len(mine), 3 * one.bodies)
+        ]
+        for body in range(one.bodies)
     ]
-    size = math.hypot(*(max(along, default=0.0) - min(along, default=0.0) for along in ends)) / 2.0
-    far = max((abs(a - b) for a, b in zip(mine, theirs, strict=True) if math.isfinite(a - b)), default=0.0)
-    return far / size if size > 0.0 else 0.0
+    away = [[far if math.isfinite(far) else 0.0 for far in of_body] for of_body in away]
+    body = max(range(one.bodies), key=lambda place: max(away[place], default=0.0))
+    furthest, size = max(away[body], default=0.0), _half_picture(one, mine)
+    if furthest <= 0.0 or size <= 0.0:
+        return None
+    seen = min(SEEN * size, 0.1 * furthest)
+    first = next(sample for sample, far in enumerate(away[body]) if far >= seen)
+    return Parting(body, first * one.step, furthest, away[body][-1], furthest / size)
+
+
+def _half_picture(motion: Trajectory, positions: list[float]) -> float:
+    """Half the diagonal of what a motion shows: its bodies, and the places in the world they hang from."""
+    fixed = [link.anchors[end] for link in motion.links for end in (0, 1) if link.bodies[end] == WORLD]
+    ends = [
+        [place[axis] for place in fixed] + list(filter(math.isfinite, positions[axis::3]))
+        for axis in range(3)
+    ]
+    return math.hypot(*(max(along, default=0.0) - min(along, default=0.0) for along in ends)) / 2.0
+
+
+def apart(one: Trajectory, other: Trajectory) -> float:
+    """The largest distance between two motions as a share of half the picture; 0 if they are of different scenes."""
+    found = parting(one, other)
+    return 0.0 if found is None else found.share
 
 
 def _values(motion: Trajectory, name: str) -> list[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
@@ -46,9 +47,7 @@ def health(book: Book) -> tuple[Class, Count]:
 def index(book: Book, causes: Sequence[Cause]) -> Page:
     """Is the engine healthy tonight?"""
     gates = [(test, trend) for test in book.tests for trend in test.gates()]
-    red = [told(cause, book) for cause in lasting(causes)]
-    new, old = [c for c in red if c.new], [c for c in red if not c.new]
-    state, found = health(book)
+    found = counted(book)
     seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
     others = [
         _nearest(test, book)
@@ -59,14 +58,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     steps = {t.definition.time_step for test, t in gates if test.card.seven}
     step = steps.pop() if len(steps) == 1 else None
     context = {
-        "state": state,
-        "headline": _headline(state, found, tonight(book), _red_maps(book)),
-        "summary": summary(book),
-        "new": new,
-        "old": old[:MOST_OLD],
-        "old_left_out": max(0, len(old) - MOST_OLD),
-        "most_tests": MOST_TESTS,
-        "blamed": _blamed(new, old),
+        **lead(book, causes),
         "kept": found.kept,
         "limits": found.limits,
         "held": found.set_points - found.left,
@@ -79,6 +71,23 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         "signs": [(name, said, meaning) for name, (_, said, meaning) in CLASSES.items()],
     }
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
+
+
+def lead(book: Book, causes: Sequence[Cause]) -> dict[str, Any]:
+    """What the first page and the report begin with: the state of the night, and what is red since when."""
+    red = [told(cause, book) for cause in lasting(causes)]
+    new, old = [c for c in red if c.new], [c for c in red if not c.new]
+    state, found = health(book)
+    return {
+        "state": state,
+        "headline": _headline(state, found, tonight(book), _red_maps(book)),
+        "summary": summary(book),
+        "new": new,
+        "old": old[:MOST_OLD],
+        "old_left_out": max(0, len(old) - MOST_OLD),
+        "most_tests": MOST_TESTS,
+        "blamed": _blamed(new, old),
+    }
 
 
 def _judged(test: TestHistory) -> list[Trend]:
@@ -150,13 +159,13 @@ def summary(book: Book) -> str:
     kept = sum(trend.state != "fail" for trend in seven)
     parts = []
     if seven:
-        tests = len({trend.definition.test for trend in seven})
-        of = "the thesis’ seven tests" if tests == 7 else f"{tests} of the thesis’ seven tests"
-        how_many = f"All {len(seven)}" if kept == len(seven) else f"{kept} of {len(seven)}"
-        parts.append(f"{how_many} gates of {of} hold.")
+        every = "The one limit" if len(seven) == 1 else f"All {len(seven)} limits"
+        verb = "is" if len(seven) == 1 else "are"
+        how_many = every if kept == len(seven) else f"{kept} of {len(seven)} limits"
+        parts.append(f"{how_many} from the thesis {verb} kept.")
     put = {test.name for test, _ in fresh}
     engine = f"{clean(book.tonight.engine.name)} {version(book.tonight.engine)}"
-    parts.append(f"{len(put)} {'test was' if len(put) == 1 else 'tests were'} put to {engine}.")
+    parts.append(f"{len(put)} {'test' if len(put) == 1 else 'tests'} ran on {engine}.")
     missed = [test for test in book.tests if test.gates() and test.name not in put]
     if missed:
         parts.append(f"{len(missed)} {'was' if len(missed) == 1 else 'were'} not run tonight.")
@@ -167,7 +176,7 @@ def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause]) -> str:
     """How many causes there are, new apart from old."""
     parts = []
     if new:
-        parts.append("Something became worse tonight.")
+        parts.append(_worsened(new))
     elif old:
         parts.append("Nothing became worse tonight.")
     if old:
@@ -177,6 +186,22 @@ def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause]) -> str:
             else f"{len(old)} earlier causes are still red."
         )
     return " ".join(parts)
+
+
+def _worsened(new: Sequence[ToldCause]) -> str:
+    """One commit broke 12 limits tonight."""
+    made = "One commit" if len(new) == 1 else f"{len(new)} commits"
+    counts = Counter[str]()
+    for cause in new:
+        counts.update(dict(cause.damage))
+        counts["series"] += len(cause.hits)
+    for words, did in (("limit broken", "broke {} limit"), ("value lost", "lost {} value")):
+        if number := counts[words.replace(" ", "s ")] + counts[words]:
+            return (
+                f"{made} {did.format('one' if number == 1 else number)}{'' if number == 1 else 's'} tonight."
+            )
+    series = counts["series"]
+    return f"{made} made {'one' if series == 1 else series} series worse tonight."
 
 
 def _step_words(step: float | None) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import map_key
-from spook_tracker.tracker.judge.vocabulary import OVERALL, spaced
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, OVERALL, spaced
 from spook_tracker.tracker.website.causes import hit_row, told
 from spook_tracker.tracker.website.charts import drawable
 from spook_tracker.tracker.website.comparisons import Comparisons, choice, pair_name
@@ -25,7 +25,7 @@ from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
 from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
 from spook_tracker.tracker.website.nights import Book, TestHistory
-from spook_tracker.tracker.website.page_index import counts_by_night, health, summary
+from spook_tracker.tracker.website.page_index import RED, counts_by_night, health, lead
 from spook_tracker.tracker.website.page_rows import Page, address, row
 from spook_tracker.tracker.website.page_test import concluded, earlier_choices
 from spook_tracker.tracker.website.scenery import scenery
@@ -176,14 +176,32 @@ def data(book: Book, events: Sequence[Event]) -> Page:
     return Page("data.html", "data.html", "Data", "Every number as CSV and JSON.", context)
 
 
-def document(book: Book, events: Sequence[Event]) -> Page:
-    """The report of tonight in one piece, in the order of the thesis' appendix A."""
-    gates, tests = [], []
-    for test in book.tests:
-        name = slug(test.name)
-        for gate in test.gates():
-            gates.append({**vars(_row(gate, test)), "slug": name})
-        scalars = test.gates() + test.companions() + test.reported() + test.of_kind("order")
+def document(book: Book, causes: Sequence[Cause]) -> Page:
+    """The report of tonight in one piece: the lead of the first page, failing tests, then the rest.
+
+    What fails and the tests of the thesis are told whole, in the order of the thesis' appendix A; any other is a table.
+    """
+    ordered = sorted(
+        book.tests, key=lambda test: CLASS_RANK[test.state] if test.state in RED else len(CLASS_RANK)
+    )
+    tests = [_chapter(test, book) for test in ordered]
+    whole = [test for test in ordered if _told_whole(test)]
+    gates = [{**vars(_row(gate, test)), "slug": slug(test.name)} for test in whole for gate in test.gates()]
+    context = {**lead(book, causes), "gates": gates, "tests": tests}
+    return Page("document.html", "document.html", "Report", "The report of tonight, for printing.", context)
+
+
+def _told_whole(test: TestHistory) -> bool:
+    return test.card.seven or test.state in RED
+
+
+def _chapter(test: TestHistory, book: Book) -> dict[str, Any]:
+    """What the report tells of one test."""
+    name, whole = slug(test.name), _told_whole(test)
+    scalars = test.gates() + test.companions()
+    pictures = []
+    if whole:
+        scalars += test.reported() + test.of_kind("order")
         charts = [figure_chart(f, f"{name}-") for f in test.figures]
         charts += [
             chart
@@ -193,18 +211,15 @@ def document(book: Book, events: Sequence[Event]) -> Page:
         pictures = [(picture(chart, shown := drawable(chart)), shown.note) for chart in charts]
         grids = [map_grid(m, f"{name}-") for m in test.maps]
         pictures += [(grid_picture(grid), grid.note) for grid in grids]
-        tests.append(
-            {
-                "card": test.card,
-                "slug": name,
-                "scenery": scenery(test.card.scene) if test.card.scene else None,
-                "state": test.state,
-                "kept": [s.stage for s in test.card.stages if s.kept],
-                "left_out": sum(not s.kept for s in test.card.stages),
-                "rows": [_row(t, test) for t in [*scalars, *test.of_kind("break_point")]],
-                "pictures": pictures,
-                "conclusions": concluded(test.card.conclusion, [gate.state for gate in test.gates()]),
-            }
-        )
-    context = {"summary": summary(book), "gates": gates, "tests": tests}
-    return Page("document.html", "document.html", "Report", "The report of tonight, for printing.", context)
+    return {
+        "card": test.card,
+        "slug": name,
+        "whole": whole,
+        "scenery": scenery(test.card.scene) if whole and test.card.scene else None,
+        "state": test.state,
+        "kept": [s.stage for s in test.card.stages if s.kept],
+        "left_out": sum(not s.kept for s in test.card.stages),
+        "rows": [_row(t, test) for t in [*scalars, *test.of_kind("break_point")]],
+        "pictures": pictures,
+        "conclusions": concluded(test.card.conclusion, test.state),
+    }

@@ -17,6 +17,7 @@ from spook_tracker.tracker.document.wording import (
     margin,
     named,
     number,
+    pair,
     quantity,
     seconds,
     slug,
@@ -131,6 +132,7 @@ def event_row(event: Event, book: Book) -> dict[str, Any]:
     """An event as a line of a table."""
     d = event.definition
     test = next(t for t in book.tests if t.name == d.test)
+    before, now = pair(event.before, event.value, d.unit)
     return {
         "test": test.card.title,
         "what": f"{named(d)[0]} ({conditions(d)})",
@@ -139,8 +141,8 @@ def event_row(event: Event, book: Book) -> dict[str, Any]:
         "state": event.stands,
         "name": event.name,
         "sentence": event.sentence,
-        "now": quantity(event.value, d.unit, 6),
-        "before": quantity(event.before, d.unit, 6) if math.isfinite(event.before) else "–",
+        "now": now,
+        "before": before if math.isfinite(event.before) else "–",
         "night": event.first,
         "again": event.worse_at if event.worse_at is not event.first else None,
         "blame": blame(event.first, event.good),

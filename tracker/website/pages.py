@@ -69,6 +69,6 @@ def pages(
         yield Planned(PATH, "Wrong on purpose", partial(mutants_page, mutants, book))
     yield Planned("versions.html", "Versions", partial(page_overviews.versions, book))
     yield Planned("data.html", "Data", partial(page_overviews.data, book, events))
-    yield Planned("document.html", "Report", partial(page_overviews.document, book, events))
+    yield Planned("document.html", "Report", partial(page_overviews.document, book, causes))
     for test in book.tests:
         yield Planned(address(test), clean(test.card.title), partial(test_page, book, test, events))

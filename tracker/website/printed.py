@@ -20,6 +20,7 @@ from spook_tracker.tracker.website.nights import Records
 from spook_tracker.tracker.website.publish import publish
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+NUMBERED = re.compile(r'<span class="page-of" data-of="([^"]*)">')
 PATIENCE = 300.0  # s, for some sixty pages on a busy machine
 
 
@@ -53,7 +54,8 @@ def one_file(
 def print_pdf(html: Path, pdf: Path) -> None:
     """Print an HTML file as PDF, with an outline and the pages of its contents, by the browser that is here.
 
-    Only what is printed tells on which page it stands: it is printed once to learn that, and again with the numbers.
+    Only what is printed tells on which page it stands: it is printed once, with numbers as wide as any, to learn that,
+    and again with the right ones.
     PrintError if there is no browser, or it fails.
     """
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -63,13 +65,12 @@ def print_pdf(html: Path, pdf: Path) -> None:
             "for --html and print that"
         )
     with tempfile.TemporaryDirectory() as folder:
-        made = _printed(browser, html, Path(folder))
         text = html.read_text(encoding="utf-8")
-        numbered = with_pages(text, pages_of(made.read_bytes()))
-        if numbered != text:
-            again = Path(folder) / "numbered.html"
-            again.write_text(numbered, encoding="utf-8")
-            made = _printed(browser, again, Path(folder))
+        numbered = Path(folder) / "numbered.html"
+        numbered.write_text(with_pages(text, dict.fromkeys(NUMBERED.findall(text), 88)), encoding="utf-8")
+        made = _printed(browser, numbered, Path(folder))
+        numbered.write_text(with_pages(text, pages_of(made.read_bytes())), encoding="utf-8")
+        made = _printed(browser, numbered, Path(folder))
         pdf.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(made, pdf)
 
@@ -81,7 +82,7 @@ def with_pages(html: str, pages: Mapping[str, int]) -> str:
         page = pages.get(found[1])
         return found[0] if page is None else f"{found[0]}{page}"
 
-    return re.sub(r'<span class="page-of" data-of="([^"]*)">', numbered, html)
+    return NUMBERED.sub(numbered, html)
 
 
 def pages_of(pdf: bytes) -> dict[str, int]:

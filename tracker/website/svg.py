@@ -113,7 +113,9 @@ def picture(chart: Chart, shown: Chart | None = None) -> Picture:
         low = y_of(band.low) if chart.y_scale == "linear" or band.low > 0.0 else box[3]
         high = max(y_of(band.high), box[1])
         out.bands.append((_n(high), _n(max(low - high, 1.5)), clean(band.name)))
-    out.names = [(_n(y_of(y) - 5.0), clean(name)) for y, name in names_on_lines(chart)]
+    out.names = [
+        (_n(y_of(one.y) + (12.0 if one.below else -5.0)), clean(one.name)) for one in names_on_lines(chart)
+    ]
     out.marks = [_mark(line, x_of, y_of) for line in chart.lines if not line.waits]
     return out
 

@@ -1,0 +1,93 @@
+"""No two sentences of a website contradict each other: sign against conclusion, worst against table, lead against lead."""
+
+import re
+from html import unescape
+from pathlib import Path
+
+import pytest
+
+from spook_tracker.tracker.website.publish import publish
+from tests.synthetic_history import history
+
+TODAY = 6
+
+
+@pytest.fixture(scope="module", params=["red", "green"])
+def site(tmp_path_factory, request):
+    out = tmp_path_factory.mktemp(request.param) / "public"
+    publish(history(TODAY, broken={"red": TODAY - 1, "green": 10**9}[request.param]), out)
+    return out
+
+
+def plain(html: str) -> str:
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", html))).strip()
+
+
+def read(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def sign_of(page: str) -> str:
+    """The word of the sign beside the title of a page."""
+    return plain(re.search(r'<div class="title-row"><h1>.*?</h1>(.*?)</div>', page, re.DOTALL)[1])
+
+
+def test_a_conclusion_says_what_the_sign_beside_the_title_says(site):
+    said = set()
+    for path in (site / "tests").glob("*.html"):
+        page = read(path)
+        concluded = page.partition('id="conclusion"')[2]
+        for words, sign in (("It passed tonight", "PASS"), ("It failed tonight", "FAIL")):
+            if words in concluded:
+                assert sign_of(page) == sign, path.name
+                said.add(sign)
+    assert "PASS" in said
+
+
+def test_a_page_opens_with_what_is_broken_and_only_where_something_is(site):
+    for path in (site / "tests").glob("*.html"):
+        page = read(path)
+        assert ('id="broken"' in page) == (sign_of(page) in ("FAIL", "WATCH")), path.name
+        if 'id="broken"' in page:
+            assert page.index('id="broken"') < page.index('id="scene"'), path.name
+
+
+def factors(html: str) -> list[float]:
+    """Every "n × its limit" as a number."""
+    digits = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
+    found = []
+    for mantissa, power in re.findall(r"([\d.]+)(?:×10([⁻⁰-⁹²³¹]+))? × its limit", plain(html)):
+        found.append(float(mantissa) * 10.0 ** float(power.translate(digits) or 0))
+    return found
+
+
+def test_the_worst_of_a_cause_is_the_worst_of_its_table(site):
+    page = read(site / "regressions.html")
+    for cause in re.findall(r'<details class="cause.*?</details>', page, re.DOTALL):
+        summary, _, table = cause.partition("</summary>")
+        if rows := factors(table):
+            assert factors(summary) == [max(rows)]
+
+
+def test_first_page_report_and_badge_count_the_same(site):
+    index, report = read(site / "index.html"), read(site / "document.html")
+    headline = plain(re.search(r"<h1>(.*?)</h1>", index)[1])
+    summary = plain(re.search(r"</h1><p>(.*?)</p>", index)[1])
+    assert headline in plain(report) and summary in plain(report)
+    kept, of = re.search(r"Limits kept (\d+) of (\d+)", plain(index)).groups()
+    badge = plain(read(site / "badge.svg"))
+    if kept == of:
+        assert headline.startswith("Every limit is kept") and kept in badge
+    else:
+        broken = {"One limit is broken tonight": 1}.get(headline) or int(headline.split()[0])
+        assert broken == int(of) - int(kept) and str(broken) in badge
+
+
+def test_the_report_says_first_what_the_first_page_says_broke(site):
+    index, report = read(site / "index.html"), read(site / "document.html")
+    for part in ("What broke tonight", "Still red"):
+        assert (part in plain(index)) == (part in plain(report))
+    first = re.findall(r'<h2 id="t-[^"]*">(.*?)</h2>', report, re.DOTALL)
+    signs = [plain(title).rsplit(" ", 1)[-1] for title in first]
+    red = [sign in ("FAIL", "WATCH") for sign in signs]
+    assert red == sorted(red, reverse=True)
