@@ -24,6 +24,7 @@ from spook_tracker.engine.errors import EngineError, MethodError
 from spook_tracker.engine.forces import Force, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, frictions
 from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import (
     ConstraintForce,
     ContactCount,
@@ -276,6 +277,8 @@ def run(
     del method, time_stages
     if not (math.isfinite(time_step) and time_step > 0.0):
         raise MethodError(f"time_step must be positive and finite, not {time_step!r}")
+    if isinstance(scene, ModelRun):
+        return _of_model(adapter, scene, time_step, duration, time_limit)
     if (duration is None) == (steps is None):
         raise MethodError("give either a duration or a number of steps")
     count = round(duration / time_step) if duration is not None else int(steps or 0)
@@ -294,6 +297,16 @@ def run(
         time_limit=time_limit,
     )
     return _result(task, adapter.record(task), observe)
+
+
+def _of_model(
+    adapter: Adapter, asked: ModelRun, time_step: float, duration: float | None, time_limit: float | None
+) -> Result:
+    """A model file, by an adapter that has `run_model` and lists the file's format in `reads`."""
+    if asked.model.format not in getattr(adapter, "reads", ()):
+        raise NotSupported(f"{adapter.name} reads no {asked.model.format} here")
+    found: Result = adapter.run_model(asked, time_step, duration, time_limit)  # type: ignore[attr-defined]
+    return found
 
 
 def configuration_of(adapter: Adapter, name: str) -> Configuration:

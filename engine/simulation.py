@@ -9,7 +9,9 @@ from spook_tracker.engine import check
 from spook_tracker.engine.compiler import NOTHING, compile
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
 
@@ -30,6 +32,8 @@ def simulate(
     A duration that is no whole number of time steps [s] is rounded to the nearest. `time_limit` is wall time
     [s]. Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
     """
+    if isinstance(scene, ModelRun):
+        raise NotSupported(f"spook reads no {scene.model.format} yet")
     program = compile(scene, time_step=time_step, method=method, observe=observe)
     if (duration is None) == (steps is None):
         raise MethodError("give either a duration or a number of steps")

@@ -37,6 +37,36 @@ Better = Literal["smaller_magnitude", "larger", "smaller", "inside"]
 Role = Literal["gate", "companion", "reported"]
 
 
+class Estimate(float):
+    """A value that a measurement gives together with what moves it, in its own unit.
+
+    `rounding` is how far pushes of the last bits have moved it: a difference up to that is none, one beyond is a
+    change, however small. `step_error` is what halving the time step changes (None: not measured), `scale` what is
+    large: both say how much a change is. `unsettled` says in a sentence why the value is not the one that was sought.
+    """
+
+    __slots__ = ("rounding", "scale", "step_error", "unsettled")
+
+    def __new__(
+        cls,
+        value: float,
+        *,
+        rounding: float,
+        step_error: float | None = None,
+        scale: float | None = None,
+        unsettled: str = "",
+    ) -> Estimate:
+        made = super().__new__(cls, value)
+        made.rounding, made.step_error, made.scale = rounding, step_error, scale
+        made.unsettled = unsettled
+        return made
+
+    rounding: float
+    step_error: float | None
+    scale: float | None
+    unsettled: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
     """What is measured, whoever is asked: the question's own part of a metric.
@@ -83,6 +113,7 @@ class Metric:
     tolerance: float = 0.0
     relative_tolerance: float = 1e-9
     formerly: tuple[str, ...] = ()  # its earlier names, the first one first: its history goes on
+    noisy: bool = False  # a run time or what depends on one: judged by statistics
 
     @property
     def quantity(self) -> Quantity:
@@ -295,6 +326,7 @@ class ScalarTest:
     misprints: tuple[str, ...] = ()  # where a reader comparing with the thesis would stumble
     seven: bool = False  # one of the thesis' seven continuous tests
     formerly: tuple[str, ...] = ()  # its earlier names: its history goes on
+    as_given: bool = False  # its measurements say all themselves: no engine puts it in settings of its own
     iteration_tolerance: float = (
         0.1  # relative: how many more sweeps, pivots, corrections are not yet more work
     )

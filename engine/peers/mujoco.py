@@ -20,6 +20,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from spook_tracker.engine.peers.mujoco_file import READS, run_model
 from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, model
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
@@ -37,6 +38,8 @@ class MuJoCo:
     """The adapter."""
 
     name = "mujoco"
+    reads = READS
+    run_model = staticmethod(run_model)
     capabilities = Capabilities(
         shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),

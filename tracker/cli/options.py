@@ -55,9 +55,61 @@ def _each_named(context: click.Context, option: click.Parameter, names: str) -> 
     return names
 
 
+MODELS = "model files named on the command line"
+
+
+def _model(context: click.Context, option: click.Parameter, files: tuple[str, ...]) -> None:
+    """A model file is a catalogue of one test; `_catalogue`, which is read after this, adds it."""
+    for file in files:
+        if "," in file:
+            raise click.BadParameter(f"{file!r}: a comma parts catalogues; give the file another name")
+    context.meta[MODELS] = files
+
+
+def _catalogue(context: click.Context, option: click.Parameter, names: str) -> str:
+    """With models on the command line, they alone; with --catalogue beside them, both."""
+    names = _each_named(context, option, names)
+    models = context.meta.get(MODELS, ())
+    if not models:
+        return names
+    from spook_tracker.tracker.measure.model_files import is_model
+
+    for file in models:
+        if not is_model(file):
+            raise click.BadParameter(f"{file!r} is no model file: it ends in .xml, .mjcf, .urdf or .sdf")
+    named = context.get_parameter_source(str(option.name)) is click.core.ParameterSource.COMMANDLINE
+    return ",".join([names] * named + [*models])
+
+
+def model_option(command: Command) -> Command:
+    """--model FILE, which becomes a part of the catalogue."""
+    return click.option(
+        "--model",
+        multiple=True,
+        metavar="[NAME=]FILE",
+        is_eager=True,
+        expose_value=False,
+        callback=_model,
+        help="Ask about this MJCF, URDF or SDF file instead; may be repeated. Those of every night: [[model]] in tracker.toml.",
+    )(command)
+
+
+def catalogue_option(command: Command) -> Command:
+    """--catalogue NAME."""
+    return click.option(
+        "--catalogue",
+        metavar="NAME[,NAME]",
+        envvar="TRACKER_CATALOGUE",
+        default="standard",
+        callback=_catalogue,
+        help="Other tables of scalar tests: module:NAME, with commas between; also TRACKER_CATALOGUE.",
+    )(command)
+
+
 def source_options(command: Command) -> Command:
     """Which questions are put to which engine."""
     for option in (
+        model_option,
         click.option(
             "--engine",
             metavar="NAME[,NAME]",
@@ -66,14 +118,7 @@ def source_options(command: Command) -> Command:
             callback=_each_named,
             help="spook, mujoco, … (see: tracker engines) or module:NAME; also TRACKER_ENGINE.",
         ),
-        click.option(
-            "--catalogue",
-            metavar="NAME[,NAME]",
-            envvar="TRACKER_CATALOGUE",
-            default="standard",
-            callback=_each_named,
-            help="Other tables of scalar tests: module:NAME, with commas between; also TRACKER_CATALOGUE.",
-        ),
+        catalogue_option,
     ):
         command = option(command)
     return command

@@ -9,7 +9,14 @@ from typing import Any
 
 import click
 
-from spook_tracker.tracker.cli.options import database_option, example, limit_option, workers_option
+from spook_tracker.tracker.cli.options import (
+    catalogue_option,
+    database_option,
+    example,
+    limit_option,
+    model_option,
+    workers_option,
+)
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 
 KEPT = ".tracker-releases"
@@ -20,6 +27,7 @@ MEGABYTE = 1e6
     epilog=example(
         "tracker backfill v0.2.0 v0.3.0 HEAD",
         "tracker backfill --engine mujoco --test resting_stack --budget 20",
+        "tracker backfill --engine mujoco 3.3.7 3.4.0 --model robot.xml",
     )
 )
 @click.argument("versions", nargs=-1, metavar="[REV]...")
@@ -47,7 +55,8 @@ MEGABYTE = 1e6
 @click.option(
     "--out", metavar="DIR", type=click.Path(path_type=Path), help="Publish the website there afterwards."
 )
-@click.option("--catalogue", default="spook_tracker.scalar_tests.catalogue:CATALOGUE", metavar="MODULE:NAME")
+@model_option
+@catalogue_option
 @limit_option
 @workers_option
 @database_option
@@ -77,6 +86,7 @@ def backfill(
     calling it again. One that cannot be installed, does not start or gives no answers is named and passed
     over. In the end every change between two releases is named with its release.
     """
+    import spook_tracker.tracker.measure.catalogues as catalogues
     import spook_tracker.tracker.measure.releases as releases
     from spook_tracker.tracker.cli.console import say
 
@@ -106,7 +116,8 @@ def backfill(
         )  # fmt: skip
 
     ends = None if budget is None else time.monotonic() + 60.0 * budget
-    for line in progress(engine, chosen, measure, database, ends):
+    wanted = tests or tuple(catalogues.find(catalogue))
+    for line in progress(engine, chosen, measure, database, ends, wanted):
         say(line)
     if folder.exists():
         taken = releases.size(folder) / MEGABYTE
@@ -129,12 +140,16 @@ def progress(
     measure: Callable[[str], Any],
     database: str,
     ends: float | None,
+    tests: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Measure and record each release; a line as each is done. `ends` is a reading of the monotonic clock."""
+    """Measure and record each release; a line as each is done. `ends` is a reading of the monotonic clock.
+
+    One that was asked all these tests before is not measured again.
+    """
     from spook_tracker.tracker.library import record
     from spook_tracker.tracker.measure.releases import ReleaseError
 
-    have = _recorded(database, engine)
+    have = _recorded(database, engine, tests)
     for place, version in enumerate(chosen, start=1):
         heading = f"[{place}/{len(chosen)}] {engine} {version}"
         if version in have:
@@ -156,12 +171,16 @@ def progress(
         yield f"{heading}: {values} of {len(document.samples)} values in {time.monotonic() - began:.0f} s"
 
 
-def _recorded(database: str, engine: str) -> set[str]:
+def _recorded(database: str, engine: str, tests: Sequence[str]) -> set[str]:
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
 
     with session_on(database) as session:  # made if it is not there yet
-        return {run.engine.version for run in History(session).runs() if run.engine.name == engine}
+        return {
+            run.engine.version
+            for run in History(session).runs()
+            if run.engine.name == engine and (run.asked is None or {*tests} <= {*run.asked.tests})
+        }
 
 
 @click.command("releases", epilog=example("tracker releases mujoco --changelog docs/mujoco-changelog.toml"))

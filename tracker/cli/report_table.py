@@ -114,14 +114,15 @@ def red(run: RunDocument) -> list[Pair]:
 
 def pass_table(run: RunDocument, everything: bool = False, room: int | None = None) -> str:
     """The table with its heading and its verdict, ready to print."""
-    shown = [pair for pair in pairs(run) if pair[0].kind == "scalar"]
+    shown = [pair for pair in pairs(run) if pair[0].kind == "scalar" or _asked_alone(pair[0])]
     if not everything:
         judged = [pair for pair in shown if pair[0].role != "reported"]
         # An engine that is only shown has no gates; what has a limit is what a reader asks for.
         shown = judged or [pair for pair in shown if pair[0].limit is not None]
     lines = [title(run), ""]
     lines += _scalars(shown, room or width())
-    ladders = [pair for pair in pairs(run) if pair[0].kind in ("ladder", "order", "time")]
+    swept = ("ladder", "order", "time")
+    ladders = [pair for pair in pairs(run) if pair[0].kind in swept and not _asked_alone(pair[0])]
     if ladders:
         lines += ["", *sweep_table(ladders, room or width())]
     points = [pair for pair in pairs(run) if pair[0].kind == "break_point"]
@@ -131,6 +132,11 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
         lines += [_map_line(found) for found in run.maps]
     lines += ["", *failures(run), verdict(run)]
     return "\n".join(lines)
+
+
+def _asked_alone(definition: SeriesDefinition) -> bool:
+    """A run time that was measured as a value, and not on a ladder."""
+    return definition.kind == "time" and ":" not in definition.metric
 
 
 def _map_line(found: MapData) -> str:

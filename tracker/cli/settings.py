@@ -11,6 +11,9 @@
     [limits]                             # what your engine owes you, by series
     "falling_object/default/velocity_error/*" = 1e-9
 
+    [[model]]                            # a file of yours that every night asks about: tracker.measure.model_files
+    file = "assets/robot.xml"
+
 It is looked for where one stands and in the folders above, up to the root of the repository and no further.
 What a command line or an environment variable says goes before it.
 """
@@ -57,6 +60,7 @@ class Settings:
 
     values: Mapping[str, Any] = field(default_factory=dict)
     limits: tuple[tuple[str, Any], ...] = ()
+    has_models: bool = False
 
     def limits_of(self, engine: str) -> tuple[tuple[str, Any], ...]:
         """They are the team's own engine's; another one that is asked beside it is not held to them."""
@@ -83,15 +87,21 @@ def read(here: Path) -> Settings:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingsError(f"{file} cannot be read: {error}") from None
     limits = said.pop("limits", {})
+    models = said.pop("model", [])
     for name, value in said.items():
         if name not in KINDS:
-            raise SettingsError(f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits")
+            raise SettingsError(
+                f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits, model"
+            )
         if type(value) not in KINDS[name]:
             raise SettingsError(f"{file}: {name} must be {WORDS[KINDS[name][-1]]}, not {value!r}")
     folder = str(file.parent)
     if folder not in sys.path:
         sys.path.insert(0, folder)  # engine and catalogue are modules of that folder
-    return Settings(_placed(said, file.parent, here), _limits(file, limits))
+    if models:
+        own = str(file.relative_to(here) if file.is_relative_to(here) else file)
+        said["catalogue"] = f"{said.get('catalogue', 'standard')},{own}"
+    return Settings(_placed(said, file.parent, here), _limits(file, limits), bool(models))
 
 
 def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:
@@ -101,7 +111,8 @@ def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:
         if isinstance(command, click.Group):
             found[name] = defaults(command, settings)
         else:
-            known = {p.name for p in command.params} - NOT_MEANT.get(name, set())
+            not_meant = NOT_MEANT.get(name, set()) - ({"catalogue"} if settings.has_models else set())
+            known = {p.name for p in command.params} - not_meant
             found[name] = {key: value for key, value in settings.values.items() if key in known}
     return found
 

@@ -69,6 +69,14 @@ class Worker(Struct, frozen=True, kw_only=True):
     pieces: Annotated[int, msgspec.Meta(ge=1)]
 
 
+class Sensitivity(Struct, frozen=True, kw_only=True):
+    """What moves a value, measured in the same run, in the series' unit."""
+
+    rounding: Number  # as far as pushes of the last bits have moved it: a difference up to that is none
+    step_error: Number | None = None  # what halving the time step changes
+    scale: Number | None = None  # what is large
+
+
 class SeriesDefinition(Struct, frozen=True, kw_only=True):
     """What is followed over versions: one metric of one test in one configuration."""
 
@@ -95,6 +103,7 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     aliases: tuple[str, ...] = ()  # earlier keys of the same series
     time_tolerance: float = 0.0  # of a ladder: relative change of its run time below which none is told
     iteration_tolerance: float = 0.1  # relative growth of its iteration counts that is not yet more work
+    sensitivity: Sensitivity | None = None  # of a value without a reference: what a difference of it means
 
 
 class Again(Struct, frozen=True, kw_only=True):

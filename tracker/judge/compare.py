@@ -279,6 +279,7 @@ def _change(
         limit=definition.limit,
         decades=verdict.decades,
         ulps=verdict.ulps,
+        rounding=definition.sensitivity.rounding if definition.sensitivity else None,
     )
 
 

@@ -52,6 +52,7 @@ class Change(Struct, frozen=True, kw_only=True):
     first_bad: Text = ""  # hash or version of the first bad commit, if history knows it
     last_good: Text = ""
     accepted: Text = ""  # by whom and why, if accepted.toml takes this level
+    rounding: Number | None = None  # where it was measured: a difference up to that is none
 
 
 class Frontier(Struct, frozen=True, kw_only=True):

@@ -68,6 +68,8 @@ def visible(change: Change) -> bool:
     if change.kind in ("time", "run_time", "work") or change.before is None or change.after is None:
         return False
     outcomes = (str(change.before_outcome), str(change.after_outcome))
+    if change.rounding is not None and outcomes[0] == outcomes[1]:
+        return change.word != "same" and change.before != change.after
     return moved(change.before, change.after, outcomes)
 
 

@@ -7,6 +7,8 @@
 5. Errors are compared by magnitude, the rest by what is better. A growth within the tolerance is only
    "changed", and so is one that ends at least three decades inside the limit: it is named in decades, and the
    comparison with the last release catches it if it creeps on.
+6. Where pushes of the last bits were measured beside a value, what they grow to is rounding, and all beyond it a
+   change, told against what halving the time step changes.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from spook_tracker.tracker.document.run_document import (
     MapData,
     OutcomeClass,
     Sample,
+    Sensitivity,
     SeriesDefinition,
 )
 from spook_tracker.tracker.judge.standing import honest
@@ -166,6 +169,8 @@ def _by_class(before: Sample, after: Sample, decades: float | None, ulps: int | 
 def _by_size(
     definition: SeriesDefinition, old: float, new: float, decades: float | None, ulps: int | None
 ) -> Verdict:
+    if definition.sensitivity is not None:
+        return _by_sensitivity(definition, definition.sensitivity, old, new)
     badness_before, badness_after = badness(definition, old), badness(definition, new)
     if badness_before is None or badness_after is None:
         return Verdict(
@@ -187,6 +192,29 @@ def _by_size(
     if growth > 0.0:
         return Verdict(word="regressed", sentence=words, name=_called(definition), decades=decades, ulps=ulps)
     return Verdict(word="improved", sentence=words, decades=decades, ulps=ulps)
+
+
+def _by_sensitivity(definition: SeriesDefinition, known: Sensitivity, old: float, new: float) -> Verdict:
+    """A value without a reference: rounding, or a change, which is told against what else moves it."""
+    moved, unit = abs(new - old), definition.unit
+    if moved <= known.rounding:
+        if math.isinf(known.rounding):
+            words = "beyond the time until which this can be predicted"
+        else:
+            words = f"rounding: {moved:.2g} {unit}, and pushes of the last bits grow to {known.rounding:.2g}"
+        return Verdict(word="same", sentence=words)
+    told = f"moved by {moved:.3g} {unit}"
+    if known.step_error is not None and math.isfinite(known.step_error) and known.step_error > 0.0:
+        told += f": {_times(moved / known.step_error)} what halving the time step changes"
+    if known.scale and math.isfinite(known.scale) and unit == "m":
+        told += f", {moved / known.scale:.2g} of the size"
+    if 0.0 < definition.tolerance < moved:
+        return Verdict(word="regressed", sentence=told, name="moved")
+    return Verdict(word="changed", sentence=told)
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2g} times" if 1e-3 <= ratio < 1e6 else f"{ratio:.0e} times"
 
 
 def _called(definition: SeriesDefinition) -> str:

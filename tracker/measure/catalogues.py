@@ -2,6 +2,7 @@
 
     standard                   ours, which needs SciPy
     any other word             what an installed package announces as an entry point "spook_tracker.catalogues"
+    robot.xml, arm=arm.urdf    a model file; a tracker.toml with [[model]] tables (tracker.measure.model_files)
     my_tests, my_tests:NAME    a module with a table name → ScalarTest, called CATALOGUE or NAME
 
 The folder one stands in is looked at, too: a team's own questions need no installation.
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +22,8 @@ from spook_tracker.engine.find import thrown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.measure.model_files import catalogue as catalogue_of_models
+from spook_tracker.tracker.measure.model_files import is_model
 
 STANDARD = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
 GROUP = "spook_tracker.catalogues"
@@ -30,22 +33,39 @@ class CatalogueError(TrackerError):
     """There is no such catalogue, or it is none; one sentence that names the way out."""
 
 
+class Several(Mapping[str, ScalarTest]):
+    """Catalogues one after the other; none of our own tests is imported before it is asked for."""
+
+    def __init__(self, parts: Mapping[str, Mapping[str, ScalarTest]]) -> None:
+        self.owner: dict[str, Mapping[str, ScalarTest]] = {}
+        first: dict[str, str] = {}
+        for name, part in parts.items():
+            for test in part:
+                if test in first:
+                    raise CatalogueError(f"{first[test]} and {name} both have a test {test!r}; rename one")
+                self.owner[test], first[test] = part, name
+
+    def __getitem__(self, test: str) -> ScalarTest:
+        return self.owner[test][test]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.owner)
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+
 def find(names: str) -> Mapping[str, ScalarTest]:
     """The tests of the catalogues named, in that order. A test that two of them have is refused."""
     asked_for = [part.strip() for part in names.split(",")]
     if len(asked_for) == 1:
         return _one(asked_for[0])
-    found: dict[str, ScalarTest] = {}
-    owner: dict[str, str] = {}
-    for name in asked_for:
-        for test, asked in _one(name).items():
-            if test in found:
-                raise CatalogueError(f"{owner[test]} and {name} both have a test {test!r}; rename one")
-            found[test], owner[test] = asked, name
-    return found
+    return Several({name: _one(name) for name in asked_for})
 
 
 def _one(name: str) -> Mapping[str, ScalarTest]:
+    if is_model(name):
+        return catalogue_of_models(name)
     try:
         found = _loaded(STANDARD if name == "standard" else name)
         if isinstance(found, Catalogue) and find_spec("scipy") is not None:

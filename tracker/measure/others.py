@@ -29,7 +29,9 @@ def asked_of(
     Single values are asked in each configuration, or in the first alone; ladders in each.
     """
     return {
-        name: replace(
+        name: test
+        if test.as_given
+        else replace(
             test,
             measurements=tuple(
                 _measurements(test, configurations if every_setting else configurations[:1], gating)

@@ -14,10 +14,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+import msgspec
+
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
+    Estimate,
     Figure,
     Measurement,
     Metric,
@@ -33,6 +36,7 @@ from spook_tracker.tracker.document.run_document import (
     MapData,
     OutcomeClass,
     Sample,
+    Sensitivity,
     SeriesDefinition,
 )
 from spook_tracker.tracker.measure.definition import definition_hash
@@ -163,7 +167,7 @@ def metric_series(name: str, test: ScalarTest, measurement: Measurement, metric:
         unit=metric.unit,
         role=metric.role,
         better=metric.better,
-        kind="scalar",
+        kind="time" if metric.noisy else "scalar",
         time_step=measurement.time_step,
         parameters={key: float(value) for key, value in measurement.parameters.items()},
         limit=metric.limit,
@@ -192,13 +196,26 @@ def measure(name: str, test: ScalarTest, measurement: Measurement, simulate: Sim
             if metric.name in answer.value:
                 outcome = ask(partial(float, answer.value[metric.name])).settled(witness)
             else:
-                given = ", ".join(sorted(map(str, answer.value))) or "nothing"
+                there = ", ".join(sorted(map(str, answer.value))) or "nothing"
                 outcome = Outcome(
-                    None, "missing", sentence(f"the measurement gave no {metric.name!r}, only {given}")
+                    None, "missing", sentence(f"the measurement gave no {metric.name!r}, only {there}")
                 )
         series = metric_series(name, test, measurement, metric)
+        given = answer.value.get(metric.name) if answer.outcome == "value" else None
+        if isinstance(given, Estimate):
+            series = msgspec.structs.replace(series, sensitivity=_sensitivity(given))
+            if given.unsettled and outcome.outcome == "value":
+                outcome = Outcome(outcome.value, "unsettled", sentence(given.unsettled))
         measured.append((series, judged_sample(series.key, metric, outcome, witness)))
     return tuple(measured)
+
+
+def _sensitivity(given: Estimate) -> Sensitivity:
+    return Sensitivity(
+        rounding=Number(given.rounding),
+        step_error=None if given.step_error is None else Number(given.step_error),
+        scale=None if given.scale is None else Number(given.scale),
+    )
 
 
 def _mapping(values: Any) -> Mapping[str, float]:

@@ -1,0 +1,71 @@
+"""A model file as something an engine can be asked: which file, started and driven how, and what of it is watched.
+
+A `ModelRun` takes the place of a `Scene` in `simulate`: an engine that reads the file's format loads it with its own
+loader and gives a `Result`. One without says so: `NotSupported`. Nothing here reads a file (`engine.model_reading`
+does) and nothing here knows an engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Format = Literal["MJCF", "URDF", "SDF"]
+DRIVES = ("zero", "hold", "table", "sinusoid", "function")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watched:
+    """A body whose place and turn are read. An unnamed one is found from its nearest named ancestor (or the world, "")
+    by the places of children, each from 0: ("torso", (2, 0)) is the first child of the third child of torso."""
+
+    label: str  # what a reader sees; unique in its model
+    name: str  # as the file has it
+    path: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What the actuators get over time. A table holds each row from its time on; a function gets (time [s], count)."""
+
+    kind: Literal["zero", "hold", "table", "sinusoid", "function"] = "zero"
+    rows: tuple[tuple[float, ...], ...] = ()  # of a table: time [s], then a control each
+    amplitude: float = 0.0  # of a sinusoid, in the unit of the controls
+    frequency: float = 0.0  # Hz
+    function: str = ""  # module:name
+    digest: str = ""  # of the module that holds the function: another one is another test
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelFile:
+    """A model and how it is started. `digest` is a hash over all its files: where it lies makes no other model."""
+
+    path: str = field(metadata={"definition": False})
+    format: Format
+    digest: str
+    time_step: float  # s, the file's own
+    watched: tuple[Watched, ...]
+    keyframe: str = ""  # its name, or its number; "": as the file describes it
+    drive: Drive = Drive()
+    assets: Mapping[str, str] = field(default_factory=dict, metadata={"definition": False})  # name → path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelRun:
+    """One simulation of a model: what `simulate` is given in place of a scene.
+
+    The Result's observables are, of the watched bodies B at the samples S: position (S, B, 3) m, orientation
+    (S, B, 4), both from the world; speed (B,) m/s of the end, size () m of what moves, and of the last state
+    overlap () m, load () N carried by contacts with what does not move over the weight of what moves. With
+    `until_settled` the run ends early: settled () is the time [s] it did, NaN if it did not, and creep (B,) m/s. With
+    `timed`: load_seconds, step_seconds and worst_step_seconds, real_time_factor, megabytes.
+    """
+
+    model: ModelFile
+    samples: tuple[float, ...] = ()  # s, growing
+    until_settled: bool = False
+    push: float = 0.0  # of the size a second and a body, as random changes of velocity in every step
+    seed: int = 0
+    timed: bool = False
+    elsewhere: bool = False  # in a process of its own

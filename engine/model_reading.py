@@ -1,0 +1,396 @@
+"""What can be said of a model file without any engine: its files, their hash, its bodies, its time step.
+
+Only XML is read, and with care, for the file may come from anywhere: no entities, bounded size, depth and number of
+files, and nothing outside the folder the model belongs to. Includes, attached models, meshes, height fields and
+textures are followed; together they are the model, and their hash is its definition.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree
+
+from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.model_file import Format, Watched
+
+MOST_BYTES = 64_000_000  # of one file; the largest mesh of the robots people share has a third of that
+MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten times their text in memory
+MOST_FILES = 3_000
+DEEPEST = 200  # elements within elements; engines read models recursively
+MOST_WATCHED = 8
+TIME_STEP = 0.002  # s, of MJCF that names none; also what MuJoCo gives a URDF
+ROOTS = (".git", "tracker.toml", "pyproject.toml", "package.xml")  # whose folder is a whole
+INSTALLED = ("site-packages", "dist-packages")  # whose folders are wholes
+FILES_OF = {  # element: attributes that name files
+    "mesh": ("file", "filename"),
+    "hfield": ("file",),
+    "skin": ("file",),
+    "flexcomp": ("file",),
+    "texture": ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"),
+}
+MOVES_URDF = (
+    "revolute",
+    "continuous",
+    "prismatic",
+    "floating",
+    "planar",
+    "ball",
+    "universal",
+    "screw",
+    "revolute2",
+)
+
+
+class ModelError(EngineError, ValueError):
+    """A model file cannot be read; one sentence that names the file and what is wrong with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """What a model consists of."""
+
+    path: Path
+    format: Format
+    files: tuple[Path, ...]  # itself first
+    digest: str
+    time_step: float  # s
+    watched: tuple[Watched, ...]  # free bodies and the ends of its chains
+    keyframes: tuple[str, ...] = ()
+    bodies: int = 0  # that move
+    stands_free: bool = False  # everything that moves is free: nothing but contacts carries it
+    assets: dict[str, Path] = field(default_factory=dict)  # a URDF's meshes, by the name after the last slash
+
+
+@dataclass(slots=True)
+class _Body:
+    """A body of the file; `moves` by joints of its own."""
+
+    name: str
+    moves: bool = False
+    free: bool = False
+    children: list[_Body] = field(default_factory=list)
+
+
+def folder_of(path: Path) -> Path:
+    """The folder a model belongs to: its repository, installed package or ROS package; else the one it lies in."""
+    here = path.resolve().parent
+    for folder in (here, *here.parents):
+        if folder.parent.name in INSTALLED or any((folder / name).exists() for name in ROOTS):
+            return folder
+    return here
+
+
+def read(path: Path, folder: Path | None = None) -> Reading:
+    """The model in the file `path`; nothing outside `folder` (by default `folder_of` it) is touched. ModelError."""
+    return _Reader(path, (folder or folder_of(path)).resolve()).reading()
+
+
+class _Reader:
+    """The files of one model, as they are found."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        self.path, self.folder = path, folder
+        self.files: dict[Path, None] = {}
+        self.attached: set[Path] = set()
+
+    def reading(self) -> Reading:
+        root = self.parsed(self.path)
+        if root.tag == "robot":
+            return self.urdf(root)
+        if root.tag == "sdf":
+            return self.sdf(root)
+        if root.tag == "mujoco":
+            return self.mjcf(root)
+        raise ModelError(
+            f"{self.path} is no model by itself: it begins with <{root.tag}>; a model begins with <mujoco>, <robot> or <sdf>"
+        )
+
+    def inside(self, path: Path, named_in: Path) -> Path:
+        """The file itself, if it lies inside the folder."""
+        found = path.resolve()
+        if not found.is_relative_to(self.folder):
+            raise ModelError(
+                f'{named_in} names {path}, which lies outside {self.folder}; say folder = "…" in its [[model]] '
+                "if it belongs to the model"
+            )
+        return found
+
+    def taken(self, path: Path, named_in: Path, most: int = MOST_BYTES) -> Path:
+        """A file of the model, whose size is bounded."""
+        found = self.inside(path, named_in)
+        if not found.is_file():
+            raise ModelError(
+                f"{path} is no file" if path == named_in else f"{named_in} names {path}, which is no file"
+            )
+        if (size := found.stat().st_size) > most:
+            raise ModelError(
+                f"{path} has {size / 1e6:.0f} MB; a file of a model may have {most / 1e6:.0f} MB"
+            )
+        self.files.setdefault(found)
+        if len(self.files) > MOST_FILES:
+            raise ModelError(f"{self.path} consists of more than {MOST_FILES} files")
+        return found
+
+    def parsed(self, path: Path, named_in: Path | None = None) -> ElementTree.Element:
+        """The XML of one file of the model."""
+        text = self.taken(path, named_in or path, MOST_XML).read_bytes()
+        if b"<!ENTITY" in text:
+            raise ModelError(
+                f"{path} declares XML entities, which no model needs; write out what they stand for"
+            )
+        try:
+            root = ElementTree.fromstring(text)
+        except (ElementTree.ParseError, ValueError, LookupError) as error:
+            raise ModelError(f"{path} is no XML: {error}") from None
+        level, depth = [root], 0
+        while level:
+            level, depth = [child for element in level for child in element], depth + 1
+            if depth > DEEPEST:
+                raise ModelError(f"{path} has elements nested deeper than {DEEPEST}")
+        return root
+
+    def first(self, name: str, places: list[Path], named_in: Path) -> Path:
+        """A named file, looked for in several folders; the first place is the one that is named if it is nowhere."""
+        written = Path(name.removeprefix("file://"))
+        candidates = [written] if written.is_absolute() else [place / written for place in places]
+        if not written.is_absolute() and all(
+            not candidate.resolve().is_relative_to(self.folder) for candidate in candidates
+        ):
+            self.inside(candidates[0], named_in)
+        inside = [c for c in candidates if c.resolve().is_relative_to(self.folder)]
+        there = next((candidate for candidate in inside if candidate.is_file()), (inside or candidates)[0])
+        return self.taken(there, named_in)
+
+    # MJCF
+
+    def mjcf(self, root: ElementTree.Element) -> Reading:
+        self.expand(root, self.path.parent, self.path, (self.path.resolve(),))
+        bodies = _Body("")
+        for world in root.findall("worldbody"):
+            _gather(world, bodies)
+        if not any(len(world) for world in root.findall("worldbody")):
+            raise ModelError(
+                f"{self.path} is no model by itself: nothing is in its world; it is a part for inclusion"
+            )
+        self.mjcf_files(root, self.path.parent, self.path)
+        steps = [o.get("timestep") for o in root.findall("option") if o.get("timestep")]
+        keys = [key for frames in root.findall("keyframe") for key in frames.findall("key")]
+        return self.found(
+            "MJCF",
+            bodies,
+            _step(steps[-1], self.path) if steps else TIME_STEP,
+            keyframes=tuple(key.get("name") or str(place) for place, key in enumerate(keys)),
+        )
+
+    def expand(self, element: ElementTree.Element, main: Path, file: Path, within: tuple[Path, ...]) -> None:
+        """Put what is included in its place."""
+        place = 0
+        while place < len(element):
+            child = element[place]
+            if child.tag != "include":
+                self.expand(child, main, file, within)
+                place += 1
+                continue
+            name = child.get("file")
+            if not name:
+                raise ModelError(f"{file} includes a file it does not name")
+            found = self.first(name, [main, file.parent], file)
+            if found in within:
+                raise ModelError(f"{file} includes {found.name}, which includes it")
+            included = self.parsed(found, file)
+            self.expand(included, main, found, (*within, found))
+            element[place : place + 1] = list(included)
+            place += len(included)
+
+    def mjcf_files(self, root: ElementTree.Element, main: Path, file: Path) -> None:
+        """Meshes, height fields, skins, textures and attached models."""
+        folders = {"mesh": "", "texture": ""}
+        for compiler in root.findall("compiler"):
+            both = compiler.get("assetdir")
+            folders["mesh"] = compiler.get("meshdir", both or folders["mesh"])
+            folders["texture"] = compiler.get("texturedir", both or folders["texture"])
+        for element in root.iter():
+            if element.tag == "model" and element.get("file"):
+                child = self.first(str(element.get("file")), [main, file.parent], file)
+                if child not in self.attached:
+                    self.attached.add(child)
+                    other = self.parsed(child, file)
+                    if other.tag == "mujoco":
+                        self.expand(other, child.parent, child, (child,))
+                        self.mjcf_files(other, child.parent, child)
+            for attribute in FILES_OF.get(element.tag, ()):
+                if name := element.get(attribute):
+                    folder = folders["texture" if element.tag == "texture" else "mesh"]
+                    self.first(name, [main / folder, main], file)
+
+    # URDF and SDF
+
+    def urdf(self, root: ElementTree.Element) -> Reading:
+        links = {link.get("name", ""): _Body(link.get("name", "")) for link in root.findall("link")}
+        if not links:
+            raise ModelError(f"{self.path} is no model: it has no links")
+        inner = set()
+        for joint in root.findall("joint"):
+            ends = [joint.find("parent"), joint.find("child")]
+            names = [end.get("link", "") if end is not None else "" for end in ends]
+            if stray := [name for name in names if name not in links]:
+                raise ModelError(
+                    f"{self.path}: joint {joint.get('name', '')!r} ties link {stray[0]!r}, which is not there"
+                )
+            child = links[names[1]]
+            child.moves = joint.get("type") in MOVES_URDF
+            child.free = joint.get("type") == "floating"
+            links[names[0]].children.append(child)
+            inner.add(names[1])
+        bodies = _Body("", children=[link for name, link in links.items() if name not in inner])
+        if not bodies.children:
+            raise ModelError(f"{self.path}: its joints make a circle, so no link is the first")
+        assets = {}
+        for collision in (False, True):  # what collides goes before what is only seen
+            for mesh in (
+                m for k in root.iter("collision" if collision else "visual") for m in k.iter("mesh")
+            ):
+                if name := mesh.get("filename"):
+                    assets[name.rpartition("/")[2]] = self.first(
+                        _local(name), self.ros_places(name), self.path
+                    )
+        return self.found("URDF", bodies, TIME_STEP, assets=assets)
+
+    def ros_places(self, name: str) -> list[Path]:
+        """Where a mesh may lie: beside the file, or in any folder above that the package could be."""
+        above = [f for f in self.path.resolve().parents if f.is_relative_to(self.folder)]
+        package = name.removeprefix("package://").partition("/")[0] if name.startswith("package://") else ""
+        named = [folder / package for folder in above] + [f for f in above if f.name == package]
+        return [*(named if package else []), self.path.parent]
+
+    def sdf(self, root: ElementTree.Element) -> Reading:
+        bodies = _Body("")
+        step = root.findtext(".//physics/max_step_size")
+        for model in root.iter("model"):
+            links = {link.get("name", ""): _Body(link.get("name", "")) for link in model.findall("link")}
+            inner = set()
+            for joint in model.findall("joint"):
+                parent, child = (joint.findtext(end, "").strip() for end in ("parent", "child"))
+                if child in links:
+                    links[child].moves = joint.get("type") in MOVES_URDF
+                    inner.add(child)
+                    if parent in links:
+                        links[parent].children.append(links[child])
+            fixed = model.findtext("static", "false").strip() in ("true", "1")
+            for name, link in links.items():
+                if name not in inner:
+                    link.moves = link.free = not fixed
+                    bodies.children.append(link)
+        if not bodies.children:
+            raise ModelError(f"{self.path} is no model: it has no links")
+        for mesh in root.iter("uri"):
+            if mesh.text and "://" not in mesh.text.removeprefix("file://").removeprefix("model://"):
+                self.first(
+                    mesh.text.removeprefix("model://"), [self.path.parent, self.path.parent.parent], self.path
+                )
+        return self.found("SDF", bodies, _step(step, self.path) if step else 0.001)
+
+    def found(
+        self,
+        format: Format,
+        bodies: _Body,
+        time_step: float,
+        keyframes: tuple[str, ...] = (),
+        assets: dict[str, Path] | None = None,
+    ) -> Reading:
+        every = list(_moving(bodies, "", (), False))
+        if not every:
+            raise ModelError(f"nothing in {self.path} moves: it has no joints; it is a part of other models")
+        tops = [body for _, body, top in every if top]
+        return Reading(
+            path=self.path,
+            format=format,
+            files=tuple(self.files),
+            digest=self.digest(),
+            time_step=time_step,
+            watched=_labelled(
+                [found for found, body, top in every if body.free or not _drives(body)][:MOST_WATCHED]
+            ),
+            keyframes=keyframes,
+            bodies=len(every),
+            stands_free=all(body.free for body in tops),
+            assets=assets or {},
+        )
+
+    def digest(self) -> str:
+        """Over the content of all files and where they lie beside the first one."""
+        main = self.path.resolve().parent
+        total = hashlib.sha256()
+        for file in sorted(self.files, key=lambda f: Path(_beside(f, main)).as_posix()):
+            total.update(f"{_beside(file, main)}\0".encode())
+            total.update(hashlib.sha256(file.read_bytes()).digest())
+        return total.hexdigest()[:16]
+
+
+def _beside(file: Path, main: Path) -> str:
+    """Where a file lies seen from the first one."""
+    return Path(os.path.relpath(file, main)).as_posix()
+
+
+def _local(name: str) -> str:
+    """Where in its package: package://name/meshes/a.stl -> meshes/a.stl."""
+    return name.removeprefix("package://").partition("/")[2] if name.startswith("package://") else name
+
+
+def _step(text: str | None, path: Path) -> float:
+    try:
+        step = float(text or "")
+    except ValueError:
+        raise ModelError(f"{path}: its time step is {text!r}, which is no number") from None
+    if not 0.0 < step <= 1.0:
+        raise ModelError(f"{path}: its time step is {step:g} s")
+    return step
+
+
+def _gather(element: ElementTree.Element, into: _Body) -> None:
+    """Bodies of MJCF, also those in frames."""
+    for child in element:
+        if child.tag == "body":
+            body = _Body(child.get("name", ""))
+            body.free = any(
+                j.tag == "freejoint" or (j.tag == "joint" and j.get("type") == "free") for j in _joints(child)
+            )
+            body.moves = any(True for _ in _joints(child))
+            into.children.append(body)
+            _gather(child, body)
+        elif child.tag in ("frame", "replicate"):
+            _gather(child, into)
+
+
+def _joints(body: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    for child in body:
+        if child.tag in ("joint", "freejoint"):
+            yield child
+        elif child.tag == "frame":
+            yield from _joints(child)
+
+
+def _moving(
+    body: _Body, name: str, path: tuple[int, ...], inside: bool
+) -> Iterator[tuple[Watched, _Body, bool]]:
+    """Bodies with joints of their own, how each is found, and whether nothing above it moves."""
+    for place, child in enumerate(body.children):
+        where = (child.name, ()) if child.name else (name, (*path, place))
+        if child.moves:
+            label = child.name or ".".join([name or "world", *map(str, where[1])])
+            yield Watched(label=label.replace("/", "."), name=where[0], path=where[1]), child, not inside
+        yield from _moving(child, *where, inside or child.moves)
+
+
+def _drives(body: _Body) -> bool:
+    """Whether some body below it has joints of its own."""
+    return any(child.moves or _drives(child) for child in body.children)
+
+
+def _labelled(found: list[Watched]) -> tuple[Watched, ...]:
+    """Each label once: a name that replicate or attach would make twice keeps its first body."""
+    return tuple({one.label: one for one in found}.values())

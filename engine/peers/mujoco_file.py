@@ -1,0 +1,350 @@
+"""A user's own model in MuJoCo: loaded by MuJoCo's loader, its options as the file has them, run and read.
+
+Every release since 2.3 can do this: nothing of the bindings is used that came or went since. The file stays as it
+is; a time step other than its own is set in the compiled model.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.model_file import Drive, ModelRun, Watched
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.engine.result import Result
+
+Array = npt.NDArray[np.float64]
+BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+READS = ("MJCF", "URDF")
+CALM = 1e-3  # of the size a second: nothing faster, nothing turning faster than that at its rim
+CALM_FOR = 0.5  # s
+LOOK = 0.02  # s between two looks at whether all is calm
+LOADS = 3  # times a file is loaded to tell how long it takes
+ELSEWHERE_LIMIT = 120.0  # s
+
+
+def run_model(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
+    """Load the file, drive it for `duration` [s] and read what is asked for."""
+    if run.elsewhere:
+        return _elsewhere(run, time_step, duration, time_limit)
+    began = time.perf_counter()
+    try:
+        first = load(run)
+    except (ValueError, OSError) as error:
+        raise NotSupported(f"mujoco refuses {Path(run.model.path).name}: {_line(error)}") from None
+    loads = [time.perf_counter() - began]
+    if run.timed:
+        for _ in range(LOADS - 1):
+            began = time.perf_counter()
+            load(run)
+            loads.append(time.perf_counter() - began)
+    return _Simulation(run, first, time_step, time_limit).result(duration, min(loads))
+
+
+def load(run: ModelRun) -> Any:
+    """The compiled model; a URDF's meshes are handed in, for MuJoCo does not know where packages lie."""
+    path = Path(run.model.path)
+    if run.model.format == "URDF":
+        assets = {name: Path(file).read_bytes() for name, file in run.model.assets.items()}
+        return mujoco.MjModel.from_xml_string(path.read_text(encoding="utf-8"), assets)
+    return mujoco.MjModel.from_xml_path(str(path))
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:240]
+
+
+def _elsewhere(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
+    """The same in a process of its own."""
+    from dataclasses import replace
+
+    asked = pickle.dumps((replace(run, elsewhere=False), time_step, duration, time_limit))
+    done = subprocess.run(
+        [sys.executable, "-m", __name__], input=asked, capture_output=True, timeout=ELSEWHERE_LIMIT
+    )
+    if done.returncode:
+        raise EngineError(
+            f"mujoco died in a process of its own: {done.stderr.decode(errors='replace')[-200:]}"
+        )
+    found: Result = pickle.loads(done.stdout)
+    return found
+
+
+class _Simulation:
+    """One model with its data."""
+
+    def __init__(self, run: ModelRun, model: Any, time_step: float, time_limit: float | None) -> None:
+        self.run, self.model, self.step, self.limit = run, model, time_step, time_limit
+        model.opt.timestep = time_step
+        self.data = mujoco.MjData(model)
+        if run.model.keyframe:
+            mujoco.mj_resetDataKeyframe(model, self.data, self._key(run.model.keyframe))
+        self.bodies = np.array([self._body(one) for one in run.model.watched], dtype=int)
+        mujoco.mj_forward(model, self.data)
+        self.moving = np.flatnonzero(np.asarray(model.body_weldid) != 0)
+        self.size = self._size()
+        self.drive = _driven(run.model.drive, model, self.data)
+        self.random = np.random.default_rng(run.seed)
+        self.done = 0
+        self.seconds = self.cpu = self.worst = 0.0
+        self.failure = ""
+
+    def _key(self, name: str) -> int:
+        found = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, name))
+        if found < 0 and name.isdigit():
+            found = int(name)
+        if not 0 <= found < self.model.nkey:
+            raise NotSupported(f"the model has no keyframe {name!r}")
+        return found
+
+    def _body(self, watched: Watched) -> int:
+        found = 0
+        if watched.name:
+            found = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, watched.name))
+        for place in watched.path:
+            children = np.flatnonzero(np.asarray(self.model.body_parentid) == found)
+            children = children[children > 0]
+            found = int(children[place]) if found >= 0 and place < len(children) else -1
+        if found < 0:
+            raise NotSupported(f"mujoco finds no body {watched.label!r} in {Path(self.run.model.path).name}")
+        return found
+
+    def _size(self) -> float:
+        """Of what moves: how far its geoms reach from their middle, twice; its bodies where it has no geoms [m]."""
+        m, d = self.model, self.data
+        geoms = np.flatnonzero(np.asarray(m.body_weldid)[np.asarray(m.geom_bodyid)] != 0)
+        places = d.geom_xpos[geoms] if len(geoms) else d.xpos[self.moving]
+        reach = np.asarray(m.geom_rbound)[geoms] if len(geoms) else np.zeros(len(places))
+        if not len(places):
+            raise NotSupported(f"nothing in {Path(self.run.model.path).name} moves")
+        size = 2.0 * float(np.max(np.linalg.norm(places - places.mean(axis=0), axis=1) + reach))
+        return size if np.isfinite(size) and size > 0.0 else float(m.stat.extent)
+
+    def result(self, duration: float, load_seconds: float) -> Result:
+        run, total = self.run, round(duration / self.step)
+        looks = {total}
+        marks = {min(total, round(at / self.step)) for at in run.samples}
+        if run.until_settled:
+            every = max(1, round(LOOK / self.step))
+            looks |= set(range(every, total, every))
+        positions, turns = [], []
+        recent: deque[tuple[int, Array]] = deque()
+        calm_since: int | None = None
+        settled, creep = float("nan"), np.full(len(self.bodies), np.nan)
+        status: Any = "completed"
+        for mark in sorted(marks | looks):
+            self.advance(mark)
+            if self.failure:
+                status = "timed_out" if self.failure.startswith("stopped") else "diverged"
+                break
+            self.read()
+            if mark in marks:
+                positions.append(self.data.xpos[self.bodies].copy())
+                turns.append(self.data.xquat[self.bodies].copy())
+            if not run.until_settled:
+                continue
+            recent.append((mark, self.data.xpos[self.bodies].copy()))
+            calm_since = (calm_since if calm_since is not None else mark) if self.calm() else None
+            while (mark - recent[0][0]) * self.step > CALM_FOR + 1e-9:
+                recent.popleft()
+            since, there = recent[0]
+            if mark > since:
+                creep = np.linalg.norm(recent[-1][1] - there, axis=1) / ((mark - since) * self.step)
+            if calm_since is not None and (mark - calm_since) * self.step >= CALM_FOR - 1e-9:
+                settled = calm_since * self.step
+                break
+        if not run.samples and status == "completed":
+            positions.append(self.data.xpos[self.bodies].copy())
+            turns.append(self.data.xquat[self.bodies].copy())
+        return self.told(status, positions, turns, settled, creep, load_seconds)
+
+    def advance(self, to: int) -> None:
+        """Step to that many steps; in one call where nothing changes on the way."""
+        m, d, run = self.model, self.data, self.run
+        stepwise = bool(run.push) or run.timed or self.drive.varies
+        while self.done < to and not self.failure:
+            count = min(to - self.done, 200)
+            began, begun = time.perf_counter(), time.process_time()
+            if stepwise:
+                pushes = (
+                    run.push * self.size * self.random.uniform(-1.0, 1.0, (count, m.nv)) if run.push else None
+                )
+                last = began
+                for k in range(count):
+                    self.drive.apply(d)
+                    if pushes is not None:
+                        d.qvel += pushes[k]
+                    mujoco.mj_step(m, d)
+                    if run.timed:
+                        now = time.perf_counter()
+                        self.worst, last = max(self.worst, now - last), now
+            else:
+                mujoco.mj_step(m, d, count)
+            self.seconds += time.perf_counter() - began
+            self.cpu += time.process_time() - begun
+            self.done += count
+            for kind in BAD:
+                if d.warning[getattr(mujoco.mjtWarning, kind)].number:
+                    self.failure = f"mujoco reset a state it calls bad ({kind[7:].lower()}) before {self.done * self.step:.4g} s"
+            if not np.isfinite(d.qpos).all():
+                self.failure = f"a place is not finite after {self.done * self.step:.4g} s"
+            if self.limit is not None and self.seconds > self.limit and self.done < to:
+                self.failure = (
+                    f"stopped after {self.limit:g} s, at {self.done * self.step:.4g} s of simulated time"
+                )
+
+    def read(self) -> None:
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_comVel(self.model, self.data)
+
+    def speeds(self, bodies: Any) -> tuple[Array, Array]:
+        """Of the centres of mass [m/s], and of turning [rad/s]."""
+        m, d = self.model, self.data
+        spin = d.cvel[bodies, :3]
+        arm = d.xipos[bodies] - d.subtree_com[np.asarray(m.body_rootid)[bodies]]
+        return np.linalg.norm(d.cvel[bodies, 3:] + np.cross(spin, arm), axis=1), np.linalg.norm(spin, axis=1)
+
+    def calm(self) -> bool:
+        moving, turning = self.speeds(self.moving)
+        return bool(max(moving.max(), 0.5 * self.size * turning.max()) < CALM * self.size)
+
+    def told(
+        self,
+        status: Any,
+        positions: list[Array],
+        turns: list[Array],
+        settled: float,
+        creep: Array,
+        load: float,
+    ) -> Result:
+        m, d, count = self.model, self.data, len(self.bodies)
+        overlap, carried = self.contacts() if status == "completed" else (0.0, 0.0)
+        values: dict[str, Any] = {
+            "position": np.array(positions).reshape(-1, count, 3),
+            "orientation": np.array(turns).reshape(-1, count, 4),
+            "size": np.array(self.size),
+            "overlap": np.array(overlap),
+            "load": np.array(carried),
+        }
+        if status == "completed":
+            values["speed"] = self.speeds(self.bodies)[0]
+            values["fastest"] = np.array(self.speeds(self.moving)[0].max())
+        if self.run.until_settled:
+            values |= {"settled": np.array(settled), "creep": creep}
+        if self.run.timed:
+            each = self.cpu / max(1, self.done)
+            values |= {
+                "load_seconds": np.array(load),
+                "step_seconds": np.array(each),
+                "worst_step_seconds": np.array(self.worst),
+                "real_time_factor": np.array(self.step / each if each else np.inf),
+                "megabytes": np.array(
+                    (mujoco.mj_sizeModel(m) + d.narena) / 1e6 if hasattr(d, "narena") else np.nan
+                ),
+            }
+        state = np.concatenate([d.qpos, d.qvel, np.asarray(d.act)])
+        names = [one.label for one in self.run.model.watched]
+        return Result(
+            status=status,
+            failure=self.failure,
+            failed_body=None,
+            failed_step=self.done if self.failure else None,
+            time_step=self.step,
+            steps=self.done,
+            seconds=self.seconds,
+            cpu_seconds=self.cpu,
+            observables=values,
+            sample_times={},
+            final_state=dict(zip(names, np.hstack([d.xpos[self.bodies], d.xquat[self.bodies]]), strict=True)),
+            counters={},
+            state_hash=hashlib.sha256(np.ascontiguousarray(state).tobytes()).hexdigest()[:16],
+            stages=(),
+            stage_seconds={"setup": load},
+        )
+
+    def contacts(self) -> tuple[float, float]:
+        """The deepest overlap [m] of the last step, and what contacts with the world carry over the weight of all that moves."""
+        m, d = self.model, self.data
+        mujoco.mj_forward(m, d)
+        if not d.ncon:
+            return 0.0, 0.0
+        touching = d.contact
+        overlap = max(0.0, float(-np.min(touching.dist)))
+        weld = np.asarray(m.body_weldid)[np.asarray(m.geom_bodyid)]
+        gravity = np.asarray(m.opt.gravity)
+        strength = float(np.linalg.norm(gravity))
+        if not strength:
+            return overlap, 0.0
+        frames, wrench, up = np.reshape(touching.frame, (-1, 3, 3)), np.zeros(6), -gravity / strength
+        pairs = getattr(touching, "geom", None)
+        ones, others = (pairs[:, 0], pairs[:, 1]) if pairs is not None else (touching.geom1, touching.geom2)
+        held = 0.0
+        for k in range(d.ncon):
+            if ones[k] < 0 or others[k] < 0 or (weld[ones[k]] != 0) == (weld[others[k]] != 0):
+                continue
+            mujoco.mj_contactForce(m, d, k, wrench)
+            force = float(frames[k].T @ wrench[:3] @ up)  # on the second
+            held += force if weld[others[k]] != 0 else -force
+        return overlap, held / (strength * float(np.asarray(m.body_mass)[self.moving].sum()))
+
+
+class _Driven:
+    """The controls over time."""
+
+    def __init__(self, drive: Drive, count: int, function: Callable[[float, int], Any] | None) -> None:
+        self.drive, self.count, self.function = drive, count, function
+        self.varies = bool(count) and drive.kind in ("table", "sinusoid", "function")
+        rows = np.array(drive.rows or np.zeros((0, count + 1)), dtype=float)
+        self.times, self.values = rows[:, 0], rows[:, 1:]
+
+    def apply(self, data: Any) -> None:
+        if not self.varies:
+            return
+        if self.function is not None:
+            data.ctrl[:] = self.function(float(data.time), self.count)
+        elif self.drive.kind == "sinusoid":
+            data.ctrl[:] = self.drive.amplitude * np.sin(2.0 * np.pi * self.drive.frequency * data.time)
+        else:
+            place = int(np.searchsorted(self.times, data.time + 1e-12, side="right")) - 1
+            data.ctrl[:] = self.values[place] if place >= 0 else 0.0
+
+
+def _driven(drive: Drive, model: Any, data: Any) -> _Driven:
+    if drive.kind == "table" and drive.rows and len(drive.rows[0]) != model.nu + 1:
+        raise NotSupported(f"the table has {len(drive.rows[0]) - 1} controls and the model {model.nu}")
+    function = None
+    if drive.kind == "function":
+        module, _, name = drive.function.partition(":")
+        function = getattr(import_module(module), name)
+    if drive.kind == "hold":
+        data.ctrl[:] = holding(model, data)
+    return _Driven(drive, model.nu, function)
+
+
+def holding(model: Any, data: Any) -> Array:
+    """Controls that ask position servos to stay where they are; all others get none."""
+    gain, bias = np.asarray(model.actuator_gainprm)[:, 0], np.asarray(model.actuator_biasprm)[:, 1]
+    servo = (gain > 0.0) & np.isclose(gain, -bias)
+    wanted = np.where(servo, np.asarray(data.actuator_length), 0.0)
+    limited = np.asarray(model.actuator_ctrllimited).astype(bool)
+    low, high = np.asarray(model.actuator_ctrlrange).T if model.nu else (np.zeros(0), np.zeros(0))
+    return np.where(limited, np.clip(wanted, low, high), wanted)
+
+
+if __name__ == "__main__":
+    asked_for = pickle.loads(sys.stdin.buffer.read())
+    sys.stdout.buffer.write(pickle.dumps(run_model(*asked_for)))

@@ -1,0 +1,1 @@
+"""Questions put to a model file, which has no closed form."""

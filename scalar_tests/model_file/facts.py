@@ -1,0 +1,62 @@
+"""What all measurements of a model share: the model, how long it is watched, what counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from spook_tracker.engine.model_file import ModelFile, ModelRun
+from spook_tracker.engine.result import Result
+from spook_tracker.scalar_tests.case import Simulate
+
+Array = npt.NDArray[np.float64]
+CHECKPOINTS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # s: they grow, as what differs does
+LONGEST_REST = 10.0  # s after which what moves is called unsettled
+PUSH = 1e-15  # of the size, in every step: what another order of sums or another compiler does
+PUSHED = 4  # runs, with seeds 1 to 4
+BEYOND = 10.0  # times the largest of four: a fifth run exceeds it once in some thousand series
+UNPREDICTABLE = (
+    0.01  # of the size: where pushes of the last bits have grown to this, places say nothing any more
+)
+GRID = 50  # times at which the growth of the pushes is read
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """A model and for how long [s] it is watched."""
+
+    model: ModelFile
+    duration: float
+
+    @property
+    def checkpoints(self) -> tuple[float, ...]:
+        """Those [s] within the duration; at least its end."""
+        return tuple(t for t in CHECKPOINTS if t <= self.duration + 1e-9) or (self.duration,)
+
+
+def simulated(simulate: Simulate, asked: Asked, duration: float, refined: int = 1, **run: Any) -> Result:
+    """One run of the model, with its own time step divided by `refined`."""
+    step = asked.model.time_step / refined
+    return simulate(ModelRun(model=asked.model, **run), time_step=step, duration=duration)  # type: ignore[arg-type]
+
+
+def turns(orientation: Array, start: Array) -> Array:
+    """Angles [rad] between unit quaternions (…, 4) and those at the start; of two that differ by a sign none."""
+    scalar = np.abs(np.sum(orientation * start, axis=-1))
+    w, x, y, z = (orientation[..., k] for k in range(4))
+    a, b, c, d = (start[..., k] for k in range(4))
+    vector = np.stack(
+        [a * x - b * w - c * z + d * y, a * y + b * z - c * w - d * x, a * z - b * y + c * x - d * w], axis=-1
+    )
+    angle: Array = 2.0 * np.arctan2(np.linalg.norm(vector, axis=-1), scalar)
+    return angle
+
+
+def spread(value: float, others: Sequence[float]) -> float:
+    """How far some others lie from a value at most; infinite if one has none."""
+    return max((abs(other - value) if math.isfinite(other) else math.inf for other in others), default=0.0)

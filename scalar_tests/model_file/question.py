@@ -1,0 +1,88 @@
+"""A model file as a scalar test: what is asked of any model, with no closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+
+from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.model_file import ModelFile
+from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.model_file import cost, motion, rest
+from spook_tracker.scalar_tests.model_file.facts import LONGEST_REST, PUSH, Asked
+
+Measure = Callable[[Asked, Simulate], Mapping[str, float]]
+
+
+def test_of(
+    title: str,
+    model: ModelFile,
+    *,
+    file: str,
+    duration: float = 5.0,
+    stands_free: bool = False,
+    tolerance: float = 0.0,
+    files: int = 1,
+    bodies: int = 0,
+) -> ScalarTest:
+    """The test of a model watched for `duration` [s]; beyond `tolerance` [m, rad] a change is red."""
+    asked = Asked(model=model, duration=duration)
+
+    def part(configuration: str, metrics: tuple[Metric, ...], measure: Measure, note: str) -> Measurement:
+        return Measurement(
+            configuration=configuration,
+            time_step=model.time_step,
+            metrics=tuple(_held(metric, tolerance) for metric in metrics),
+            measure=partial(measure, asked),
+            note=note,
+        )
+
+    return ScalarTest(
+        title=title,
+        question=f"Does {title} move, rest and cost what it did?",
+        why="Engines are upgraded by people who use them, and their models break in silence. A model has no closed form, "
+        "but it has a history: what it did in the release before.",
+        model=f"{model.format} of {files} file{'s' * (files != 1)}, {bodies} bodies with joints; watched are "
+        f"{', '.join(body.label for body in model.watched)}.",
+        parameters=(
+            ("file", file),
+            ("hash of all its files", model.digest),
+            ("time step", f"{model.time_step:g} s, the file's own"),
+            ("start", f"keyframe {model.keyframe}" if model.keyframe else "as the file describes it"),
+            ("controls", model.drive.kind),
+            ("watched for", f"{duration:g} s; until it rests, {LONGEST_REST:g} s at most"),
+        ),
+        theory=(
+            f"The same run is made with pushes of {PUSH:g} of the size in every step: what they grow to is rounding, "
+            "and a difference of releases within it is none.",
+            "What goes beyond is a change, however small. |state(h) − state(h/2)| says how much it is.",
+            "Where the pushes have grown to a hundredth of the size the model can be predicted no longer: places are not "
+            "compared from there on.",
+        ),
+        reference="The same model in the release before.",
+        conclusion="Changed: the release does something else with this model; the sentence says with which body, when and by "
+        "how much.",
+        source="the model's own file",
+        measurements=(
+            part("motion", motion.metrics(asked), motion.measure, "as the file has it"),
+            part(
+                "rest", rest.metrics(asked, stands_free), rest.measure, "as the file has it, until all rests"
+            ),
+            part("repeated", cost.REPEATABILITY, cost.repeatability, "three times the same"),
+            part("cost", cost.COST, cost.cost, "the clock looked at after each step"),
+        ),
+        example=_no_scene,
+        as_given=True,
+    )
+
+
+def _held(metric: Metric, tolerance: float) -> Metric:
+    """A place or turn beyond the team's own tolerance decides."""
+    if metric.better != "inside" or metric.unit not in ("m", "rad") or not tolerance:
+        return metric
+    return replace(metric, role="gate", tolerance=tolerance)
+
+
+def _no_scene() -> Example:
+    raise SceneError("a model file is no scene of ours")
