@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from spook_tracker.tracker.cli.main import main
-from spook_tracker.tracker.cli.settings import KINDS, NOT_MEANT, SettingsError, defaults, read
+from spook_tracker.tracker.cli.settings import KINDS, NOT_MEANT, Settings, SettingsError, defaults, read
 from spook_tracker.tracker.measure.run import Questions
 
 TOY = 'engine = "toy_engine"\ncatalogue = "toy_questions"\n'
@@ -121,7 +121,7 @@ def test_every_setting_is_an_option_of_some_command() -> None:
     assert set(KINDS) <= options
     assert set(NOT_MEANT) <= set(main.commands)
     assert isinstance(main, click.Group)
-    assert "out" not in defaults(main, type("S", (), {"values": {"out": "x"}})())["export"]  # runs, not pages
+    assert "out" not in defaults(main, Settings({"out": "x"}))["export"]  # runs, not pages
 
 
 def limited(*limits: object) -> object:

@@ -5,7 +5,8 @@ reaches, the values of the constants it reads (a Method, a mass, a table), and t
 direction, limit, reference, time step, parameters. Docstrings, comments, layout, names of tests and every
 text a reader sees are not reached, so rewording never makes two runs incomparable. The engine is not hashed
 either: it is what is being measured, and of its options only those a test sets itself count. Set points and
-tolerances judge a value and do not make another one.
+tolerances judge a value and do not make another one. A field with the metadata definition=False is left out: where
+a file lies, whose content is hashed.
 """
 
 from __future__ import annotations
@@ -125,7 +126,11 @@ def _describe(thing: Any, seen: _Seen) -> Any:
         return ("module", _inside(thing.__name__))
     if dataclasses.is_dataclass(thing):
         chosen = dataclasses.fields(thing) if seen.owns(type(thing).__module__) else _chosen(thing)
-        named = [f.name for f in chosen if not _is_wording(type(thing), f.name)]
+        named = [
+            f.name
+            for f in chosen
+            if not _is_wording(type(thing), f.name) and f.metadata.get("definition", True)
+        ]
         fields = tuple((name, _describe(getattr(thing, name), seen)) for name in named)
         return (type(thing).__qualname__, _describe(type(thing), seen), fields)
     if hasattr(thing, "tobytes") and hasattr(thing, "shape"):

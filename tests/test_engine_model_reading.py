@@ -1,0 +1,159 @@
+"""What is said of a model file without an engine: its files, their hash, its bodies; and what is refused, in a sentence."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from spook_tracker.engine.model_reading import DEEPEST, ModelError, folder_of, read
+
+CART = """<mujoco><compiler meshdir="meshes"/><option timestep=".004"/>
+<asset><mesh name="wheel" file="wheel.stl"/></asset>
+<worldbody><geom type="plane" size="1 1 1"/>
+  <body name="cart"><joint type="slide" axis="1 0 0"/><geom type="box" size=".1 .1 .1"/>
+    <body><joint type="hinge"/><geom type="sphere" size=".1"/><body name="tip" pos="0 0 1"/></body>
+  </body>
+  <include file="parts/ball.xml"/>
+</worldbody><keyframe><key name="home"/><key/></keyframe></mujoco>"""
+BALL = '<mujocoinclude><body name="ball"><freejoint/><geom type="sphere" size=".1"/></body></mujocoinclude>'
+ARM = """<robot name="arm"><link name="base"/><link name="upper"><collision><geometry>
+<mesh filename="package://arm_description/meshes/upper.stl"/></geometry></collision></link><link name="hand"/><link name="plate"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/></joint>
+<joint name="wrist" type="continuous"><parent link="upper"/><child link="hand"/></joint>
+<joint name="glue" type="fixed"><parent link="hand"/><child link="plate"/></joint></robot>"""
+
+
+@pytest.fixture
+def cart(tmp_path: Path) -> Path:
+    for name, text in {
+        "tracker.toml": "",
+        "robots/cart.xml": CART,
+        "robots/parts/ball.xml": BALL,
+        "robots/meshes/wheel.stl": "a mesh",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path / "robots/cart.xml"
+
+
+def test_a_model_is_all_its_files_and_their_content_is_its_hash(cart: Path, tmp_path: Path) -> None:
+    found = read(cart)
+
+    assert {file.name for file in found.files} == {"cart.xml", "ball.xml", "wheel.stl"}
+    (cart.parent / "meshes/wheel.stl").write_text("another mesh")
+    assert read(cart).digest != found.digest
+    (cart.parent / "meshes/wheel.stl").write_text("a mesh")
+    cart.parent.rename(tmp_path / "moved")
+    assert read(tmp_path / "moved/cart.xml").digest == found.digest  # where it lies makes no other model
+
+
+def test_watched_are_free_bodies_and_the_ends_of_chains(cart: Path) -> None:
+    found = read(cart)
+
+    assert [(one.label, one.name, one.path) for one in found.watched] == [
+        ("cart.0", "cart", (0,)),  # it has no name of its own; the tip on it has no joint
+        ("ball", "ball", ()),
+    ]
+    assert (found.time_step, found.bodies, found.keyframes) == (0.004, 3, ("home", "1"))
+    assert not found.stands_free  # the cart hangs on its rail
+
+
+def test_a_urdf_finds_its_packages_and_its_last_moving_link(tmp_path: Path) -> None:
+    (tmp_path / "arm_description/meshes").mkdir(parents=True)
+    (tmp_path / "arm_description/urdf").mkdir()
+    (tmp_path / "arm_description/package.xml").write_text("")
+    (tmp_path / "arm_description/meshes/upper.stl").write_text("x")
+    file = tmp_path / "arm_description/urdf/arm.urdf"
+    file.write_text(ARM)
+
+    found = read(file)
+
+    assert [one.label for one in found.watched] == ["hand"]
+    assert found.assets == {"upper.stl": (tmp_path / "arm_description/meshes/upper.stl").resolve()}
+
+
+def test_a_model_belongs_to_its_repository_or_installed_package(tmp_path: Path) -> None:
+    (tmp_path / "site-packages/robots/arms").mkdir(parents=True)
+
+    assert folder_of(tmp_path / "site-packages/robots/arms/a.xml") == tmp_path / "site-packages/robots"
+    assert folder_of(tmp_path / "a.xml") == tmp_path
+
+
+def _nested(levels: int) -> str:
+    return "<mujoco><worldbody>" + "<body>" * levels + "</body>" * levels + "</worldbody></mujoco>"
+
+
+BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody><body name="&b;"/></worldbody></mujoco>'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco", "is no XML"),
+        ("", "is no XML"),
+        ("\0\1\2", "is no XML"),
+        (BOMB, "declares XML entities"),
+        (_nested(DEEPEST + 1), "nested deeper"),
+        ("<html/>", "begins with <html>"),
+        ("<mujocoinclude/>", "no model by itself"),
+        ("<mujoco><asset/></mujoco>", "part for inclusion"),
+        ('<mujoco><worldbody><geom type="plane"/></worldbody></mujoco>', "nothing in"),
+        ('<mujoco><option timestep="fast"/><worldbody><body><joint/></body></worldbody></mujoco>', "no number"),
+        ('<mujoco><option timestep="nan"/><worldbody><body><joint/></body></worldbody></mujoco>', "time step is nan"),
+        ('<mujoco><worldbody><include file="gone.xml"/></worldbody></mujoco>', "gone.xml, which is no file"),
+        ('<mujoco><worldbody><include file="robot.xml"/></worldbody></mujoco>', "which includes it"),
+        ('<mujoco><worldbody><include/></worldbody></mujoco>', "does not name"),
+        (CART.replace("meshes", "elsewhere"), "wheel.stl, which is no file"),
+        (CART.replace("wheel.stl", "../../secret.stl"), "lies outside"),
+        (CART.replace("wheel.stl", "/etc/passwd"), "lies outside"),
+        ('<mujoco><worldbody><include file="../secret.xml"/></worldbody></mujoco>', "lies outside"),
+        ("<robot/>", "no links"),
+        ('<robot><link name="a"/><joint name="j"><parent link="a"/><child link="b"/></joint></robot>', "ties link 'b'"),
+        (
+            '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>',
+            "make a circle",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    (tmp_path / "secret.stl").write_text("x")
+    (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
+    (tmp_path / "models/meshes").mkdir(parents=True)
+    (tmp_path / "models/parts").mkdir()
+    (tmp_path / "models/parts/ball.xml").write_text(BALL)
+    file = tmp_path / "models/robot.xml"
+    file.write_text(text)
+
+    with pytest.raises(ModelError, match=said) as raised:
+        read(file)
+
+    assert "\n" not in str(raised.value) and "robot.xml" in str(raised.value)
+
+
+def test_a_link_out_of_the_folder_is_outside(tmp_path: Path) -> None:
+    (tmp_path / "models").mkdir()
+    (tmp_path / "real.xml").write_text(BALL)
+    (tmp_path / "models/link.xml").symlink_to(tmp_path / "real.xml")
+    (tmp_path / "models/robot.xml").write_text(
+        '<mujoco><worldbody><include file="link.xml"/></worldbody></mujoco>'
+    )
+
+    with pytest.raises(ModelError, match="lies outside"):
+        read(tmp_path / "models/robot.xml")
+
+
+@pytest.mark.parametrize("name", ["robot.xml", "meshes/wheel.stl"])
+def test_a_file_of_100_mb_is_refused_at_once(cart: Path, name: str) -> None:
+    large = cart if name == "robot.xml" else cart.parent / name
+    with large.open("r+b") as file:
+        file.truncate(100_000_000)
+    began = time.process_time()
+
+    with pytest.raises(ModelError, match="has 100 MB"):
+        read(cart)
+
+    assert time.process_time() - began < 0.5  # s: it is not read

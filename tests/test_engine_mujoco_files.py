@@ -1,0 +1,173 @@
+"""Model files in MuJoCo: what is read is what a hand calculation gives, rounding is told from change, chaos as chaos."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine.find import find
+from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun, Watched
+from spook_tracker.engine.model_reading import read
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.scalar_tests.model_file import cost, motion, rest
+from spook_tracker.scalar_tests.model_file.facts import Asked, turns
+
+pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'")
+
+BOX = """<mujoco><worldbody><geom type="plane" size="2 2 .1"/>
+<body name="lower" pos="0 0 .25"><geom type="box" size=".25 .25 .25"/></body>
+<body name="box" pos="0 0 .75"><freejoint/><geom type="box" size=".25 .25 .25" mass="1"/></body></worldbody></mujoco>"""
+FALL = '<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
+SPIN = """<mujoco><option gravity="0 0 0"/><worldbody><body name="wheel"><joint name="axle" axis="0 0 1"/>
+<geom type="cylinder" size=".1 .1" mass="1"/></body></worldbody>
+<actuator><{actuator} joint="axle" {more}/></actuator><keyframe><key name="off" qpos=".5"/></keyframe></mujoco>"""
+DOUBLE = """<mujoco><option integrator="RK4"/><worldbody><body name="upper"><joint axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/><body name="lower" pos=".3 0 0"><joint axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body></body></worldbody></mujoco>"""
+
+
+def _model(folder: Path, text: str, **facts) -> ModelFile:
+    file = folder / "model.xml"
+    file.write_text(text)
+    found = read(file)
+    return ModelFile(
+        path=str(file), format=found.format, digest=found.digest, time_step=found.time_step, watched=found.watched, **facts
+    )  # fmt: skip
+
+
+@cache
+def _simulate():
+    return find("mujoco").simulate
+
+
+def _run(model: ModelFile, duration: float, **asked):
+    return _simulate()(ModelRun(model=model, **asked), time_step=model.time_step, duration=duration)
+
+
+def test_a_free_fall_is_that_of_semi_implicit_euler(tmp_path: Path) -> None:
+    model = _model(tmp_path, FALL)
+
+    found = _run(model, 1.0, samples=(0.5, 1.0))["position"][:, 0, 2]
+
+    assert found == pytest.approx([-0.5 * 9.81 * t * (t + 0.002) for t in (0.5, 1.0)], abs=1e-12)
+
+
+def test_a_box_on_a_box_rests_carried_by_its_contacts(tmp_path: Path) -> None:
+    asked = Asked(model=_model(tmp_path, BOX), duration=1.0)
+
+    found = rest.measure(asked, _simulate())
+
+    assert found["load"] == pytest.approx(1.0, abs=1e-3)
+    assert 0.75 - found["box.rest_z"] == pytest.approx(
+        found["overlap"], rel=1e-3
+    )  # four corners, equally deep
+    assert 1e-6 < found["overlap"] < 1e-3
+    assert found["box.rest_z"].unsettled == ""
+    assert found["settled"] < 1.0
+
+
+def test_what_never_rests_is_said_to_be_unsettled(tmp_path: Path) -> None:
+    found = rest.measure(Asked(model=_model(tmp_path, FALL), duration=1.0), _simulate())
+
+    assert "still moves at" in found["ball.rest_z"].unsettled
+
+
+def test_the_step_error_of_a_fall_is_half_its_error(tmp_path: Path) -> None:
+    found = motion.measure(Asked(model=_model(tmp_path, FALL), duration=1.0), _simulate())
+    place = found["ball.place@1s"]
+
+    assert place.step_error == pytest.approx(
+        0.5 * 9.81 * 1.0 * 0.001, rel=1e-9
+    )  # ½ g t h, once with h and once with h/2
+    assert 1e-15 * 0.2 <= place.rounding < 1e-11
+    assert found["predictable_time"] == 1.0
+
+
+def test_a_double_pendulum_can_be_predicted_for_some_time_only(tmp_path: Path) -> None:
+    """Pushes of 1e-15 must grow 1e13-fold: at the double pendulum's exponent, some 5 to 9 a second here, within 10 s."""
+
+    class Longer(Asked):
+        checkpoints = (1.0, 20.0)
+
+    found = motion.measure(Longer(model=_model(tmp_path, DOUBLE), duration=20.0), _simulate())
+
+    assert 1.0 < found["predictable_time"] < 20.0
+    assert found["lower.place@1s"].rounding < 1e-9
+    assert math.isinf(found["lower.place@20s"].rounding)
+
+
+def test_pushes_move_it_and_the_same_seed_moves_it_the_same(tmp_path: Path) -> None:
+    model = _model(tmp_path, DOUBLE)
+    still, one, again, two = (
+        _run(model, 0.5, **push)
+        for push in ({}, {"push": 1e-15, "seed": 1}, {"push": 1e-15, "seed": 1}, {"push": 1e-15, "seed": 2})
+    )
+
+    assert one.state_hash == again.state_hash
+    assert len({still.state_hash, one.state_hash, two.state_hash}) == 3
+    assert np.abs(still["position"] - one["position"]).max() < 1e-12
+
+
+def test_a_model_answers_with_the_same_bits_in_another_process(tmp_path: Path) -> None:
+    asked = Asked(model=_model(tmp_path, BOX), duration=0.2)
+
+    assert cost.repeatability(asked, _simulate()) == {"differing_runs": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("drive", "expected"),
+    [
+        (Drive(), 0.0),
+        (
+            Drive(kind="sinusoid", amplitude=0.01, frequency=1.0),
+            0.01 / (2 * math.pi * 0.005),
+        ),  # ∫∫ sin over a period
+        (Drive(kind="table", rows=((0.0, 0.01), (0.5, 0.0))), 0.01 / 0.005 * (0.125 + 0.25)),
+    ],
+)
+def test_controls_drive_it_as_a_hand_calculation_says(tmp_path: Path, drive: Drive, expected: float) -> None:
+    """Inertia ½ m r² = .005 kg m² about the axle; torques of .01 N m."""
+    model = _model(tmp_path, SPIN.format(actuator="motor", more=""), drive=drive)
+
+    turned = _run(model, 1.0)["orientation"][-1, 0]
+
+    assert 2.0 * math.atan2(turned[3], turned[0]) == pytest.approx(expected, abs=0.01 * max(expected, 0.1))
+
+
+def test_to_hold_the_start_asks_servos_to_stay_at_the_keyframe(tmp_path: Path) -> None:
+    servo = SPIN.format(actuator="position", more='kp="1"')
+    held = _model(tmp_path, servo, keyframe="off", drive=Drive(kind="hold"))
+    let_go = _model(tmp_path, servo, keyframe="off")
+
+    angle = [2.0 * math.atan2(*_run(model, 0.1)["orientation"][-1, 0][[3, 0]]) for model in (held, let_go)]
+
+    assert angle[0] == pytest.approx(0.5, abs=1e-12)
+    assert angle[1] < 0.5
+
+
+def test_what_mujoco_refuses_or_lacks_is_not_supported_by_name(tmp_path: Path) -> None:
+    with pytest.raises(NotSupported, match=r"mujoco refuses model\.xml: .*nonsense"):
+        _run(_model(tmp_path, FALL.replace("<geom", "<nonsense/><geom")), 0.1)
+    model = _model(tmp_path, FALL)
+    with pytest.raises(NotSupported, match="no body 'tail'"):
+        _run(ModelFile(path=model.path, format="MJCF", digest="", time_step=0.01, watched=(Watched(label="tail", name="tail"),)), 0.1)  # fmt: skip
+
+
+def test_what_blows_up_is_diverged_though_mujoco_would_start_again(tmp_path: Path) -> None:
+    stiff = SPIN.format(actuator="position", more='kp="1e9"')
+    found = _run(_model(tmp_path, stiff, keyframe="off"), 1.0)
+
+    assert found.status == "diverged"
+    assert "mujoco reset a state it calls bad" in found.failure
+
+
+def test_turns_are_angles_whatever_the_sign_of_the_quaternion() -> None:
+    start = np.array([math.cos(0.3), 0.0, 0.0, math.sin(0.3)])
+    later = np.array([math.cos(0.5), 0.0, 0.0, math.sin(0.5)])
+
+    assert turns(later, start) == pytest.approx(0.4, abs=1e-15)
+    assert turns(-later, start) == pytest.approx(0.4, abs=1e-15)
