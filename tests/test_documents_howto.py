@@ -38,6 +38,8 @@ ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the tes
     "tracker db copy sqlite:///tracker.db postgresql://host/tracker": "tests/test_tracker_transfer.py",
     "tracker run throw falling_object": "tests/test_own_engine.py",
     "tracker bisect pendulum": "tests/test_tracker_past.py",
+    "tracker bisect throw": "tests/test_tracker_builds.py",
+    "tracker backfill v1.0..HEAD": "tests/test_tracker_builds.py",
     "tracker import results.json": "tests/test_tracker_outside.py",
     "tracker db partition": "tests/test_tracker_partition.py",
 }
@@ -88,7 +90,15 @@ def test_the_tutorial_of_an_own_test_goes_as_it_says(team: Path) -> None:
 
 
 def test_every_line_of_the_pages_runs_or_names_the_test_that_runs_it(team: Path) -> None:
-    pages = ["ci.md", "red-night.md", "sql.md", "larger.md", "choose-an-engine.md", "own-engine.md"]
+    pages = [
+        "ci.md",
+        "red-night.md",
+        "sql.md",
+        "larger.md",
+        "choose-an-engine.md",
+        "own-engine.md",
+        "own-commits.md",
+    ]
     assert sorted(pages) == sorted(page.name for page in (DOCS / "how-to").glob("*.md"))
     lines = [line for page in pages for line in typed(f"docs/how-to/{page}") if line.startswith("tracker ")]
     seen = set()

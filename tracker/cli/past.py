@@ -1,4 +1,4 @@
-"""`tracker bisect` and `tracker backfill REV…`: earlier commits of this project, built, asked and judged."""
+"""`tracker bisect` and `tracker backfill REV…`: earlier commits of a repository, built, asked and judged."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import click
 
 from spook_tracker.tracker.cli.filters import kind_options
 from spook_tracker.tracker.cli.options import RED, accepted_option, database_option, example
+from spook_tracker.tracker.cli.settings import present
 
 KEPT = ".tracker-commits"
 
@@ -48,9 +49,9 @@ def bisect(
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import red_lines
     from spook_tracker.tracker.judge.choice import Choice
-    from spook_tracker.tracker.measure.commits import repository_at, subject
+    from spook_tracker.tracker.measure.commits import subject
 
-    repository = repository_at(Path.cwd())
+    repository, measure = _commits(folder.resolve(), (test,), say)
     if good is None or bad is None:
         known_good, known_bad = _from_history(test, accepted, database)
         good, bad = good or known_good, bad or known_bad
@@ -59,7 +60,7 @@ def bisect(
         repository,
         good,
         bad,
-        _measuring(repository, folder.resolve(), (test,), options, say),
+        lambda commit: measure(commit, *options),
         Choice(tests=(test,), kinds=kinds, roles=roles),
         lambda step: say(f"{step.commit[:12]} {step.word}: {step.why}"),
     )
@@ -92,25 +93,24 @@ def _from_history(test: str, accepted: Path | None, database: str) -> tuple[str,
 def backfill_commits(
     names: Sequence[str], tests: Sequence[str], options: Sequence[str], folder: Path, database: str
 ) -> None:
-    """Measure and record commits of this project, oldest first; one that is recorded already is left as it is."""
+    """Measure and record commits, oldest first; one that is recorded already is left as it is."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.library import record
-    from spook_tracker.tracker.measure.commits import CommitError, commits_named, repository_at
+    from spook_tracker.tracker.measure.commits import CommitError, commits_named
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
 
-    repository = repository_at(Path.cwd())
+    repository, measure = _commits(folder.resolve(), tests, say)
     commits = commits_named(repository, names)
     with session_on(database) as session:  # made if it is not there yet
         have = {run.engine.git_hash for run in History(session).runs() if not run.engine.dirty}
-    measure = _measuring(repository, folder.resolve(), tests, options, say)
     for place, commit in enumerate(commits, start=1):
         heading = f"[{place}/{len(commits)}] {commit[:12]}"
         if commit in have and not tests:
             say(f"{heading}: recorded already")
             continue
         try:
-            document = measure(commit)
+            document = measure(commit, *options)
         except CommitError as error:
             say(f"{heading}: {error}")
             continue
@@ -119,16 +119,25 @@ def backfill_commits(
         say(f"{heading}: {values} of {len(document.samples)} values, recorded as run {document.id}")
 
 
-def _measuring(
-    repository: Path, folder: Path, tests: Sequence[str], options: Sequence[str], say: Callable[[str], None]
-) -> Callable[[str], Any]:
-    """A function that builds and asks a commit, and says whose questions it answered."""
-    from spook_tracker.tracker.measure.commits import ask_commit, built, subject
+def _commits(
+    folder: Path, tests: Sequence[str], say: Callable[[str], None]
+) -> tuple[Path, Callable[..., Any]]:
+    """The repository one stands in, and a function that builds and asks a commit and says whose questions it answered.
 
-    def measure(commit: str) -> Any:
-        place = built(repository, commit, folder)
-        document, whose = ask_commit(place, tests, *options)
+    A team's where tracker.toml says how it is built; else this project's own.
+    """
+    from spook_tracker.tracker.measure.builds import team_repository
+    from spook_tracker.tracker.measure.commits import ask_commit, built, repository_at, subject
+
+    team = team_repository(present().folder, present().build)
+    repository = team.repository if team else repository_at(Path.cwd())
+
+    def measure(commit: str, *options: str) -> Any:
+        if team is None:
+            document, whose = ask_commit(built(repository, commit, folder), tests, *options)
+        else:
+            document, whose = team.measure(commit, folder, tests, *options)
         say(f"{commit[:12]} answers {whose}: {subject(repository, commit)}")
         return document
 
-    return measure
+    return repository, measure

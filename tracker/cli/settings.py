@@ -14,6 +14,9 @@
     [[model]]                            # a file of yours that every night asks about: tracker.measure.model_files
     file = "assets/robot.xml"
 
+    [build]                              # how a commit is built and asked (tracker/measure/builds.py)
+    command = "cmake -S . -B build && cmake --build build"
+
 It is looked for where one stands and in the folders above, up to the root of the repository and no further.
 What a command line or an environment variable says goes before it.
 """
@@ -30,6 +33,7 @@ from typing import Any
 import click
 
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.measure.build_settings import TABLE, Build, build_of
 
 FILE = "tracker.toml"
 KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an option: what it may be
@@ -61,6 +65,8 @@ class Settings:
     values: Mapping[str, Any] = field(default_factory=dict)
     limits: tuple[tuple[str, Any], ...] = ()
     has_models: bool = False
+    build: Build | None = None
+    folder: Path | None = None  # of tracker.toml
 
     def limits_of(self, engine: str) -> tuple[tuple[str, Any], ...]:
         """They are the team's own engine's; another one that is asked beside it is not held to them."""
@@ -86,12 +92,11 @@ def read(here: Path) -> Settings:
         said = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingsError(f"{file} cannot be read: {error}") from None
-    limits = said.pop("limits", {})
-    models = said.pop("model", [])
+    limits, models, build = said.pop("limits", {}), said.pop("model", []), said.pop(TABLE, None)
     for name, value in said.items():
         if name not in KINDS:
             raise SettingsError(
-                f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits, model"
+                f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits, model, build"
             )
         if type(value) not in KINDS[name]:
             raise SettingsError(f"{file}: {name} must be {WORDS[KINDS[name][-1]]}, not {value!r}")
@@ -101,7 +106,13 @@ def read(here: Path) -> Settings:
     if models:
         own = str(file.relative_to(here) if file.is_relative_to(here) else file)
         said["catalogue"] = f"{said.get('catalogue', 'standard')},{own}"
-    return Settings(_placed(said, file.parent, here), _limits(file, limits), bool(models))
+    return Settings(
+        values=_placed(said, file.parent, here),
+        limits=_limits(file, limits),
+        has_models=bool(models),
+        build=None if build is None else build_of(build, file),
+        folder=file.parent,
+    )
 
 
 def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:

@@ -36,7 +36,10 @@ def repository_at(folder: Path) -> Path:
     done = _run(["git", "-C", str(folder), "rev-parse", "--show-toplevel"])
     place = Path(done.stdout.strip()) if done.returncode == 0 else None
     if place is None or not (place / NATIVE / "CMakeLists.txt").exists():
-        raise CommitError(f"{folder} is in no repository of the engine; call this inside a clone of it")
+        raise CommitError(
+            f"{folder} is in no repository of the engine; call this inside a clone of it, or say in "
+            "tracker.toml how your own is built: [build] with a command"
+        )
     return place
 
 
@@ -85,14 +88,18 @@ def subject(repository: Path, commit: str) -> str:
 def checked_out(repository: Path, commit: str, folder: Path) -> Path:
     """The folder with that commit, not built; what is there already is used again. Raises CommitError."""
     place = folder / commit[:12]
-    if (place / WORKS).exists():
-        return place
+    if not (place / WORKS).exists():
+        check_out(repository, commit, place)
+    return place
+
+
+def check_out(repository: Path, commit: str, place: Path) -> None:
+    """Make the folder `place` a clone with that commit, whatever was there. Raises CommitError."""
     shutil.rmtree(place, ignore_errors=True)
     place.parent.mkdir(parents=True, exist_ok=True)
     clone = ["git", "clone", "-q", "--shared", "--no-checkout", str(repository), str(place)]
     for command in (clone, ["git", "-C", str(place), "checkout", "-q", "--detach", commit]):
         _must(command, f"commit {commit[:12]} cannot be checked out")
-    return place
 
 
 def built(repository: Path, commit: str, folder: Path) -> Path:
@@ -136,7 +143,7 @@ def ask_commit(place: Path, tests: Sequence[str], *options: str) -> tuple[RunDoc
         done = call(search, "run", *tests, "--no-record", "--json", str(file), *options)
         if done.returncode in (0, 1) and file.exists():
             return decode(file.read_bytes(), RunDocument), whose
-        reasons.append(f"{whose}: {_last(done.stderr)}")
+        reasons.append(f"{whose}: {last_words(done.stderr)}")
     raise CommitError(f"{place.name} gives no answers; " + "; ".join(reasons))
 
 
@@ -154,7 +161,7 @@ def ask_today(place: Path, tests: Sequence[str], *options: str) -> RunDocument:
         done = call(search, "run", *tests, "--no-record", "--json", str(file), *options)
         if done.returncode in (0, 1) and file.exists():
             return decode(file.read_bytes(), RunDocument)
-        reasons.append(f"by {whose}: {_last(done.stderr)}")
+        reasons.append(f"by {whose}: {last_words(done.stderr)}")
     raise CommitError(
         f"today's engine does not answer the questions of {place.name}, asked " + "; ".join(reasons)
     )
@@ -211,14 +218,14 @@ def _mixed(folder: Path, others: Mapping[str, Path]) -> Path:
 def _must(command: list[str], complaint: str) -> None:
     done = _run(command)
     if done.returncode:
-        raise CommitError(f"{complaint}: {_last(done.stderr or done.stdout)}")
+        raise CommitError(f"{complaint}: {last_words(done.stderr or done.stdout)}")
 
 
 def _run(command: list[str], **where: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, **where)  # type: ignore[call-overload,no-any-return]
 
 
-def _last(text: str) -> str:
+def last_words(text: str) -> str:
     """The line in which a program says what is wrong: the last with the word error, else the last."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     telling = [line for line in lines if "error" in line.lower()] or lines

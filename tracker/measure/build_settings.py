@@ -1,0 +1,53 @@
+"""[build] of a team's tracker.toml: how a commit of its repository is built and asked. Imports nothing heavy.
+
+[build]
+command = "cmake -S . -B build && cmake --build build"
+environment = {PYTHONPATH = "{checkout}/build/python"}  # for building and asking; {checkout} is the commit's folder
+questions = ["tracking"]         # today's, laid over every commit, so that old ones answer what is asked now
+ask = "build/bench > $ANSWERS"   # by default `tracker run`; a run document, or a file `tracker import` reads
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.errors import TrackerError
+
+FILE = "tracker.toml"
+TABLE = "build"
+KINDS: Mapping[str, tuple[type, str]] = {
+    "command": (str, "a shell command"),
+    "ask": (str, "a shell command"),
+    "environment": (dict, "a table of texts"),
+    "questions": (list, "a list of paths"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Build:
+    """How a commit is built and asked."""
+
+    command: str = "true"  # shell
+    ask: str = ""  # shell; empty: `tracker run`
+    environment: Mapping[str, str] = field(default_factory=dict)
+    questions: tuple[str, ...] = ()  # paths beside tracker.toml
+
+
+def build_of(said: Any, file: Path) -> Build:
+    """What the table [build] says. TrackerError names the file and what is wrong with it."""
+    if not isinstance(said, dict):
+        raise TrackerError(f"{file}: {TABLE} must be a table with a command")
+    for name, value in said.items():
+        kind, words = KINDS.get(name, (None, ""))
+        if kind is None:
+            raise TrackerError(f"{file}: [{TABLE}] has no setting {name!r}; it knows {', '.join(KINDS)}")
+        parts = [*value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
+        if type(value) is not kind or not all(isinstance(part, str) for part in parts):
+            raise TrackerError(f"{file}: {name} of [{TABLE}] must be {words}, not {value!r}")
+    for path in said.get("questions", ()):
+        if Path(path).is_absolute() or ".." in Path(path).parts:
+            raise TrackerError(f"{file}: questions of [{TABLE}] must lie beside it, unlike {path!r}")
+    return Build(**{**said, "questions": tuple(said.get("questions", ()))})
