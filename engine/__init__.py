@@ -113,7 +113,7 @@ from spook_tracker.engine.shapes import (
     Shape,
     Sphere,
 )
-from spook_tracker.engine.simulation import simulate
+from spook_tracker.engine.simulation import Prepared, prepare, simulate
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
 from spook_tracker.engine.tyres import Tyre
 
@@ -170,6 +170,7 @@ __all__ = [
     "PointOnLine",
     "Position",
     "PotentialEnergy",
+    "Prepared",
     "Prismatic",
     "Program",
     "Ramp",
@@ -198,6 +199,7 @@ __all__ = [
     "build_info",
     "compile",
     "explain",
+    "prepare",
     "simulate",
     "start",
 ]

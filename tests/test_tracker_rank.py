@@ -152,7 +152,7 @@ def test_without_ladders_it_says_what_to_measure(tmp_path: Path) -> None:
 def test_a_ladder_without_a_rung_there_is_not_an_engine_that_failed() -> None:
     (one,) = standings({"a": rungs("euler", {1 / 1000: (1e-3, 1.0)})})  # type: ignore[dict-item]
 
-    assert (one.error, one.outcome) == (None, "no such step")
+    assert (one.error, one.outcome) == (None, "not run at this time step")
 
 
 def asked(tests: tuple[str, ...], *, whole: bool = False, families: Any = ("values", "sweep")) -> Asked:

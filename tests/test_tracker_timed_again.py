@@ -37,10 +37,10 @@ class ScriptedNight:
         self.times = 0  # ladders were timed
         measure = clock.interleaved
 
-        def interleaved(runs: Any, simulate: Any, repeats: int, begin: Any) -> Any:
+        def interleaved(runs: Any, simulate: Any, repeats: int, begin: Any, *prepare: Any) -> Any:
             factor = self.factors[min(self.times, len(self.factors) - 1)]
             self.times += 1
-            patch.setattr(clock, "_both", lambda *asked: (2e-3 * factor, 2e-3 * factor))
+            patch.setattr(clock, "_taken", lambda *asked: (2e-3 * factor, 2e-3 * factor))
             return measure(runs, simulate, repeats, begin)
 
         patch.setattr(clock, "calibrate", lambda: 1e-3)

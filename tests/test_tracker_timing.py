@@ -36,11 +36,11 @@ def runs(**seconds: float):
 
 def test_repeats_are_interleaved_and_all_kept():
     engine = Clockwork()
-    slow, fast = interleaved(runs(slow=0.1, fast=0.01), engine, 5)
+    slow, fast = interleaved(runs(slow=0.04, fast=0.01), engine, 5)
     order = [name for name, stages in engine.calls if not stages]
 
     assert order == ["slow", "fast", *["slow", "fast"] * 5]
-    assert slow.seconds == (0.1,) * 5
+    assert slow.seconds == (0.04,) * 5
     assert (fast.runs_per_repeat, fast.stage_seconds) == (1, {"solve_path": 0.005})
 
 
@@ -104,13 +104,59 @@ def test_a_run_that_fails_in_a_later_repeat_has_failed():
     def engine(scene, **options):
         if scene.name == "b" and next(left, None) is None:
             raise MemoryError
-        return SimpleNamespace(seconds=0.1, status="completed", stage_seconds={})
+        return SimpleNamespace(seconds=0.01, status="completed", stage_seconds={})
 
     asked = [lambda s, n=n: s(SimpleNamespace(name=n)) for n in ("a", "b")]
     good, bad = interleaved(asked, engine, 5)
 
     assert isinstance(good, Timing) and len(good.seconds) == 5
     assert bad == Outcome(None, "crashed", "the test ran out of memory")
+
+
+class Compiler:
+    """An engine that compiles apart from running."""
+
+    def __init__(self) -> None:
+        self.compiled, self.ran = 0, 0
+
+    def prepare(self, scene, **options):
+        self.compiled += 1
+        return SimpleNamespace(run=lambda **how: self.run(scene))
+
+    def run(self, scene):
+        self.ran += 1
+        return SimpleNamespace(
+            seconds=0.01, cpu_seconds=0.01, status=scene.status, failure="", stage_seconds={}
+        )
+
+
+def test_a_scene_is_compiled_once_however_often_it_is_timed():
+    engine = Compiler()
+    (timing,) = interleaved(
+        [lambda s: [s(SimpleNamespace(status="completed")) for _ in range(2)]],
+        lambda scene, **options: engine.run(scene),
+        4,
+        prepare=engine.prepare,
+    )
+
+    assert timing.seconds == (0.02,) * 4 and timing.cpu_seconds == (0.02,) * 4
+    assert engine.compiled == 2 and engine.ran == 2 * (
+        1 + 4 + 1
+    )  # the first, four repeats, one for the stages
+
+
+def test_a_prepared_run_that_fails_when_it_is_run_again_has_failed():
+    scene = SimpleNamespace(status="completed")
+    engine = Compiler()
+
+    def begin(number):
+        scene.status = "diverged" if engine.ran else "completed"
+
+    (found,) = interleaved(
+        [lambda s: s(scene)], lambda scene, **options: engine.run(scene), 3, begin, engine.prepare
+    )
+
+    assert found == Outcome(None, "diverged", "")
 
 
 def test_nothing_is_recorded_while_timing_but_the_time_limit_is_passed_on():

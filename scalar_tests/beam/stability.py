@@ -92,7 +92,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
         x_label="damping, τ/h",
         y_label="compliance [m/N, rad/(N m)]",
         prediction=table(COMPLIANCES, RELATIVE_DAMPINGS, eigenvalue),
-        note="Without damping the eigenvalue −1 of a rigid lock is double and the push is never forgotten; with soft "
+        note="Without damping the eigenvalue −1 of a rigid lock is double and undamped modes persist; with soft "
         "locks and next to no damping the beam falls apart.",
     )
 

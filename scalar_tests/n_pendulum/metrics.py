@@ -52,7 +52,7 @@ PROTOTYPE = "the method's own discrete solution: the prototype tests/oracle_chai
 def _energy_at_10_s(limit: float, source: str) -> Metric:
     return Metric(
         name="energy_at_10_s",
-        description="E − E₀ after 10 s, of the fall to hanging: negative is a loss",
+        description="Energy drift after 10 s, of the fall to hanging (+ gained, − lost)",
         unit="%",
         role="companion",
         better="larger",
@@ -78,7 +78,7 @@ ENERGY_AT_10_S_LONG = _energy_at_10_s(
 def _energy_at_the_end(set_point: tuple[float, float] | None = None) -> Metric:
     return Metric(
         name="energy_at_the_end",
-        description="E − E₀ after 22 s, of the fall to hanging; in curved configurations chaos decides its digits",
+        description="Energy drift after 22 s, of the fall to hanging (+ gained, − lost); in curved configurations chaos decides its digits",
         unit="%",
         role="reported",
         better="larger",

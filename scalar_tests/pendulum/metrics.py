@@ -64,7 +64,7 @@ def _energy(limit: float, source: str, value: float) -> Metric:
 
 ENERGY_AT_THE_END = Metric(
     name="energy_at_the_end",
-    description="E − E₀ after 22 s, of m g l: negative is a loss",
+    description="Energy drift after 22 s, of m g l (+ gained, − lost)",
     unit="%",
     role="companion",
     better="larger",

@@ -127,7 +127,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
         x_label="damping, τ/h",
         y_label="compliance [m/N]",
         prediction=table(COMPLIANCES, RELATIVE_DAMPINGS, eigenvalue),
-        note="The linear rod is stable everywhere, but the swing feeds it: where the eigenvalue comes within about "
+        note="The linear rod is stable everywhere, but the swing pumps energy into it: where the eigenvalue comes within about "
         "1e-3 of the unit circle and compliance is next to nothing, the pendulum explodes. This is Fig 3.23.",
     )
 

@@ -168,7 +168,7 @@ class Player {
     tools.forces.hidden = !movie.contact;
     tools.cones.hidden = !movie.cones;
     const given = [];
-    if (movie.ghost) { movie.error = apart(movie.position, movie.ghost.position, movie.bodies, movie.count); given.push(["distance from the ghost", "m", [{ values: movie.error, colour: 1 }]]); }
+    if (movie.ghost) { movie.error = apart(movie.position, movie.ghost.position, movie.bodies, movie.count); given.push(["difference from the reference run", "m", [{ values: movie.error, colour: 1 }]]); }
     if (movie.rows) { movie.largest = largestEach(movie.violation, movie.rows, movie.count); given.push(["largest violation", movie.violationUnit || "m", [{ values: movie.largest, colour: 1 }]]); }
     if (movie.energy) { given.push(["energy", "J", movie.ghost && movie.ghost.energy ? [{ values: movie.energy, colour: 0 }, { values: movie.ghost.energy, colour: 1 }] : [{ values: movie.energy, colour: 0 }]]); }
     if (movie.penetration) { given.push(["deepest penetration", "m", [{ values: movie.penetration, colour: 3 }]]); }

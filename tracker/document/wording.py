@@ -143,7 +143,9 @@ def margin(definition: SeriesDefinition, value: float) -> Margin:
         )
         return Margin(over, share)
     if share < 1e-2:
-        return Margin(f"{math.log10(allowed) - math.log10(used):.1f} decades inside", share)
+        below = allowed / used
+        times_below = "over a million" if below >= 1e6 else number(below, 2)
+        return Margin(f"{times_below} times below the limit", share)
     return Margin(f"{number(100 * share, 3)} % of the limit", share)
 
 

@@ -172,7 +172,7 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
             outcomes.append(sample.outcome)
             if sample.outcome == "value" and abs(sample.value) < best:
                 best, chosen = abs(sample.value), name
-    none = "no such step" if configurations else "not asked"
+    none = "not run at this time step" if configurations else "not asked"
     outcome = "value" if chosen else (outcomes[0] if outcomes else none)
     return Standing(
         test=test,

@@ -25,7 +25,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 from spook_tracker.tracker.measure.question import Outcome, Witness, ask, sentence, series_key
-from spook_tracker.tracker.measure.timing import Repeats, Timed, interleaved, once, stage_seconds
+from spook_tracker.tracker.measure.timing import Prepare, Repeats, Timed, interleaved, once, stage_seconds
 from spook_tracker.tracker.measure.workers import NOWHERE, Lost, at
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
@@ -88,9 +88,15 @@ Place = tuple[str, int, int, int]  # of a rung: test, ladder, configuration, ste
 
 
 def timed_series(
-    tests: Mapping[str, ScalarTest], errors: Errors, simulate: Simulate, repeats: int | Repeats
+    tests: Mapping[str, ScalarTest],
+    errors: Errors,
+    simulate: Simulate,
+    repeats: int | Repeats,
+    prepare: Prepare | None = None,
 ) -> list[Pair]:
-    """Every ladder's series with timings, and the scalars read off them; run alone on the machine."""
+    """Every ladder's series with timings, and the scalars read off them; run alone on the machine.
+
+    `prepare` is the engine's, where it compiles apart from running."""
     found: dict[Place, Timing | Outcome] = {}
     places = _to_be_timed(tests, errors)
     for name, test in tests.items():
@@ -98,7 +104,7 @@ def timed_series(
             here = [place for place in places if place[:2] == (name, i)]
             runs = [_run_of(ladder, place) for place in here]
             first = places.index(here[0]) if here else 0
-            timings = interleaved(runs, simulate, repeats, partial(_begin, first))
+            timings = interleaved(runs, simulate, repeats, partial(_begin, first), prepare)
             at(NOWHERE)
             found |= zip(here, timings, strict=True)
     return _all_pairs(tests, errors, found)

@@ -35,7 +35,9 @@ def perform_timing(source: Questions, piece: TimingPiece) -> Timed:
     tests = {piece.test: source.tests()[piece.test]}
     simulate = replace(source, patience=None).simulate()  # what gave a value is worth its time
     if piece.kind == "ladders":
-        return ladders.timed_series(tests, piece.errors, simulate, piece.repeats), {}
+        module = source.module()
+        prepare = getattr(module, "prepare", None) if simulate is module.simulate else None
+        return ladders.timed_series(tests, piece.errors, simulate, piece.repeats, prepare), {}
     return [], ladders.saved_by_leaving_out(tests, simulate)
 
 

@@ -24,11 +24,12 @@ from spook_tracker.tracker.measure.question import Outcome, ask, sentence
 
 RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
 MOST_RUNS = 200  # in one repeat
-POINT_BUDGET = 0.6  # s for all repeats of one run
+POINT_BUDGET = 0.2  # s for all repeats of one run: what takes longer is steadier, too
 FEWEST_REPEATS = 2
 STAGES_UP_TO = 0.2  # s: longer runs are not run again only to see their stages
 
 Timed = Callable[[Simulate], Any]
+Prepare = Callable[..., Any]  # as `engine.prepare`: compiles, and what it gives runs again and again
 Taken = tuple[float, float | None]  # s of one run, and s of the processor where the engine can tell
 
 
@@ -52,13 +53,24 @@ class Stopwatch:
     cpu: float | None = 0.0  # s of the processor; None once a run could not tell
     results: list[Result] = field(default_factory=list)
     counter: InstructionCounter | None = None
+    prepare: Prepare | None = None  # where programs are to be kept
+    programs: list[Callable[[], Result]] = field(default_factory=list)  # one for each simulation, in order
 
     def __call__(self, scene: Any, **options: Any) -> Result:
+        if self.prepare is not None:
+            asked = {**options, **self.options}
+            how = {name: asked.pop(name) for name in ("time_limit", "time_stages") if name in asked}
+            self.programs.append(partial(self.prepare(scene, **asked).run, **how))
+            return self.take(self.programs[-1]())
         if self.counter is None:
             result = self.simulate(scene, **{**options, **self.options})
         else:
             with self.counter.counting():
                 result = self.simulate(scene, **{**options, **self.options})
+        return self.take(result)
+
+    def take(self, result: Result) -> Result:
+        """Add what a simulation took."""
         self.seconds += result.seconds
         own = getattr(result, "cpu_seconds", 0.0)
         self.cpu = self.cpu + own if self.cpu is not None and own > 0.0 else None
@@ -73,6 +85,7 @@ class _Lane:
     run: Timed
     runs: int
     repeats: int
+    programs: Sequence[Callable[[], Result]] = ()  # what the run asks of the engine, compiled once
     seconds: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
     kernel: list[float] = field(default_factory=list)
@@ -97,7 +110,10 @@ def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> flo
 
 def _both(run: Timed, simulate: Simulate, time_limit: float | None = None) -> Taken | Outcome:
     """Seconds of one run, and of the processor for it where the engine can tell; else what came of it."""
-    watch = Stopwatch(simulate, {} if time_limit is None else {"time_limit": time_limit})
+    return _taken(run, Stopwatch(simulate, {} if time_limit is None else {"time_limit": time_limit}))
+
+
+def _taken(run: Timed, watch: Stopwatch) -> Taken | Outcome:
     before = time.perf_counter()
     answer = ask(partial(run, watch))
     if answer.outcome != "value":
@@ -110,23 +126,36 @@ def _both(run: Timed, simulate: Simulate, time_limit: float | None = None) -> Ta
     return watch.seconds, watch.cpu
 
 
+def _again(programs: Sequence[Callable[[], Result]]) -> Timed:
+    """A run that only runs again what was compiled for it."""
+
+    def run(watch: Any) -> None:
+        for program in programs:
+            watch.take(program())
+
+    return run
+
+
 def interleaved(
     runs: Sequence[Timed],
     simulate: Simulate,
     repeats: int | Repeats,
     begin: Callable[[int], None] = lambda number: None,
+    prepare: Prepare | None = None,
 ) -> list[Timing | Outcome]:
     """A timing of each run, for those that fail what came of them; instructions and stages where they can be had.
 
-    `begin` is told the number of the run whose turn it is. The first run of each warms the caches and tells how often it can be repeated; one that takes longer than all
-    its repeats should has no cold caches to speak of, and counts as the first of them.
+    `begin` is told the number of the run whose turn it is. The first run of each warms the caches and tells how often
+    it can be repeated; one that takes longer than all its repeats should has no cold caches to speak of, and counts as
+    the first of them. With `prepare` its scenes are compiled there, and only run from then on.
     """
     often = Repeats(repeats) if isinstance(repeats, int) else repeats
     lanes: list[_Lane] = []
     for number, run in enumerate(runs):
         begin(number)
         kernel = calibrate()
-        first = _both(run, simulate)
+        watch = Stopwatch(simulate, prepare=prepare)
+        first = _taken(run, watch)
         if isinstance(first, Outcome):
             lanes.append(_Lane(run=run, runs=0, repeats=0, failed=first))
             continue
@@ -136,6 +165,7 @@ def interleaved(
             run=run,
             runs=min(often.runs, max(1, math.ceil(RESOLVED / grain))),
             repeats=max(often.fewest, min(often.most, affordable)),
+            programs=watch.programs,
         )
         lanes.append(fresh)
         if grain > often.seconds:
@@ -145,7 +175,8 @@ def interleaved(
             if lane.failed is None and len(lane.kernel) < lane.repeats:
                 begin(number)
                 kernel = calibrate()
-                lane.keep(kernel, [_both(lane.run, simulate) for _ in range(lane.runs)])
+                again = _again(lane.programs) if lane.programs else lane.run
+                lane.keep(kernel, [_both(again, simulate) for _ in range(lane.runs)])
     clock = True  # until a run comes without one: an engine has it for all its stages or for none
     timings: list[Timing | Outcome] = []
     for number, lane in enumerate(lanes):

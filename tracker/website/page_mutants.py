@@ -62,4 +62,4 @@ def mutants_page(mutants: Sequence[Mutant], book: Book) -> Page:
     ]
     caught = sum(mutant.caught for mutant in mutants)
     context = {"mutants": rows, "caught": caught, "missed": len(mutants) - caught}
-    return Page(PATH, PATH, "Wrong on purpose", "Would the tests notice a wrong engine?", context)
+    return Page(PATH, PATH, "Mutation tests", "Would the tests notice a wrong engine?", context)

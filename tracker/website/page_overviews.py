@@ -136,7 +136,7 @@ def compare(told: Comparisons, book: Book) -> Page:
 
 
 def versions(book: Book) -> Page:
-    """What ran where."""
+    """Versions and machines."""
     nights = list(reversed(book.nights))
     counts = counts_by_night(book, MOST_NIGHTS)
     machines = Counter(night.machine for night in book.nights)
@@ -163,7 +163,7 @@ def versions(book: Book) -> Page:
             for machine, count in machines.most_common()
         ],
     }
-    return Page("versions.html", "versions.html", "Versions and machines", "What ran where.", context)
+    return Page("versions.html", "versions.html", "Versions and machines", "Versions and machines.", context)
 
 
 def data(book: Book, events: Sequence[Event]) -> Page:
