@@ -63,6 +63,7 @@ lint: develop
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	sh .ci/subjects
+	$(BIN)/python .ci/words.py
 	$(BIN)/clang-format --dry-run -Werror $$(git ls-files 'engine/native/*.[ch]pp' 'engine/native/*.inl')
 
 # Over the core; again only when something in it has changed since it passed.

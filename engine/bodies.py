@@ -43,14 +43,14 @@ class Material:
     Two surfaces combine: friction by the geometric mean, both restitutions, rolling and torsional friction by the larger,
     compliance by the sum. Viscous friction, a force c times the slip, is a slip_compliance of 1/c under a friction that
     is never reached. Rolling and torsional friction act in every contact that carries load, but not in the instant of
-    a blow that returns.
+    an impact that returns.
 
-    A blow at the relative speed u of approach and v along the surface leaves -psi u and, where friction holds, -psi_t v;
-    where that asks for more than mu times the normal impulse the surfaces slide through the blow. One contact with both
+    An impact at the relative speed u of approach and v along the surface leaves -psi u and, where friction holds, -psi_t v;
+    where that asks for more than mu times the normal impulse the surfaces slide through the impact. One contact with both
     at most 1 loses energy or keeps it: with the inverse mass A of the point the impulse is -A^-1 (1 + psi) v, the work
     half of that times (1 - psi) v, and Coulomb's bound only shortens what opposes the slip. What several contacts at
     once, or a point whose A couples both directions, would add is taken back towards the plastic answer, which cannot
-    gain. psi_t acts in blows that return, where psi > 0; a ball of rubber that grips has one of nearly psi.
+    gain. psi_t acts in impacts that return, where psi > 0; a ball of rubber that grips has one of nearly psi.
 
     Friction may differ with the direction, as it does along a grain, on a blade or on a board with grooves: then
     `friction` is along `friction_direction`, a direction of the body, and `friction_across` across it; both are
@@ -60,7 +60,7 @@ class Material:
     (f_d/µ_d)² + (f_a/µ_a)² <= N²; while nothing slips the force is any inside that ellipse. So it lies on the ellipse,
     normal to it along −v: not opposite to the slip, but it never does positive work. The same holds where the
     direction leaves the surface; where it is normal to it, friction is `friction_across` all round. The friction models
-    box and scaled_box take the ellipse's rectangle. Sweeps settle the slower the farther both are apart. A
+    box and scaled_box take the ellipse's rectangle. Iterations settle the slower the farther both are apart. A
     slip_compliance is that of the direction of lower friction; in the other one it is less, by the square of the ratio
     of both.
     """
@@ -68,7 +68,7 @@ class Material:
     friction: float = 0.0  # Coulomb's mu, 1
     restitution: float = 0.0  # psi, between 0 and 1
     tangential_restitution: float = (
-        0.0  # psi_t, between 0 and 1: of the slip that a blow which grips turns round
+        0.0  # psi_t, between 0 and 1: of the slip that an impact which grips turns round
     )
     compliance: float = 0.0  # m/N per contact point
     damping: float | None = None  # s; None means 4.5 time steps

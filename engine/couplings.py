@@ -75,7 +75,7 @@ class Wire:
 
     `through` lists where the wire runs: a body's name, or WORLD, and a world point at the start [m]. It slides
     through the points between its ends without friction, which is the ideal pulley of no size. When it snaps taut
-    the blow is plastic, or returns `restitution` of the speed. A length of None is the one at the start. A rope is a
+    the impact is plastic, or returns `restitution` of the speed. A length of None is the one at the start. A rope is a
     wire through two points. The force that is observed is its tension [N].
 
     With `friction` µ, one number or one for each point between the ends, it rubs where it bends: the pulls before and

@@ -1,6 +1,6 @@
 """Fixed surfaces of triangles: meshes and height fields. They have an outside, and no inertia.
 
-What slides over the seam of two triangles in one plane, or along a valley, feels the faces alone; on ridges, tips and
+What slides over the shared edge of two triangles in one plane, or along a valley, feels the faces alone; on ridges, tips and
 rims a mesh is met by its edges and corners. A shape whose centre is below a triangle is let alone by it.
 """
 

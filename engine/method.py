@@ -42,23 +42,23 @@ class Method:
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
                        compliance, damping and corrections play no part; forces are those at the sample's time.
                        Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows
-    solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct); a blow
-                       among up to 24 contacts that sweeps do not settle is solved directly, since what it leaves stays;
+    solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct); an impact
+                       among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
                        so are up to 24 joints (and their contacts) that would be unsettled
     iterations, residual_tolerance   when an iterative solve stops; where rows are still off by more than
-                       unsettled_residual, sweeps go on there and nearby, for up to sixteen times the work (joints: four)
+                       unsettled_residual, iterations go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
-    impacts            simultaneous: all that touch take part in one blow (a ball on four gives −.6 and four times .4);
-                       a pair, or a joint's stop, is struck once in a step, and stops without rebound where it approaches
+    impacts            simultaneous: all that touch take part in one impact (a ball on four gives −.6 and four times .4);
+                       a pair, or a joint's stop, is hit once in a step, and stops without rebound where it approaches
                        again;
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in
-                       the order in which they close, free balls led from one blow to the next
+                       the order in which they close, free balls moved from one impact to the next
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
                        law, its impulse against where a step of projection would put it; so does one that stopped early
                        and left bodies sunk into each other by a fiftieth of the smaller one's radius
     sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep; 0: nobody does. They do so
-                       by islands, all that hang together by contacts, joints and springs, and wake at once, in the same
+                       by islands, all that are connected by contacts, joints and springs, and wake at once, in the same
                        step, when a body meets one of them, a kinematic one that touches or holds one moves, or a load,
                        motor or spring of one is set. Asleep they have no speed, keep their places to the last bit, cost
                        next to nothing, and forces read as they were last; what speed they had is lost. Never asleep:
@@ -68,7 +68,7 @@ class Method:
     sleep_after        how long bodies must have been that slow, s
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
-    threads            that share the work on contacts: the search, sweeps, islands. The results are equal to the bit for
+    threads            that share the work on contacts: the search, iterations, islands. The results are equal to the bit for
                        every number of them; heaps of fewer than some hundred contacts gain nothing
     force_stages       stages to keep although the scene does not need them, to measure what they cost; solve_block: the
                        general factorisation also where a chain or a mechanism in a plane has a faster way

@@ -84,7 +84,7 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
     bouncing = next((b.name for b in _that_may_touch(scene) if b.material.restitution), None)
     if touching and bouncing is not None:
         raise MethodError(
-            f"method: {wanted} is for contacts that last, but {bouncing!r} has a restitution, and blows leave order 1, "
+            f"method: {wanted} is for contacts that last, but {bouncing!r} has a restitution, and impacts leave order 1, "
             f"that of the plain method; leave one of them out, or give Scene contacts=False"
         )
     if method.solver != "direct":

@@ -47,6 +47,18 @@ def test_native_code_takes_nothing_from_the_c_library_that_it_may_round_as_it_li
     assert found == []
 
 
+def test_native_code_is_told_in_the_words_of_the_field(tmp_path: Path) -> None:
+    """Retired words come back neither in code nor in comments; `make lint` names them and what to say instead."""
+    ask = [sys.executable, str(ROOT / ".ci" / "words.py")]
+    (tmp_path / "some.cpp").write_text('int sweeps = 0;  // who "strikes" whom\nconst char* name = "blow";\n')
+
+    told = subprocess.run([*ask, str(tmp_path)], capture_output=True, text=True)
+    assert told.returncode == 1
+    assert re.findall(r': "(\w+)": say', told.stdout) == ["sweeps", "who", "whom"]
+    clean = subprocess.run([*ask, str(ROOT / "engine" / "native")], capture_output=True, text=True)
+    assert (clean.returncode, clean.stdout) == (0, "")
+
+
 def test_all_names_of_the_engine_exist_and_are_public() -> None:
     assert len(engine.__all__) == len(set(engine.__all__))
     for name in engine.__all__:

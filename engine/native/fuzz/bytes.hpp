@@ -104,7 +104,7 @@ inline std::vector<int> round_face(const std::vector<Point>& points, const std::
     return ring;
 }
 
-/// The hull of up to ten points with whole coordinates, stretched; null where they enclose nothing.
+/// The hull of up to ten points with whole coordinates, anisotropic; null where they enclose nothing.
 inline std::shared_ptr<const Polytope> hull(Bytes& bytes) {
     const int count = 4 + bytes.below(7);
     std::vector<Point> points;

@@ -5,8 +5,8 @@
 #include "../tests/support_distance.hpp"
 #include "bytes.hpp"
 #include "collision/narrow_phase.hpp"
+#include "collision/shape_cast.hpp"
 #include "collision/submerged.hpp"
-#include "collision/sweep.hpp"
 
 namespace {
 
@@ -174,7 +174,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const Vec3 speed = bytes.place(), spin = bytes.place();
     const Mover one{first, placed, at_first, speed, spin};
     const Mover two{second, placed, at_second, bytes.place(), {}};
-    const double duration = 0.02, time = first_touch(one, two, duration, 1e-6);
+    const double duration = 0.02, time = time_of_impact(one, two, duration, 1e-6);
     PROMISE(time < 0.0 || time <= duration);
     return 0;
 }

@@ -55,7 +55,7 @@ public:
         std::vector<double> lead(bodies.size(), 0.0);
         for (std::size_t k = 0; k < bodies.size(); ++k)
             if (touching && bodies[k].mass > 0.0) {
-                lead[k] = stage.lead(static_cast<int>(k));
+                lead[k] = stage.toi_fraction(static_cast<int>(k));
                 for (int i = 0; i < 3; ++i) velocity[k][i] += lead[k] * h * gravity[i];
             }
         while (touching && stage.impact_needed(system)) {
@@ -93,9 +93,9 @@ public:
         for (int round = 0; touching && round < 3; ++round) {
             for (std::size_t k = 0; k < bodies.size(); ++k)
                 poses[k] = {bodies[k].position, rotation(bodies[k].turn)};
-            if (!stage.part(system, 0, poses, round > 0)) break;
+            if (!stage.project_positions(system, 0, poses, round > 0)) break;
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
-                if (bodies[k].mass > 0.0) move(bodies[k], stage.parting().velocity[u++]);
+                if (bodies[k].mass > 0.0) move(bodies[k], stage.projection().velocity[u++]);
         }
     }
 

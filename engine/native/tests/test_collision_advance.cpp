@@ -1,4 +1,4 @@
-// How long a direction that turns keeps two moving shapes apart, and what first_touch() makes of it.
+// How long a direction that turns keeps two moving shapes apart, and what time_of_impact() makes of it.
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "collision/advance.hpp"
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "expect.hpp"
 #include "linear/vec.hpp"
 
@@ -75,7 +75,7 @@ void what_is_promised_holds() {
         const double time = trial % 4 ? 0.0 : 0.1;
         const Separation apart = separation(one, first.at(time), two, second.at(time));
         if (!(apart.gap > 1e-6)) continue;
-        const double left = 1.0 - time, kept = parted_for(first, second, apart.normal, time, left, SLOP);
+        const double left = 1.0 - time, kept = separated_for(first, second, apart.normal, time, left, SLOP);
         ++asked;
         whole += kept >= left;
         none += !(kept > 0.0);
@@ -100,14 +100,14 @@ void what_parts_slowly_is_not_met() {
         const Separation apart = separation(one, here, two, there);
         if (!(apart.gap > 0.01)) continue;
         const Mover still{one, own, here, {}, {}};
-        const double when = first_touch(still, {two, own, there, apart.gap * apart.normal, {}}, 9.0, SLOP);
+        const double when = time_of_impact(still, {two, own, there, apart.gap * apart.normal, {}}, 9.0, SLOP);
         if (when < 0.0) continue;
         there.position += (when * apart.gap - 1e-8) * apart.normal;
         const Mover first{one, own, here, {}, dice.vector(2.0)};
         const Mover second{two, own, there, dice.vector(0.5) - 0.3 * apart.normal, dice.vector(5.0)};
         if (least_gap(first, second, duration) < 1e-9) continue;
         ++asked;
-        EXPECT(first_touch(first, second, duration, 1e-3 * SLOP) < 0.0);
+        EXPECT(time_of_impact(first, second, duration, 1e-3 * SLOP) < 0.0);
     }
     EXPECT(asked > 200);
 }

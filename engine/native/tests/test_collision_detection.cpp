@@ -4,7 +4,7 @@
 #include <random>
 
 #include "collision/detection.hpp"
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -161,7 +161,7 @@ void filters_and_order() {
 }
 
 /// Margins that grow for a few bodies: their pairs are those that a search from scratch would find.
-void who_goes_further_is_looked_for_again() {
+void what_goes_further_is_looked_for_again() {
     std::mt19937_64 random(11);
     std::uniform_real_distribution<double> unit(0.0, 1.0);
     for (const int count : {5, 60}) {
@@ -196,7 +196,7 @@ void who_goes_further_is_looked_for_again() {
             EXPECT(found == theirs);
             EXPECT(found.size() >= grown.size());
         }
-        EXPECT(!one.near_again({0}, margin, found));  // a plane's margin is everybody's
+        EXPECT(!one.near_again({0}, margin, found));  // a plane's margin is that of every body
     }
 }
 
@@ -219,7 +219,7 @@ void keys_last_while_the_touching_features_do() {
 
 /// Boxes and capsules that fly and turn past each other, on parts off their centres or not: nothing is missed that
 /// many small steps see, and nothing is found where they see nothing.
-void sweeps_find_what_small_steps_find() {
+void casts_find_what_small_steps_find() {
     std::mt19937_64 random(11);
     std::uniform_real_distribution<double> unit(-1.0, 1.0);
     const auto vector = [&](double size) { return size * Vec3{unit(random), unit(random), unit(random)}; };
@@ -251,7 +251,7 @@ void sweeps_find_what_small_steps_find() {
             if (gap < -slop && seen < 0.0) seen = time;
             deepest = std::min(deepest, gap);
         }
-        const double found = first_touch(first, second, 1.0, slop);
+        const double found = time_of_impact(first, second, 1.0, slop);
         if (seen >= 0.0) {
             ++hits;
             EXPECT(found >= 0.0 && found <= seen);
@@ -273,16 +273,16 @@ void what_turns_in_a_plane_meets_no_side_of_it() {
     const double half = std::sqrt(0.5);
     const Pose lying{{0.3, 0.1, 0.05}, rotation(Quat{half, half, 0, 0})};  // axis along y
     for (const double h : {1.0 / 60.0, 0.1}) {
-        EXPECT(first_touch({box, own, flat, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
-        EXPECT(first_touch({roller, own, lying, {5, 0, 0}, {0, 100, 0}}, still, h, 1e-10) < 0.0);
-        EXPECT(first_touch({roller, own, lying, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
+        EXPECT(time_of_impact({box, own, flat, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
+        EXPECT(time_of_impact({roller, own, lying, {5, 0, 0}, {0, 100, 0}}, still, h, 1e-10) < 0.0);
+        EXPECT(time_of_impact({roller, own, lying, {5, 0, 0}, {0, 0, 4}}, still, h, 1e-10) < 0.0);
         // Nor what lifts its rear by turning about its front edge.
-        EXPECT(first_touch({box, own, flat, {5, 0, 0.05e-3}, {0, 1e-3, 0}}, still, h, 1e-10) < 0.0);
+        EXPECT(time_of_impact({box, own, flat, {5, 0, 0.05e-3}, {0, 1e-3, 0}}, still, h, 1e-10) < 0.0);
     }
     // One that tips is met, and so is one that stands a little lower.
-    EXPECT(first_touch({box, own, flat, {5, 0, 0}, {0, 4, 0}}, still, 0.1, 1e-10) >= 0.0);
+    EXPECT(time_of_impact({box, own, flat, {5, 0, 0}, {0, 4, 0}}, still, 0.1, 1e-10) >= 0.0);
     const Pose lower{{0.3, 0.1, 0.0499}, Mat3::identity()};
-    EXPECT(first_touch({box, own, lower, {5, 0, 0}, {0, 0, 4}}, still, 0.1, 1e-10) >= 0.0);
+    EXPECT(time_of_impact({box, own, lower, {5, 0, 0}, {0, 0, 4}}, still, 0.1, 1e-10) >= 0.0);
 }
 
 }  // namespace
@@ -294,9 +294,9 @@ int main() {
     a_long_one_among_few_meets_each_once();
     not_a_number_touches_nothing();
     filters_and_order();
-    who_goes_further_is_looked_for_again();
+    what_goes_further_is_looked_for_again();
     keys_last_while_the_touching_features_do();
-    sweeps_find_what_small_steps_find();
+    casts_find_what_small_steps_find();
     what_turns_in_a_plane_meets_no_side_of_it();
     return report();
 }

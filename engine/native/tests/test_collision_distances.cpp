@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "collision/narrow_phase.hpp"
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "expect.hpp"
 #include "support_distance.hpp"
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "collision/narrow_phase.hpp"
+#include "collision/shape_cast.hpp"
 #include "collision/submerged.hpp"
-#include "collision/sweep.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -45,7 +45,7 @@ void ask(const Primitive& one, const Pose& here, const Primitive& two, const Pos
 void move(const Primitive& one, const Pose& here, const Primitive& two, const Pose& there, Vec3 speed,
           Vec3 spin) {
     const double time =
-        first_touch({one, here, Pose{}, speed, spin}, {two, there, Pose{}, {}, {}}, 0.02, 1e-9);
+        time_of_impact({one, here, Pose{}, speed, spin}, {two, there, Pose{}, {}, {}}, 0.02, 1e-9);
     EXPECT(!(time > 0.02));
 }
 

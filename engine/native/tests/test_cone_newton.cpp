@@ -1,4 +1,4 @@
-// Newton's method on the cone against closed forms, enumeration and projected sweeps; wedges, ties and NaN.
+// Newton's method on the cone against closed forms, enumeration and projected iterations; wedges, ties and NaN.
 #include <limits>
 #include <random>
 
@@ -183,7 +183,7 @@ void coulombs_law_holds_in_towers() {
 }
 
 /// The same answer by projected Gauss–Seidel over dense rows, where rows give way and friction is small: one answer.
-void soft_towers_match_projected_sweeps() {
+void soft_towers_match_projected_gauss_seidel() {
     std::mt19937_64 random(31);
     for (int trial = 0; trial < 10; ++trial) {
         Problem problem = tower(3, random, 0.5, 1.0, 0.05);
@@ -196,7 +196,7 @@ void soft_towers_match_projected_sweeps() {
             for (std::size_t c = 0; c < n; ++c) sum += flat.s[r][c] * z[c];
             return sum;
         };
-        for (int sweep = 0; sweep < 20'000; ++sweep)
+        for (int iteration = 0; iteration < 20'000; ++iteration)
             for (std::size_t r = 0; r < n; r += 3) {
                 z[r] = std::max(0.0, z[r] - w(r) / flat.s[r][r]);
                 const double scale = flat.s[r + 1][r + 1] + flat.s[r + 2][r + 2];
@@ -341,7 +341,7 @@ int main() {
     one_point_matches_its_closed_form();
     rows_with_bounds_match_enumeration();
     coulombs_law_holds_in_towers();
-    soft_towers_match_projected_sweeps();
+    soft_towers_match_projected_gauss_seidel();
     a_tower_carries_what_stands_on_it();
     redundant_loads_are_shared();
     an_answer_is_its_own_start();

@@ -1,4 +1,4 @@
-// Islands: who hangs together, and that solving apart gives what solving together gives.
+// Islands: which bodies are connected, and that solving apart gives what solving together gives.
 #include <cstring>
 
 #include "contact_world.hpp"
@@ -26,7 +26,7 @@ void static_bodies_join_nothing() {
     EXPECT((islands.of_body == std::vector<int>{0, 1, -1, 2, 1, -1}));
 }
 
-/// Ties come, go and stay: the islands are those that one who knows nothing finds, and more ties are no reason to search.
+/// Ties come, go and stay: the islands are those that a search from nothing finds, and more ties are no reason to search.
 void islands_follow_their_ties() {
     constexpr int bodies = 60;
     IslandFinder kept;

@@ -39,7 +39,7 @@ void one_contact_reverses_its_velocity() {
     }
 }
 
-/// A ball is led to the time of its strike, t = g/(V + a h) of the step's own fall: it hits with V + a t, leaves with
+/// A ball is moved to the time of its impact, t = g/(V + a h) of the step's own fall: it hits with V + a t, leaves with
 /// psi times that, and what is left of the step pulls at it again.
 void a_ball_bounces_when_it_meets_the_surface() {
     const double speed = 3.0, a = -down.z;
@@ -54,7 +54,7 @@ void a_ball_bounces_when_it_meets_the_surface() {
         }
 }
 
-/// A box strikes a step early. Where in the step the surface lies is chance and must not be seen: what counts is the
+/// A box hits a step early. Where in the step the surface lies is chance and must not be seen: what counts is the
 /// energy. A body that falls through a gap g hits with √(V² + 2 a g), leaves with psi times that, and passes the
 /// height where the impact was written down with √(psi² (V² + 2 a g) − 2 a g).
 void a_bounce_does_not_win_the_fall_that_is_still_ahead() {

@@ -118,9 +118,9 @@ void all_solvers_agree() {
         EXPECT_NEAR(norm(hybrid.bodies[1].velocity - direct.bodies[1].velocity), 0.0, 1e-8);
         EXPECT_NEAR(ratio(iterative), std::min(slope, 0.5), 1e-8);
         EXPECT_NEAR(ratio(hybrid), std::min(slope, 0.5), 1e-8);
-        std::printf("slope %.1f: sweeps iterative %llu, hybrid %llu; direct rounds %llu\n", slope,
-                    static_cast<unsigned long long>(iterative.stage.counters().sweeps),
-                    static_cast<unsigned long long>(hybrid.stage.counters().sweeps),
+        std::printf("slope %.1f: PGS iterations iterative %llu, hybrid %llu; direct rounds %llu\n", slope,
+                    static_cast<unsigned long long>(iterative.stage.counters().pgs_iterations),
+                    static_cast<unsigned long long>(hybrid.stage.counters().pgs_iterations),
                     static_cast<unsigned long long>(direct.stage.counters().friction_rounds));
     }
 }
@@ -187,7 +187,7 @@ void the_law_holds_in_random_systems() {
                 sliding, sticking, unsettled, exact);
     EXPECT(exact >= 270);
     EXPECT(sliding > 100 && sticking > 100);
-    EXPECT(unsettled <= 5);  // wedges in which neither rounds nor sweeps settle: reported, not hidden
+    EXPECT(unsettled <= 5);  // wedges in which neither rounds nor iterations settle: reported, not hidden
 }
 
 /// A ball thrown sliding: it slows by mu g until it rolls, then keeps 5/7 of its speed (exactly, in discrete time).

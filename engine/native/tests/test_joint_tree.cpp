@@ -110,12 +110,12 @@ void what_it_cannot_do_is_left_to_the_rows() {
     driven.hinge(0, 1, {0.5, 0, 0});
     EXPECT(driven.coordinates() == 0);
 
-    World stretched;  // both bars of a loop in one line: its rows depend on each other
-    const int left = stretched.body({0.5, 0, 0}), right = stretched.body({1.5, 0, 0});
-    stretched.hinge(-1, left, {0, 0, 0});
-    stretched.hinge(left, right, {1, 0, 0});
-    stretched.hinge(-1, right, {2, 0, 0});
-    EXPECT(stretched.coordinates() == 0);
+    World anisotropic;  // both bars of a loop in one line: its rows depend on each other
+    const int left = anisotropic.body({0.5, 0, 0}), right = anisotropic.body({1.5, 0, 0});
+    anisotropic.hinge(-1, left, {0, 0, 0});
+    anisotropic.hinge(left, right, {1, 0, 0});
+    anisotropic.hinge(-1, right, {2, 0, 0});
+    EXPECT(anisotropic.coordinates() == 0);
 }
 
 void a_band_is_solved_with_row_exchange() {

@@ -32,7 +32,7 @@ nb::dict to_dict(const RunReport& report);
 nb::list to_list(const StageChoices& choices);
 nb::list to_list(const std::vector<Stage>& stages);
 
-/// Reads every entry of a dict of options, and refuses those nobody reads.
+/// Reads every entry of a dict of options, and refuses those that are not read.
 class Options {
 public:
     explicit Options(const nb::dict& options) : options_(options) {}

@@ -168,8 +168,8 @@ bool lowest_edge(const Mover& mover, double time, Vec3 n, Vec3& edge) noexcept {
 
 }  // namespace
 
-double parted_for(const Mover& first, const Mover& second, Vec3 normal, double time, double left,
-                  double slop) noexcept {
+double separated_for(const Mover& first, const Mover& second, Vec3 normal, double time, double left,
+                     double slop) noexcept {
     double best = 0.0;
     const Frame with_second{second.spin, second.body_at(time).position, second.velocity};
     if (first.shape.kind != ShapeKind::plane)

@@ -16,7 +16,7 @@ constexpr double furthest = 1e9;   // cells from the origin; what lies further c
 constexpr double fatness = 0.1;    // of the cells of level 0: by so much bounds are enlarged on every side,
 constexpr double fast = 1.0;       //   but for those that got further out than this part of it in one call
 constexpr double loose = 4.0;      // times that much: bounds as far inside theirs get new ones
-constexpr std::size_t few_of = 2;  // who escape are searched for alone up to one in so many
+constexpr std::size_t few_of = 2;  // those that escape are searched for alone up to one in so many
 constexpr int most_coarse = 8;     // of them that are to be compared with all,
 constexpr std::int64_t most_rows = 100;  //   since they reach more rows of smaller cells, or longer ones
 static_assert(most_rows < static_cast<std::int64_t>(std::bit_ceil(2 * few + 1)),
@@ -28,7 +28,7 @@ std::int32_t coordinate(double x, double size) noexcept {
 
 }  // namespace
 
-/// Who is no longer within its enlarged bounds, or far within, gets others.
+/// What is no longer within its enlarged bounds, or far within, gets others.
 void BroadPhase::find_escaped(const std::vector<Bounds>& bounds) {
     escaped_.clear();
     const double inside = loose * fatness * size_;
@@ -48,7 +48,7 @@ void BroadPhase::find_escaped(const std::vector<Bounds>& bounds) {
     }
 }
 
-/// Larger bounds; none for who has got so far out that it would leave them in the next call.
+/// Larger bounds; none for what has got so far out that it would leave them in the next call.
 void BroadPhase::fatten(std::size_t i, const Bounds& bounds, double out) {
     const double by = fatness * size_, more = out <= fast * by ? by : 0.0;
     fat_[i] = {bounds.low - Vec3{more, more, more}, bounds.high + Vec3{more, more, more}};
@@ -94,7 +94,7 @@ std::size_t BroadPhase::bucket(const Cell& cell) const noexcept {
            (begin_.size() - 2);
 }
 
-/// Tells of everybody in so many cells of a row.
+/// Tells of every member in so many cells of a row.
 template <class Visit> void BroadPhase::visit_row(const Cell& from, int cells, const Visit& visit) const {
     const std::size_t first = bucket(from), end = first + static_cast<std::size_t>(cells),
                       buckets = begin_.size() - 1;
@@ -121,7 +121,7 @@ int BroadPhase::place(std::size_t i) {
     return level;
 }
 
-/// Lists who lies in which cell.
+/// Lists what lies in which cell.
 void BroadPhase::fill_cells() {
     const std::size_t count = cells_.size();
     levels_ = 0;
@@ -140,7 +140,7 @@ void BroadPhase::fill_cells() {
         if (cells_[i].level >= 0) entries_[fill_[bucket(cells_[i])]++] = {cells_[i], static_cast<int>(i)};
 }
 
-/// Tells of everybody in a cell and its neighbours.
+/// Tells of every member in a cell and its neighbours.
 template <class Visit> void BroadPhase::visit_around(const Cell& cell, const Visit& visit) const {
     for (int n = 0; n < 9; ++n)
         visit_row({cell.x - 1, cell.y + n % 3 - 1, cell.z + n / 3 - 1, cell.level}, 3, visit);

@@ -18,7 +18,7 @@ using IndexPair = std::pair<int, int>;
 /// along x are found by hashing; the cells of a row lie one behind the other.
 ///
 /// What is searched for are pairs of bounds that have been made a little larger, and those are kept from call to call:
-/// who stays within its own costs nothing but a look, who leaves is searched for anew, and all are where many leave.
+/// what stays within its own costs nothing but a look, what leaves is searched for anew, and all are where many leave.
 /// What is told is the same in any case: the pairs that overlap, in order.
 class BroadPhase {
 public:
@@ -56,9 +56,9 @@ private:
     void sort_pairs(std::size_t count, std::vector<IndexPair>& out);
 
     std::vector<Bounds> fat_;                            // of each, larger than its own
-    std::vector<int> escaped_;                           // who has left them since the last call
+    std::vector<int> escaped_;                           // what has left them since the last call
     std::vector<char> has_escaped_;                      // of each
-    std::vector<IndexPair> pairs_, new_pairs_, merged_;  // of those bounds; of who has escaped; scratch
+    std::vector<IndexPair> pairs_, new_pairs_, merged_;  // of those bounds; of what has escaped; scratch
     double size_ = 1.0;                                  // of the cells of level 0, m
     std::uint32_t levels_ = 0;                           // those that hold something, a bit each
     std::vector<double> sorted_;

@@ -1,4 +1,4 @@
-// What pairs and sweeps ask of a cylinder.
+// What pairs and casts ask of a cylinder.
 #pragma once
 
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "collision/narrow_phase.hpp"
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 
 namespace spook {
 
@@ -66,7 +66,7 @@ bool Detection::single_points() const noexcept {
 bool Detection::may_touch(int i, int j) const noexcept {
     const int a = body_of_[i], b = body_of_[j];
     const unsigned roles = role_[a] | role_[b];
-    if (a == b || ((roles & awake) == 0 && roles != (sleeps | stirs))) return false;
+    if (a == b || ((roles & awake) == 0 && roles != (sleeps | is_moving))) return false;
     if (forms_[i].shape.kind == ShapeKind::plane && forms_[j].shape.kind == ShapeKind::plane) return false;
     return excluded_.empty() || !std::binary_search(excluded_.begin(), excluded_.end(), pair_key(a, b));
 }
@@ -87,13 +87,13 @@ void Detection::add(IndexPair pair, const Manifold& manifold, std::vector<Contac
     }
 }
 
-void Detection::touch(IndexPair pair, double margin, std::vector<Contact>& out) const {
+void Detection::collide_pair(IndexPair pair, double margin, std::vector<Contact>& out) const {
     const auto [i, j] = pair;
     add(pair, collide(forms_[i].shape, poses_[i], forms_[j].shape, poses_[j], margin), out);
 }
 
-void Detection::touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
-                      std::vector<Contact>& out) const {
+void Detection::collide_pair(IndexPair pair, const Pose& first, const Pose& second, double margin,
+                             std::vector<Contact>& out) const {
     const Collider::View a = collider(pair.first), b = collider(pair.second);
     add(pair, collide(a.shape, placed(first, a.part), b.shape, placed(second, b.part), margin), out);
 }
@@ -174,7 +174,7 @@ void Detection::detect(const std::vector<Pose>& bodies, const std::vector<double
                        std::vector<Contact>& out) {
     out.clear();
     for (const IndexPair& pair : near(bodies, margin))
-        touch(pair, margin[body_of_[pair.first]] + margin[body_of_[pair.second]], out);
+        collide_pair(pair, margin[body_of_[pair.first]] + margin[body_of_[pair.second]], out);
     std::sort(out.begin(), out.end(), [](const Contact& a, const Contact& b) { return a.key < b.key; });
 }
 

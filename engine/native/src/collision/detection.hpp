@@ -68,10 +68,10 @@ public:
     /// False if that does not do and near() is to be asked again.
     bool near_again(const std::vector<int>& grown, const std::vector<double>& margin,
                     std::vector<IndexPair>& out);
-    void touch(IndexPair pair, double margin, std::vector<Contact>& out) const;
-    /// As touch(), with the bodies of the pair elsewhere.
-    void touch(IndexPair pair, const Pose& first, const Pose& second, double margin,
-               std::vector<Contact>& out) const;
+    void collide_pair(IndexPair pair, double margin, std::vector<Contact>& out) const;
+    /// As collide_pair(), with the bodies of the pair elsewhere.
+    void collide_pair(IndexPair pair, const Pose& first, const Pose& second, double margin,
+                      std::vector<Contact>& out) const;
     Collider::View collider(int index) const noexcept {
         return {body_of_[index], forms_[index].shape, forms_[index].part};
     }
@@ -84,9 +84,9 @@ public:
     const std::vector<double>& radius() const noexcept { return radius_; }
 
     /// A dynamic body sleeps, or is awake again.
-    void rest(int body, bool asleep) noexcept { role_[body] = asleep ? sleeps : awake; }
+    void set_asleep(int body, bool asleep) noexcept { role_[body] = asleep ? sleeps : awake; }
     /// A body that moves as it is told does so, or stands still: then no sleeper need be told from it.
-    void stir(int body, bool moves) noexcept { role_[body] = moves ? stirs : none; }
+    void mark_moving(int body, bool moves) noexcept { role_[body] = moves ? is_moving : none; }
 
     /// Per body: whether a sphere round its centre is all its surface, so that its orientation does not matter.
     std::vector<char> balls() const;
@@ -99,7 +99,7 @@ private:
     bool reaches(int plane, int k, const std::vector<double>& margin) const noexcept;
     void add(IndexPair pair, const Manifold& manifold, std::vector<Contact>& out) const;
 
-    static constexpr unsigned char none = 0, awake = 1, sleeps = 2, stirs = 4;
+    static constexpr unsigned char none = 0, awake = 1, sleeps = 2, is_moving = 4;
 
     struct Form {
         Primitive shape;

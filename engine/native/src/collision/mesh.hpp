@@ -9,8 +9,8 @@
 namespace spook {
 
 /// Triangles with common corners, anticlockwise seen from outside. A contact on an edge or a corner is genuine only if
-/// no neighbouring triangle rises beyond it along the contact's normal: along seams of flat faces, and in valleys, the
-/// faces alone are met, so that what slides over a seam feels nothing.
+/// no neighbouring triangle rises beyond it along the contact's normal: along internal edges of flat faces, and in valleys, the
+/// faces alone are met, so that what slides over an internal edge feels nothing.
 struct Mesh {
     std::vector<Vec3> corners;  // m
     std::vector<std::array<int, 3>> triangles;

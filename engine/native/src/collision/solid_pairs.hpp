@@ -1,4 +1,4 @@
-// Flat-sided solids, boxes and hulls, against each other: what contact points and sweeps both ask.
+// Flat-sided solids, boxes and hulls, against each other: what contact points and casts both ask.
 #pragma once
 
 #include "collision/polytope.hpp"

@@ -19,13 +19,13 @@ constexpr double narrow = 0.03;     // a step so short has lost the path
 // Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
 // however redundant the points; with the tightest, what holding leaves is rounding soon after.
 constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
-constexpr double behind = 10.0, slow = 0.1;      // of the blur, and of itself: what holding back leaves
-constexpr double far = 1e-3;                     // a residual, of the speeds, from which the path may crawl
-constexpr int patience = 3, long_patience = 12;  // iterations without half the residual, or much less blur
-constexpr int max_jumps = 3;                     // without half the least they met
-constexpr int max_losses = 3;                    // of the path, sought again,
-constexpr double back = 10.0;                    //   so many blurs away
-constexpr double nearer = 0.1;                   //   and kept so much nearer to
+constexpr double behind = 10.0, slow = 0.1;     // of the blur, and of itself: what holding back leaves
+constexpr double far = 1e-3;                    // a residual, of the speeds, from which the path may crawl
+constexpr int backoff = 3, long_patience = 12;  // iterations without half the residual, or much less blur
+constexpr int max_jumps = 3;                    // without half the least they met
+constexpr int max_losses = 3;                   // of the path, sought again,
+constexpr double back = 10.0;                   //   so many blurs away
+constexpr double nearer = 0.1;                  //   and kept so much nearer to
 
 /// M⁻¹ from its factor: good enough for directions, which are refined.
 Mat6 inverse_six(const Mat6& factor) noexcept {
@@ -313,7 +313,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         }
         blur = found.blur;
         const bool lost =
-            stalled >= (best.speed > far * speed_ ? long_patience : patience) || found.length < narrow;
+            stalled >= (best.speed > far * speed_ ? long_patience : backoff) || found.length < narrow;
         if (lost && best.speed <= near_enough * speed_) break;
         if (jumps < 0 && !lost) continue;
         if (jumps < 0 && met > 0.0) {

@@ -81,32 +81,33 @@ private:
 };
 
 /// A point where the step ends, of bodies that may overlap.
-struct Lap {
+struct PenetrationRecord {
     Contact contact;
     Vec3 first_arm, second_arm;  // from the centres of mass, m
     double damping = 0.0;        // of the pair
-    double push = 0.0;           // how deep it is, m; negative where bodies are apart
+    double depth = 0.0;          // how deep it is, m; negative where bodies are apart
 };
 
-/// Of the search for strikes that act at their own time; by an island's first body.
+/// Of the search for impacts that act at their own time; by an island's first body.
 struct EventSearch {
     std::vector<std::size_t> members;
-    std::vector<std::uint64_t> struck;  // the pair of the island's strike, plus one
+    std::vector<std::uint64_t> impact_pair;  // the pair of the island's impact, plus one
     std::vector<char> plain, bouncy;
     std::vector<double> when, speed;
-    std::vector<std::size_t> climbing, may_climb;  // how many move along the forces, and may
+    std::vector<std::size_t> moving_along, may_move_along;  // how many move along the forces, and may
 };
 
-/// Of one blow; energies, shares and flags by island.
-struct BlowArrays {
+/// Of one impact; energies, shares and flags by island.
+struct ImpactArrays {
     MixedSystem hit, start, plastic;
     std::vector<FrictionPoint> friction, fresh, plastic_friction, first_friction;
-    std::vector<std::size_t> who, pushed;  // points; rows against what moves as it is told, or along itself
+    std::vector<std::size_t> hit_points,
+        pushed;  // points; rows against what moves as it is told, or along itself
     std::vector<std::pair<int, int>> pairs;
     std::vector<Vec6> before, mixed, next;
     std::vector<std::array<double, 2>> returned;  // of the slip of each point, m/s
     std::vector<double> limit, energy, share, low, high, asked, first, closing;
-    std::vector<char> rises, answered, touched, struck, balls, is_hit;  // the last by body
+    std::vector<char> rises, answered, touched, taking_part, balls, is_hit;  // the last by body
 };
 
 struct EnergySums {
@@ -116,7 +117,7 @@ struct EnergySums {
 
 struct ContactArrays {
     EventSearch events;
-    BlowArrays blow;
+    ImpactArrays impact;
     // Of a solve:
     std::vector<FrictionPoint> friction;
     std::vector<char> answered;                   // per row: the round before found it an answer
@@ -124,14 +125,14 @@ struct ContactArrays {
     std::vector<double> share;                    // per moving body
     std::vector<EnergySums> sums;                 // by island
     std::vector<Vec6> free_velocity;              // per moving body
-    std::vector<IndexPair> grazing;               // pairs, see let_pass()
+    std::vector<IndexPair> grazing;               // pairs, see skip_grazing()
     std::vector<std::vector<std::size_t>> asked;  // open pairs to be judged, by each thread
-    std::vector<char> reached;                    // bodies, see find_beside()
-    std::vector<char> parted_far;                 // islands, see note_far()
+    std::vector<char> reached;                    // bodies, see find_neighbours()
+    std::vector<char> moved_far;                  // islands, see mark_far_islands()
     std::vector<double> island_mass;              // kg
-    DepthOfPair left;                             // see note_given()
-    // Who hangs together by rows of joints and points; in what parts; where a solve is shortened.
-    IslandFinder hanging, parted, shortened;
+    DepthOfPair left;                             // see update_initial_penetrations()
+    // Which bodies are connected by rows of joints and points; in what parts; where a solve is shortened.
+    IslandFinder connected, projected, shortened;
 };
 
 }  // namespace spook

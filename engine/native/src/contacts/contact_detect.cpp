@@ -3,7 +3,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
 #include "linear/ahead.hpp"
@@ -44,7 +44,7 @@ bool ContactStage::reachable(const Contact& contact) const {
     const std::vector<double>& radius = detection_.radius();
     const Vec3 n = contact.point.normal;
     auto speed = [&](int b) {
-        const Vec6 free = sum(velocity_[b], kick_[b]);
+        const Vec6 free = sum(velocity_[b], dv_ext_[b]);
         const double spin = std::max(norm(angular(velocity_[b])), norm(angular(free)));
         return std::max(std::abs(dot(n, linear(velocity_[b]))), std::abs(dot(n, linear(free)))) +
                spin * radius[b];
@@ -59,31 +59,32 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     if (team_) team_->refresh();
     poses_ = poses;
     velocity_ = velocity;
-    kick_.resize(bodies);
+    dv_ext_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b) {
-        kick_[b] = sum(free_velocity[b], velocity[b], -1.0);
-        prescribed_[b] = unknown_[b] < 0 ? velocity[b] : Vec6{};
+        dv_ext_[b] = sum(free_velocity[b], velocity[b], -1.0);
+        prescribed_[b] = solver_index_[b] < 0 ? velocity[b] : Vec6{};
     }
-    supplies_ = conveys_ || std::any_of(prescribed_.begin(), prescribed_.end(),
-                                        [](const Vec6& v) { return v != Vec6{}; });
+    has_external_drive_ = conveys_ || std::any_of(prescribed_.begin(), prescribed_.end(),
+                                                  [](const Vec6& v) { return v != Vec6{}; });
     // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
-    for (std::vector<char>* flags : {&parting_.grounded, &parting_.supplied, &arrays_.parted_far})
+    for (std::vector<char>* flags :
+         {&projection_.grounded, &projection_.externally_driven, &arrays_.moved_far})
         flags->reserve(bodies);
     arrays_.sums.reserve(bodies);
-    std::fill(lead_.begin(), lead_.end(), 0.0);
+    std::fill(toi_fraction_.begin(), toi_fraction_.end(), 0.0);
     std::fill(event_time_.begin(), event_time_.end(), -1.0);
     std::fill(supported_.begin(), supported_.end(), 0);
     std::fill(depth_.begin(), depth_.end(), 0.0);
-    std::fill(sinking_.begin(), sinking_.end(), 0.0);
+    std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
     correction_.clear();
-    parting_.velocity.clear();
+    projection_.velocity.clear();
     points_.clear();
-    rests_.clear();
-    roused_.clear();
+    extras_.clear();
+    woken_.clear();
     impact_needed_ = plastic_first_ = false;
-    settling_ = ran_away_ = false;  // of a step that was taken back, or is over
+    iterating_ = ran_away_ = false;  // of a step that was taken back, or is over
     impact_rounds_ = 0;
-    if (options_.impacts == ImpactOrder::successive) clock_.assign(bodies, 0.0), way_.assign(bodies, Vec6{});
+    if (options_.impacts == ImpactOrder::successive) clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{});
 
     for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
     search_ = margin_;
@@ -94,21 +95,21 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         const double room = std::sqrt(squares / static_cast<double>(margin_.size()));
         for (double& margin : search_) margin += room;
     }
-    pressing_.clear();
-    carried_kick_.assign(bodies, Vec6{});
+    support_pairs_.clear();
+    support_impulse_dv_.assign(bodies, Vec6{});
     find_open();
-    find_carried();
+    find_supported();
     predicted_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b)
-        predicted_[b] = supported_[b] || jointed_[b] || unknown_[b] < 0 ? velocity[b] : free_velocity[b];
+        predicted_[b] = supported_[b] || jointed_[b] || solver_index_[b] < 0 ? velocity[b] : free_velocity[b];
     const std::size_t closed_points = points_.size();
-    if (!begun_) find_given();
-    if (find_strikes(predicted_, false) > 0) {
+    if (!initial_penetration_known_) note_initial_penetrations();
+    if (find_impacts(predicted_, false) > 0) {
         find_events();
-        take_back_strikes(closed_points, predicted_);
+        move_impacts_to_start(closed_points, predicted_);
     }
     if (points_.empty()) {
-        touches_.clear();
+        cache_.clear();
         return false;
     }
     counters_.contacts += points_.size();
@@ -127,7 +128,7 @@ void ContactStage::find_open() {
 /// The same where the search has been widened for some bodies since: what is new is theirs.
 void ContactStage::find_open_again() {
     if (!detection_.near_again(grown_, search_, near_)) {
-        changed_.assign(unknown_.size(), 1);
+        changed_.assign(solver_index_.size(), 1);
         return find_open();
     }
     for (const int body : grown_) changed_[body] = 1;
@@ -167,8 +168,8 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
     for (std::size_t k = 0; k < near.size(); ++k) {
         const IndexPair& pair = near[k];
         if (k + ahead < near.size()) {
-            ask_for(detection_.pose(near[k + ahead].first));
-            ask_for(detection_.pose(near[k + ahead].second));
+            prefetch(detection_.pose(near[k + ahead].first));
+            prefetch(detection_.pose(near[k + ahead].second));
         }
         if ((k + 1) % pairs_a_look == 0) Watch::look();
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
@@ -182,7 +183,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
             continue;
         }
         scratch_.clear();
-        detection_.touch(pair, reach, scratch_);
+        detection_.collide_pair(pair, reach, scratch_);
         const bool touching =
             std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
         // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
@@ -202,19 +203,20 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
     }
     for (std::size_t k = before; k < points_.size(); ++k) {
         // As deep as a body will be when it meets the next part of what holds it.
-        const double depth = sunk_by(points_[k], false);
+        const double depth = depth_at_toi(points_[k], false);
         for (const int b : {points_[k].contact.first, points_[k].contact.second})
             depth_[b] = std::max(depth_[b], depth);
     }
-    if (let_pass(before))
+    if (skip_grazing(before))
         std::sort(open_.begin() + unmet, open_.end(),
                   [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; });
     for (std::size_t k = before; k < points_.size(); ++k) {
         if (k + ahead < points_.size()) {
             const Contact& later = points_[k + ahead].contact;
-            for (const int body : {later.first, later.second}) ask_for(velocity_[body]), ask_for(kick_[body]);
+            for (const int body : {later.first, later.second})
+                prefetch(velocity_[body]), prefetch(dv_ext_[body]);
         }
-        note_pressing(points_[k]);
+        note_supports(points_[k]);
         for (const int b : {points_[k].contact.first, points_[k].contact.second}) supported_[b] = 1;
     }
 }
@@ -227,17 +229,17 @@ OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) co
     return {pair, first.body, second.body, apart, arm(pair.first, first), arm(pair.second, second)};
 }
 
-void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double strike) {
+void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double toi) {
     Point& point = points_.emplace_back();
     point.contact = contact;
     point.friction = material(contact).friction;
     point.first_arm = contact.point.position - first.position;
     point.second_arm = contact.point.position - second.position;
     point.tangent = world_tangent(contact.point.normal);
-    point.strike = strike;
+    point.toi = toi;
     point.begun = contact.point.gap;
     if (oriented_) orient(point, first, second);
-    if (!asleep_.empty()) rouse(contact);
+    if (!asleep_.empty()) wake_sleepers(contact);
 }
 
 /// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In
@@ -261,23 +263,23 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) {
     }
     const double along = std::sqrt(across * across + (mu * mu - across * across) * length * length);
     point.friction = std::min(along, across);
-    PointRest& rest = own_rest(point);
-    rest.stretch[0] = along / point.friction;
-    rest.stretch[1] = across / point.friction;
+    ContactExtras& extras = own_extras(point);
+    extras.axis_scale[0] = along / point.friction;
+    extras.axis_scale[1] = across / point.friction;
 }
 
-/// The overlap at which a pair counts as met, m. Bodies that sink while sweeps have not settled meet the sides of the next
+/// The overlap at which a pair counts as met, m. Bodies that sink while iterations have not settled meet the sides of the next
 /// part of what holds them as deep as that; round shapes and planes have no sides.
 double ContactStage::slop(const OpenPair& open) const noexcept {
     const int a = open.first, b = open.second;
     const bool sides =
         have_sides(detection_.collider(open.pair.first).shape, detection_.collider(open.pair.second).shape);
     return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
-           (sides ? 2.0 * std::max(sinking_[a], sinking_[b]) : 0.0);
+           (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
 }
 
 /// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first
-/// round of first_touch(), without what that needs before.
+/// round of time_of_impact(), without what that needs before.
 bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocity) const {
     const int a = open.first, b = open.second;
     if (event_time_[a] >= 0.0 || event_time_[b] >= 0.0) return false;

@@ -1,4 +1,4 @@
-// The contact stage's second part: blows.
+// The contact stage's second part: impacts.
 //
 // Why the impact cannot raise the kinetic energy E = ½ vᵀ M v. Let v_p be the plastic impact (psi = 0): with
 // impulse P, M (v_p − v₋) = P and E_p − E₋ = v_p·P − ½ |v_p − v₋|²_M, where v_p·P = Σ nu C v_p + beta·D v_p, whose
@@ -17,17 +17,17 @@ namespace spook {
 
 namespace {
 
-constexpr int simultaneous_rounds = 20;  // of blows that follow from blows in one step
+constexpr int simultaneous_rounds = 20;  // of impacts that follow from impacts in one step
 constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
-constexpr double blow_give =
-    1e-3;                        // of a point's own inverse inertia: what it gives way while a blow is shared
+constexpr double impact_compliance =
+    1e-3;  // of a point's own inverse inertia: what it gives way while an impact is shared
 constexpr int determined = 3;    // points of a pair whose normal impulses its motion fixes
-constexpr int most_again = 8;    // solves until the give is gone: each leaves about blow_give of it
+constexpr int most_again = 8;    // solves until the give is gone: each leaves about impact_compliance of it
 constexpr double left = 1e-16;   // of the fastest row: a give that is rounding
 constexpr double broken = 1e-6;  // of the fastest row: what a row may be short of
 constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 
-/// Of successive blows in one step.
+/// Of successive impacts in one step.
 int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }
 
 /// Of each island's bodies, J.
@@ -46,13 +46,13 @@ void find_kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& vel
 
 /// In islands whose energy rises, velocities between the plastic ones and those of Newton's law that keep it; `share` is
 /// how much of the latter.
-void blend(BlowArrays& blow, const Islands& islands) {
-    MixedSystem& newton = blow.hit;
-    const MixedSystem& plastic = blow.plastic;
-    const std::vector<char>& rises = blow.rises;
-    std::vector<double>&low = blow.low, &high = blow.high, &energy = blow.energy;
+void blend(ImpactArrays& work, const Islands& islands) {
+    MixedSystem& newton = work.hit;
+    const MixedSystem& plastic = work.plastic;
+    const std::vector<char>& rises = work.rises;
+    std::vector<double>&low = work.low, &high = work.high, &energy = work.energy;
     low.assign(islands.count, 0.0), high.assign(islands.count, 1.0);
-    std::vector<Vec6>& mixed = blow.mixed = newton.velocity;
+    std::vector<Vec6>& mixed = work.mixed = newton.velocity;
     const auto mix = [&](const auto& of_island) {
         for (std::size_t b = 0; b < mixed.size(); ++b) {
             const int island = islands.of_body[b];
@@ -66,12 +66,12 @@ void blend(BlowArrays& blow, const Islands& islands) {
         mix([&](int k) { return 0.5 * (low[k] + high[k]); });
         find_kinetic_energy(newton, mixed, islands, energy);
         for (int k = 0; k < islands.count; ++k)
-            (energy[k] <= blow.limit[k] ? low[k] : high[k]) = 0.5 * (low[k] + high[k]);
+            (energy[k] <= work.limit[k] ? low[k] : high[k]) = 0.5 * (low[k] + high[k]);
     }
     mix([&](int k) { return low[k]; });
     newton.velocity = mixed;
     for (int k = 0; k < islands.count; ++k)
-        if (rises[k]) blow.share[k] = low[k];
+        if (rises[k]) work.share[k] = low[k];
 }
 
 /// Whether some contact is approached after a solve: where many rows of a few bodies say the same, elimination may find
@@ -97,46 +97,47 @@ Vec3 impulse_of(const RowBlock& block) {
 
 }  // namespace
 
-/// A pair that meets at more points than its motion can tell apart may share a blow among them in many ways, and
+/// A pair that meets at more points than its motion can tell apart may share an impact among them in many ways, and
 /// friction turns the bodies otherwise with each. Points that give way alike share it in one: their rows get a
-/// softness, which hit_exactly() takes back.
-void ContactStage::share_blow(MixedSystem& hit, std::size_t joints,
-                              const std::vector<std::size_t>& who) const {
-    std::vector<std::pair<int, int>>& pairs = arrays_.blow.pairs;  // points of compounds do not come together
+/// softness, which solve_impact() takes back.
+void ContactStage::share_impact(MixedSystem& hit, std::size_t joints,
+                                const std::vector<std::size_t>& hit_points) const {
+    std::vector<std::pair<int, int>>& pairs =
+        arrays_.impact.pairs;  // points of compounds do not come together
     const auto pair = [&](std::size_t k) {
         const Contact& contact = points_[k].contact;
         return std::pair{contact.first, contact.second};
     };
     pairs.clear();
-    for (const std::size_t k : who) pairs.push_back(pair(k));
+    for (const std::size_t k : hit_points) pairs.push_back(pair(k));
     std::sort(pairs.begin(), pairs.end());
-    for (std::size_t j = 0; j < who.size(); ++j) {
-        const auto [first, last] = std::equal_range(pairs.begin(), pairs.end(), pair(who[j]));
+    for (std::size_t j = 0; j < hit_points.size(); ++j) {
+        const auto [first, last] = std::equal_range(pairs.begin(), pairs.end(), pair(hit_points[j]));
         if (last - first <= determined) continue;
         RowBlock& block = hit.rows[joints + j];
-        block.softness[0] = blow_give * own_inertia(hit, block, 0);
+        block.softness[0] = impact_compliance * own_inertia(hit, block, 0);
     }
 }
 
-/// Solves a blow; where its rows are soft, again and again with their give added to what they ask, until none is left
+/// Solves an impact; where its rows are soft, again and again with their give added to what they ask, until none is left
 /// (the proximal point algorithm, Rockafellar 1976). Rows that contradict each other keep some: the solve is unsettled.
-void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
-                               FrictionModel model) {
-    const std::vector<FrictionPoint>& fresh = arrays_.blow.first_friction = friction;
+void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
+                                FrictionModel model) {
+    const std::vector<FrictionPoint>& fresh = arrays_.impact.first_friction = friction;
     FrictionReport report = run(hit, friction, impact_solver_, model);
     if (report.converged && is_broken(hit, joints)) {
         for (std::size_t k = joints; k < hit.rows.size(); ++k) {
             RowBlock& block = hit.rows[k];
             block.multiplier.fill(0.0);
             block.state[0] = block.right[0] > 0.0 ? RowState::free : RowState::at_lower;
-            block.softness[0] = blow_give * own_inertia(hit, block, 0);
+            block.softness[0] = impact_compliance * own_inertia(hit, block, 0);
         }
         friction = fresh;
         report = run(hit, friction, impact_solver_, model);
     }
     bool settled = report.converged;
-    std::vector<double>& asked = filled(arrays_.blow.asked, 0);
-    std::vector<char>& answered = filled<char>(arrays_.blow.answered, hit.rows.size(), 1);
+    std::vector<double>& asked = filled(arrays_.impact.asked, 0);
+    std::vector<char>& answered = filled<char>(arrays_.impact.answered, hit.rows.size(), 1);
     double fastest = 0.0;
     bool soft = false;
     for (std::size_t k = joints; k < hit.rows.size(); ++k) {
@@ -161,45 +162,45 @@ void ContactStage::hit_exactly(MixedSystem& hit, std::size_t joints, std::vector
     }
     const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
     if (report.finite && change > std::max(enough, tolerated * fastest)) ++counters_.unsettled;
-    if (report.finite && !settled) judge_blow(hit, friction, model);
+    if (report.finite && !settled) judge_impact(hit, friction, model);
 }
 
-/// Whether the bodies that a plastic blow sets in motion meet others with restitution in this very step. The resting rows
-/// that answer such blows know of no bounce: plastic ones, too, are then met before, so that these are found in time. If
+/// Whether the bodies that a plastic impact sets in motion meet others with restitution in this very step. The resting rows
+/// that answer such impacts know of no bounce: plastic ones, too, are then met before, so that these are found in time. If
 /// there are none, what has been found late is no longer left out: it is met as if it did not rebound.
-bool ContactStage::blows_come_first() {
-    if (!late_blow_ || plastic_first_) return false;
+bool ContactStage::needs_plastic_impact() {
+    if (!late_impact_ || plastic_first_) return false;
     plastic_first_ = true;
     measure_points();
     if (impact_needed_) order_points();
     return impact_needed_;
 }
 
-/// Gives points to the strikes that were left out for a blow that does not come.
-bool ContactStage::find_left_out(const std::vector<Vec6>& velocity) {
-    late_blow_ = false;
-    const std::size_t taken = points_.size();
-    if (find_strikes(velocity, true) == 0) return false;
-    take_back_strikes(taken, velocity);
+/// Gives points to the impacts that were left out for an impact that does not come.
+bool ContactStage::find_deferred_impacts(const std::vector<Vec6>& velocity) {
+    late_impact_ = false;
+    const std::size_t dissipated_energy = points_.size();
+    if (find_impacts(velocity, true) == 0) return false;
+    move_impacts_to_start(dissipated_energy, velocity);
     return true;
 }
 
-/// What hangs together by rows of joints, of which `system` has so many, and by the step's points.
-const Islands& ContactStage::hanging(const MixedSystem& system, std::size_t joints) const {
-    arrays_.hanging.begin(static_cast<int>(system.mass.size()));
-    for (std::size_t k = 0; k < joints; ++k) arrays_.hanging.tie(system.rows[k]);
+/// What is connected by rows of joints, of which `system` has so many, and by the step's points.
+const Islands& ContactStage::connected(const MixedSystem& system, std::size_t joints) const {
+    arrays_.connected.begin(static_cast<int>(system.mass.size()));
+    for (std::size_t k = 0; k < joints; ++k) arrays_.connected.tie(system.rows[k]);
     for (const Point& point : points_)
-        arrays_.hanging.tie(unknown_[point.contact.first], unknown_[point.contact.second]);
-    return arrays_.hanging.find();
+        arrays_.connected.tie(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+    return arrays_.connected.find();
 }
 
 int ContactStage::island_of(const Islands& islands, const Point& point) const noexcept {
-    return islands.of_body[std::max(unknown_[point.contact.first], unknown_[point.contact.second])];
+    return islands.of_body[std::max(solver_index_[point.contact.first], solver_index_[point.contact.second])];
 }
 
-/// Whether a joint's stop takes part in blows: it sends back what hits it, or plastic blows are met as well.
+/// Whether a joint's stop takes part in impacts: it sends back what hits it, or plastic impacts are met as well.
 bool ContactStage::is_hit(const RowBlock& block) const noexcept {
-    return block.stop.rebound != 0.0 || (plastic_first_ && block.stop.struck);
+    return block.stop.rebound != 0.0 || (plastic_first_ && block.stop.hit);
 }
 
 /// Whether some stop is hit where contacts are to hear of it: what it sets in motion may push them, and
@@ -209,8 +210,8 @@ bool ContactStage::stop_is_hit(const MixedSystem& system) const {
     const auto hit = [this](const RowBlock& block) { return is_hit(block); };
     if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
     if (impact_rounds_ > most_rounds(points_.size())) return false;
-    const Islands& islands = hanging(system, system.rows.size());
-    std::vector<char>& touched = filled(arrays_.blow.touched, islands.count);
+    const Islands& islands = connected(system, system.rows.size());
+    std::vector<char>& touched = filled(arrays_.impact.touched, islands.count);
     for (const Point& point : points_) touched[island_of(islands, point)] = 1;
     return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
@@ -218,14 +219,14 @@ bool ContactStage::stop_is_hit(const MixedSystem& system) const {
 }
 
 /// Whether bodies that a stop sends back with `next` meet others that no row knew of: `known` is how many points there
-/// were. Such blows come after the stop's.
-bool ContactStage::stop_comes_first(const MixedSystem& system, std::size_t known,
-                                    const std::vector<Vec6>& next) {
+/// were. Such impacts come after the stop's.
+bool ContactStage::needs_stop_impact(const MixedSystem& system, std::size_t known,
+                                     const std::vector<Vec6>& next) {
     const auto hit = [this](const RowBlock& block) { return is_hit(block); };
     if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
-    if (late_blow_) {
+    if (late_impact_) {
         plastic_first_ = true;  // keeps them
-        find_left_out(next);
+        find_deferred_impacts(next);
     }
     if (points_.size() == known || !stop_is_hit(system)) return false;
     order_points();
@@ -240,25 +241,25 @@ bool ContactStage::pass_other_ends(const MixedSystem& system, std::size_t joints
     return ends_passed_;
 }
 
-/// The rows of joints as a blow sees them, of those that hang together with a point that is struck, or that have a stop
+/// The rows of joints as an impact sees them, of those that are connected to a point that is hit, or that have a stop
 /// which is hit beside a point: what is far from any does not know of it.
-void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& who,
+void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& hit_points,
                              std::vector<RowBlock>& rows) const {
     if (system.rows.empty()) return;
-    const Islands& islands = hanging(system, system.rows.size());
+    const Islands& islands = connected(system, system.rows.size());
     const auto island = [&](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
-    std::vector<char>&touched = filled(arrays_.blow.touched, islands.count),
-    &struck = filled(arrays_.blow.struck, islands.count);
+    std::vector<char>&touched = filled(arrays_.impact.touched, islands.count),
+    &taking_part = filled(arrays_.impact.taking_part, islands.count);
     for (const Point& point : points_) touched[island_of(islands, point)] = 1;
-    for (const std::size_t k : who) struck[island_of(islands, points_[k])] = 1;
+    for (const std::size_t k : hit_points) taking_part[island_of(islands, points_[k])] = 1;
     for (const RowBlock& block : system.rows)
-        if (is_hit(block) && touched[island(block)]) struck[island(block)] = 1;
+        if (is_hit(block) && touched[island(block)]) taking_part[island(block)] = 1;
     for (RowBlock& given : system.rows) {
-        if (!struck[island(given)]) continue;
+        if (!taking_part[island(given)]) continue;
         given.stop.answered = is_hit(given);
-        given.stop.spent = impact_rounds_ > most_rounds(points_.size());
+        given.stop.limit_reached = impact_rounds_ > most_rounds(points_.size());
         RowBlock& block = rows.emplace_back(given);
         for (int i = 0; i < block.size; ++i) {
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
@@ -275,7 +276,7 @@ void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>
 }
 
 /// Whether a point is approached so that the impact is to answer it.
-bool ContactStage::is_blow(const Point& point) const noexcept {
+bool ContactStage::is_impact(const Point& point) const noexcept {
     const bool answered = point.bounce > 0.0 || (plastic_first_ && point.bounce == 0.0);
     return answered && point.approach < -point.rounding;
 }
@@ -288,25 +289,25 @@ void ContactStage::impact(MixedSystem& system) {
     sunk_ = false;
     const bool successive =
         options_.impacts == ImpactOrder::successive && impact_rounds_ <= most_rounds(points_.size());
-    BlowArrays& blow = arrays_.blow;
-    std::vector<std::size_t>& who = filled(blow.who, 0);
-    if (successive) find_earliest_blows(system, who);
+    ImpactArrays& work = arrays_.impact;
+    std::vector<std::size_t>& hit_points = filled(work.hit_points, 0);
+    if (successive) find_earliest_impacts(system, hit_points);
     for (std::size_t k = 0; !successive && k < points_.size(); ++k)
-        if (points_[k].bounce >= 0.0) who.push_back(k);
-    MixedSystem& hit = blow.hit;
+        if (points_[k].bounce >= 0.0) hit_points.push_back(k);
+    MixedSystem& hit = work.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
     hit.rows.clear(), hit.velocity.clear();
-    take_part(system, who, hit.rows);
+    take_part(system, hit_points, hit.rows);
     const std::size_t joints = hit.rows.size();
-    std::vector<FrictionPoint>& friction = filled(blow.friction, 0);
-    std::vector<std::size_t>& pushed = filled(blow.pushed, 0);
-    std::vector<Vec6>& before = blow.before = hit.momentum;
+    std::vector<FrictionPoint>& friction = filled(work.friction, 0);
+    std::vector<std::size_t>& pushed = filled(work.pushed, 0);
+    std::vector<Vec6>& before = work.before = hit.momentum;
     for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
-    auto& returned = blow.returned;
-    returned.assign(who.size(), {});
-    for (std::size_t j = 0; j < who.size(); ++j) {
-        const Point& point = points_[who[j]];
+    auto& returned = work.returned;
+    returned.assign(hit_points.size(), {});
+    for (std::size_t j = 0; j < hit_points.size(); ++j) {
+        const Point& point = points_[hit_points[j]];
         RowBlock block = row_block(point, point.friction > 0.0 ? 3 : 1);
         if (std::any_of(block.right.begin(), block.right.begin() + block.size,
                         [](double r) { return r != 0.0; }))
@@ -315,8 +316,8 @@ void ContactStage::impact(MixedSystem& system) {
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
         if (block.size == 3) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
-            friction.back().stretched = rest(point).is_stretched();
-            const double slip = point.bounce > 0.0 && is_blow(point)
+            friction.back().anisotropic = extras(point).is_anisotropic();
+            const double slip = point.bounce > 0.0 && is_impact(point)
                                     ? std::max(materials_[point.contact.first].tangential_restitution,
                                                materials_[point.contact.second].tangential_restitution)
                                     : 0.0;
@@ -326,39 +327,39 @@ void ContactStage::impact(MixedSystem& system) {
         }
         hit.rows.push_back(block);
     }
-    // No step before has anything to say about a blow: the box takes this one's own normal impulses.
+    // No step before has anything to say about an impact: the box takes this one's own normal impulses.
     const FrictionModel model =
         options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
-    share_blow(hit, joints, who);
-    blow.start = hit, blow.fresh = friction;
-    hit_exactly(hit, joints, friction, model);
+    share_impact(hit, joints, hit_points);
+    work.start = hit, work.fresh = friction;
+    solve_impact(hit, joints, friction, model);
 
-    const Islands& islands = arrays_.hanging.find(hit);
+    const Islands& islands = arrays_.connected.find(hit);
     const auto island = [&islands](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
-    find_kinetic_energy(hit, before, islands, blow.limit);
-    find_kinetic_energy(hit, hit.velocity, islands, blow.energy);
-    std::vector<double>& share = filled(blow.share, islands.count, 1.0);  // of Newton's law, the rest plastic
-    std::vector<char>& rises = filled(blow.rises, islands.count);
-    for (int k = 0; k < islands.count; ++k) rises[k] = blow.energy[k] > blow.limit[k] * (1.0 + gain);
+    find_kinetic_energy(hit, before, islands, work.limit);
+    find_kinetic_energy(hit, hit.velocity, islands, work.energy);
+    std::vector<double>& share = filled(work.share, islands.count, 1.0);  // of Newton's law, the rest plastic
+    std::vector<char>& rises = filled(work.rises, islands.count);
+    for (int k = 0; k < islands.count; ++k) rises[k] = work.energy[k] > work.limit[k] * (1.0 + gain);
     for (const std::size_t k : pushed) rises[island(hit.rows[k])] = 0;
-    MixedSystem& plastic = blow.plastic;
+    MixedSystem& plastic = work.plastic;
     if (std::find(rises.begin(), rises.end(), 1) != rises.end()) {
-        plastic = blow.start, blow.plastic_friction = blow.fresh;
+        plastic = work.start, work.plastic_friction = work.fresh;
         for (std::size_t k = 0; k < joints; ++k)
             if (RowBlock& block = plastic.rows[k]; block.stop.row >= 0) block.right[block.stop.row] = 0.0;
         for (std::size_t k = joints; k < plastic.rows.size(); ++k) {
             plastic.rows[k].right[0] = 0.0;
             for (int i = 1; i < 3; ++i) plastic.rows[k].right[i] += returned[k - joints][i - 1];
         }
-        hit_exactly(plastic, joints, blow.plastic_friction, model);
-        blend(blow, islands);
+        solve_impact(plastic, joints, work.plastic_friction, model);
+        blend(work, islands);
     }
     system.velocity = hit.velocity;
-    mark_held(hit);
-    for (std::size_t j = 0; j < who.size(); ++j) {
-        Point& point = points_[who[j]];
+    mark_rows(hit);
+    for (std::size_t j = 0; j < hit_points.size(); ++j) {
+        Point& point = points_[hit_points[j]];
         const RowBlock& block = hit.rows[joints + j];
         const double s = share[island(block)];
         double normal = block.multiplier[0];
@@ -369,38 +370,39 @@ void ContactStage::impact(MixedSystem& system) {
             impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
         }
         point.impact += normal;
-        own_rest(point).impact_impulse += impulse;
+        own_extras(point).impact_impulse += impulse;
     }
     after_impact(system);
 }
 
-/// Blows set bodies in motion that meet others within the same step.
+/// Impacts set bodies in motion that meet others within the same step.
 void ContactStage::after_impact(const MixedSystem& system) {
-    for (std::size_t b = 0; b < unknown_.size(); ++b)
-        if (unknown_[b] >= 0 && held_[unknown_[b]]) {
-            let_go(static_cast<int>(b), system.velocity[unknown_[b]]);
-            velocity_[b] = system.velocity[unknown_[b]];
+    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+        if (solver_index_[b] >= 0 && has_rows_[solver_index_[b]]) {
+            release_support(static_cast<int>(b), system.velocity[solver_index_[b]]);
+            velocity_[b] = system.velocity[solver_index_[b]];
         }
-    std::vector<Vec6>& next = arrays_.blow.next = velocity_;
+    std::vector<Vec6>& next = arrays_.impact.next = velocity_;
     for (std::size_t b = 0; b < next.size(); ++b)
-        if (unknown_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], kick_[b]);
+        if (solver_index_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], dv_ext_[b]);
     changed_.assign(next.size(), 1);
     if (outrun(next)) find_open_again();
     const std::size_t known = points_.size();
-    const bool found = find_strikes(next, false) > 0;
+    const bool found = find_impacts(next, false) > 0;
     if (found) {
         if (!clock_.empty())
-            std::for_each(points_.begin() + known, points_.end(), [this](Point& p) { lead_point(p); });
-        take_back_strikes(known, next);
+            std::for_each(points_.begin() + known, points_.end(),
+                          [this](Point& p) { move_to_last_impact(p); });
+        move_impacts_to_start(known, next);
         counters_.contacts += points_.size() - known;
         order_points();
     }
     const bool successive = options_.impacts == ImpactOrder::successive;
     measure_points();
-    if (!successive) {  // who was hit already is not hit again
+    if (!successive) {  // what was hit already is not hit again
         impact_needed_ = false;
         for (const Point& point : points_)
-            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.strike >= 0.0 && is_blow(point));
+            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.toi >= 0.0 && is_impact(point));
         if (impact_rounds_ >= simultaneous_rounds) impact_needed_ = false;
     } else {
         for (const Point& point : points_)

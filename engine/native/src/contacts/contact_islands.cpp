@@ -15,7 +15,7 @@ constexpr std::size_t few_blocks = 48;  // blocks in all: not worth other thread
 
 }  // namespace
 
-/// Islands one after the other; on several threads each takes the next one that nobody has.
+/// Islands one after the other; on several threads each takes the next one that no thread has.
 void IslandSolver::solve_all(const Solve& solve) {
     const std::vector<Own*>& parts = open_parts_;
     std::size_t rows = 0;
@@ -28,11 +28,11 @@ void IslandSolver::solve_all(const Solve& solve) {
     std::atomic<bool> ended{false};
     std::vector<std::exception_ptr>& thrown = thrown_;
     thrown.assign(static_cast<std::size_t>(team->size()) + 1, nullptr);
-    const auto guarded = [&](std::size_t who, const auto& work) noexcept {
+    const auto guarded = [&](std::size_t worker, const auto& work) noexcept {
         try {
             work();
         } catch (...) {
-            if (!thrown[who]) thrown[who] = std::current_exception();
+            if (!thrown[worker]) thrown[worker] = std::current_exception();
             ended = true;
         }
     };
@@ -116,14 +116,14 @@ void IslandSolver::take_apart(MixedSystem& system, const Islands& islands,
 /// Gives a part its own list of the bodies beyond the first two of its rows.
 void IslandSolver::copy_rows(Own& own) const {
     std::size_t count = 0;
-    for (const RowBlock& block : own.system.rows) count += block.beyond.size();
-    own.beyond.resize(count);
-    auto at = own.beyond.begin();
+    for (const RowBlock& block : own.system.rows) count += block.further.size();
+    own.further.resize(count);
+    auto at = own.further.begin();
     for (RowBlock& block : own.system.rows) {
-        if (block.beyond.empty()) continue;
+        if (block.further.empty()) continue;
         const auto begin = at;
-        for (const Beyond& other : block.beyond) *at++ = {place_[other.body], other.jacobian};
-        block.beyond = {begin, at};
+        for (const FurtherBody& other : block.further) *at++ = {place_[other.body], other.jacobian};
+        block.further = {begin, at};
     }
 }
 
@@ -136,11 +136,11 @@ void IslandSolver::put_together(MixedSystem& system, const Islands& islands,
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         if (!open_[row_island_[k]]) continue;
         const int first = system.rows[k].first, second = system.rows[k].second;
-        const std::span<const Beyond> others = system.rows[k].beyond;
+        const std::span<const FurtherBody> others = system.rows[k].further;
         system.rows[k] = parts_[row_island_[k]]->system.rows[row_place_[k]];
         system.rows[k].first = first;
         system.rows[k].second = second;
-        system.rows[k].beyond = others;
+        system.rows[k].further = others;
     }
     next_.assign(islands.count, 0);
     for (FrictionPoint& point : points) {
@@ -166,7 +166,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         const FrictionReport& report = part->report;
         sum.rounds += report.rounds;
         sum.pivots += report.pivots;
-        sum.sweeps += report.sweeps;
+        sum.pgs_iterations += report.pgs_iterations;
         sum.residual = std::max(sum.residual, report.residual);
         sum.converged = sum.converged && report.converged;
         sum.finite = sum.finite && report.finite;
@@ -175,14 +175,14 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     return sum;
 }
 
-void IslandSolver::patience(PatienceOf& found) const {
+void IslandSolver::backoff(BackoffOf& found) const {
     found.clear();
-    for (const auto& [body, own] : own_) found.emplace_back(body, own.solver.patience);
+    for (const auto& [body, own] : own_) found.emplace_back(body, own.solver.backoff);
 }
 
-void IslandSolver::be_patient(const PatienceOf& patience) {
-    for (auto& [body, own] : own_) own.solver.patience = {};
-    for (const auto& [body, known] : patience) own_[body].solver.patience = known;
+void IslandSolver::set_backoff(const BackoffOf& backoff) {
+    for (auto& [body, own] : own_) own.solver.backoff = {};
+    for (const auto& [body, known] : backoff) own_[body].solver.backoff = known;
 }
 
 BlockLdlt::Counters IslandSolver::counters() const noexcept {

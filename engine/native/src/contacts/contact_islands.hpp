@@ -1,4 +1,4 @@
-// Bodies that hang together by rows are solved together, the others apart.
+// Bodies that are connected by rows are solved together, the others apart.
 #pragma once
 
 #include <exception>
@@ -23,9 +23,9 @@ public:
 
     double floor = 1e-12;
     int refinements = 1;
-    Team* team = nullptr;  // who else solves islands; `solve` must then be good for several at once
+    Team* team = nullptr;  // what else solves islands; `solve` must then be good for several at once
 
-    /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and sweeps and takes the
+    /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and iterations and takes the
     /// largest residual.
     /// Where `answered` says of all rows of an island that they are an answer already, it is left as it is.
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
@@ -34,9 +34,9 @@ public:
     BlockLdlt::Counters counters() const noexcept;
 
     /// Of every island, by its first body.
-    using PatienceOf = std::vector<std::pair<int, Patience>>;
-    void patience(PatienceOf& found) const;
-    void be_patient(const PatienceOf& patience);
+    using BackoffOf = std::vector<std::pair<int, RetryBackoff>>;
+    void backoff(BackoffOf& found) const;
+    void set_backoff(const BackoffOf& backoff);
 
 private:
     /// What an island has from solve to solve: its solver, its part of the system, and what became of it.
@@ -44,7 +44,7 @@ private:
         DirectSolver solver;
         MixedSystem system;
         std::vector<FrictionPoint> points;
-        std::vector<Beyond> beyond;  // of its rows, with the places of their bodies
+        std::vector<FurtherBody> further;  // of its rows, with the places of their bodies
         FrictionReport report;
     };
     Own& own_of(int first_body);

@@ -18,7 +18,7 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
         solve_six(factor_six(system.mass[body]), x);
         own += dot(jacobian, x);
     }
-    for (const auto& [body, jacobian] : block.beyond) {
+    for (const auto& [body, jacobian] : block.further) {
         Vec6 x = jacobian;
         solve_six(factor_six(system.mass[body]), x);
         own += dot(jacobian, x);
@@ -39,7 +39,7 @@ double nearly_own(const MixedSystem& system, const RowBlock& block, int i) {
         const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
         for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
     }
-    for (const auto& [body, jacobian] : block.beyond)
+    for (const auto& [body, jacobian] : block.further)
         for (int a = 0; a < 6; ++a) own += jacobian[a] * jacobian[a] / system.mass[body][7 * a];
     return own;
 }
@@ -110,7 +110,7 @@ void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPo
     residual_ = unsettled_by_ = 0.0;
     sunk_ = false;
     unsettled_body_ = -1;
-    if (!report.finite || report.rounds + report.sweeps == 0) return;
+    if (!report.finite || report.rounds + report.pgs_iterations == 0) return;
     const RowsResidual worst = rows_residual(system, points, options_.friction);
     residual_ = worst.residual;
     if (report.converged && options_.solver == SolverKind::direct) return;
@@ -119,9 +119,9 @@ void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPo
     if (unsettled_body_ < 0 && !report.converged) blame_sunk();
 }
 
-/// The same of a blow whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
-void ContactStage::judge_blow(const MixedSystem& hit, const std::vector<FrictionPoint>& points,
-                              FrictionModel model) {
+/// The same of an impact whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
+void ContactStage::judge_impact(const MixedSystem& hit, const std::vector<FrictionPoint>& points,
+                                FrictionModel model) {
     const RowsResidual worst = rows_residual(hit, points, model);
     if (!(worst.residual > residual_)) return;
     residual_ = worst.residual;
@@ -129,37 +129,39 @@ void ContactStage::judge_blow(const MixedSystem& hit, const std::vector<Friction
     blame(worst.residual, std::max(block.first, block.second));
 }
 
-/// Sweeps that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
-/// load is not carried. What parting could not lift again shows it.
+/// Iterations that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
+/// load is not borne. What the projection could not lift again shows it.
 void ContactStage::blame_sunk() {
     double worst = sunk;
     for (const Point& point : points_) {
-        if (point.strike >= 0.0 || point.before < 0.0) continue;
-        const auto given = given_.find(point.contact.key >> feature_bits);
-        const double known = explained_depth(point) + (given == given_.end() ? 0.0 : given->second);
+        if (point.toi >= 0.0 || point.before < 0.0) continue;
+        const auto given = initial_penetration_.find(point.contact.key >> feature_bits);
+        const double known =
+            elastic_depth(point) + (given == initial_penetration_.end() ? 0.0 : given->second);
         const double share = (-point.contact.point.gap - known) / moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;
         unsettled_by_ = residual_;
         sunk_ = true;
-        unsettled_body_ = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+        unsettled_body_ =
+            solver_index_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
     }
 }
 
-/// Takes down who is off by more than the method allows.
-void ContactStage::blame(double residual, int unknown) {
+/// Takes down which row is off by more than the method allows.
+void ContactStage::blame(double residual, int index) {
     double speed = 0.0;
     for (const Vec6& v : velocity_) speed = std::max(speed, norm(linear(v)));
     // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
     if (!(residual > options_.unsettled_residual + 1e-6 * speed)) return;
     unsettled_by_ = residual;
-    unsettled_body_ =
-        static_cast<int>(std::find(unknown_.begin(), unknown_.end(), unknown) - unknown_.begin());
+    unsettled_body_ = static_cast<int>(std::find(solver_index_.begin(), solver_index_.end(), index) -
+                                       solver_index_.begin());
 }
 
 /// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise
 /// the energy; all of it in islands that joints hold or something drives. Shortens the velocities alike. Islands are of the
-/// points in `pushes`, as parting's are: what merely lies near pays for nobody's gain.
+/// points in `pushes`, as the projection's are: what merely lies near pays for no gain.
 void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
                                      std::vector<double>& share) const {
     const std::size_t bodies = system.mass.size();
@@ -168,7 +170,8 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     for (std::size_t k = 0; k < joints; ++k) arrays_.shortened.tie(system.rows[k]);
     for (std::size_t k = 0; k < points_.size(); ++k)
         if (pushes[k])
-            arrays_.shortened.tie(unknown_[points_[k].contact.first], unknown_[points_[k].contact.second]);
+            arrays_.shortened.tie(solver_index_[points_[k].contact.first],
+                                  solver_index_[points_[k].contact.second]);
     const Islands& islands = arrays_.shortened.find();
     std::vector<EnergySums>& sums = arrays_.sums;
     sums.assign(islands.count, {});
@@ -178,8 +181,8 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
-        if (pushes[k] && (is_supplied(point.contact) || material(point.contact).compliance > 0.0))
-            driven(unknown_[point.contact.first], unknown_[point.contact.second]);
+        if (pushes[k] && (is_externally_driven(point.contact) || material(point.contact).compliance > 0.0))
+            driven(solver_index_[point.contact.first], solver_index_[point.contact.second]);
     }
     std::vector<Vec6>& free = arrays_.free_velocity;
     free = system.momentum;
@@ -187,8 +190,8 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
         for (std::size_t u = begin; u < end; ++u)
             if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
     });
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        const int u = unknown_[b];
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        const int u = solver_index_[b];
         if (u < 0 || islands.of_body[u] < 0) continue;
         const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
                    kick = sum(free[u], velocity_[b], -1.0);

@@ -1,4 +1,4 @@
-// The points of a step, once they are found: which of them act at the time of their strike, in which order they are
+// The points of a step, once they are found: which of them act at the time of their impact, in which order they are
 // solved, and how fast they close.
 #include <algorithm>
 #include <cmath>
@@ -11,23 +11,23 @@ namespace spook {
 
 namespace {
 
-constexpr std::size_t event_bodies = 8;  // a larger island is not led to the time of one strike in it
+constexpr std::size_t event_bodies = 8;  // a larger island is not moved to the time of one impact in it
 
 }  // namespace
 
-/// Islands of balls whose only strike is one pair, and in which nothing else is approached, are led to the strike's
+/// Islands of balls whose only impact is one pair, and in which nothing else is approached, are moved to the impact's
 /// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
-/// that goes with it changes the energy. Who is carried and moves along the forces would win energy by it, unless what
-/// is moved carries it, or the strike is of something that stands still and pushes against the forces.
+/// that goes with it changes the energy. A supported body that moves along the forces would gain energy by it, unless what
+/// is moved supports it, or the impact is with something that stands still and pushes against the forces.
 void ContactStage::find_events() {
-    root_.resize(unknown_.size());
+    root_.resize(solver_index_.size());
     std::iota(root_.begin(), root_.end(), 0);
     auto root = [this](int b) {
         while (root_[b] != b) b = root_[b] = root_[root_[b]];
         return b;
     };
     auto join = [&](int a, int b) {
-        if (unknown_[a] < 0 || unknown_[b] < 0) return;
+        if (solver_index_[a] < 0 || solver_index_[b] < 0) return;
         a = root(a), b = root(b);
         root_[std::max(a, b)] = std::min(a, b);
     };
@@ -35,46 +35,47 @@ void ContactStage::find_events() {
     for (const auto& [a, b] : joints_)
         if (a >= 0 && b >= 0) join(a, b);
 
-    auto& [members, struck, plain, bouncy, when, speed, climbing, may_climb] = arrays_.events;
-    members.assign(unknown_.size(), 0);
-    struck.assign(unknown_.size(), 0);
-    plain.assign(unknown_.size(), 1), bouncy.assign(unknown_.size(), 0);
-    climbing.assign(unknown_.size(), 0), may_climb.assign(unknown_.size(), 0);
-    when.assign(unknown_.size(), -1.0);
-    for (std::size_t b = 0; b < unknown_.size(); ++b)
-        if (unknown_[b] >= 0) {
+    auto& [members, impact_pair, plain, bouncy, when, speed, moving_along, may_move_along] = arrays_.events;
+    members.assign(solver_index_.size(), 0);
+    impact_pair.assign(solver_index_.size(), 0);
+    plain.assign(solver_index_.size(), 1), bouncy.assign(solver_index_.size(), 0);
+    moving_along.assign(solver_index_.size(), 0), may_move_along.assign(solver_index_.size(), 0);
+    when.assign(solver_index_.size(), -1.0);
+    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+        if (solver_index_[b] >= 0) {
             const int island = root(static_cast<int>(b));
             ++members[island];
             plain[island] = plain[island] && ball_[b];
-            climbing[island] += climbs(static_cast<int>(b));
+            moving_along[island] += moves_along_forces(static_cast<int>(b));
         }
     for (const Point& point : points_) {
         const Contact& contact = point.contact;
-        const int island = root(unknown_[contact.first] >= 0 ? contact.first : contact.second);
-        if (is_supplied(contact)) may_climb[island] = event_bodies;
-        else if (lifts(point)) may_climb[island] = std::max<std::size_t>(may_climb[island], 1);
-        if (point.strike < 0.0) {
+        const int island = root(solver_index_[contact.first] >= 0 ? contact.first : contact.second);
+        if (is_externally_driven(contact)) may_move_along[island] = event_bodies;
+        else if (pushes_against_forces(point))
+            may_move_along[island] = std::max<std::size_t>(may_move_along[island], 1);
+        if (point.toi < 0.0) {
             const double approach = -relative(point, contact.point.normal, predicted_, false);
             if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
                 plain[island] = 0;
             continue;
         }
         const std::uint64_t pair = (contact.key >> feature_bits) + 1;
-        if (struck[island] != 0 && struck[island] != pair) plain[island] = 0;
-        struck[island] = pair;
-        when[island] = point.strike;
+        if (impact_pair[island] != 0 && impact_pair[island] != pair) plain[island] = 0;
+        impact_pair[island] = pair;
+        when[island] = point.toi;
         bouncy[island] = bouncy[island] || material(point.contact).restitution > 0.0;
     }
-    // A plastic strike among bodies that may meet others after it acts at the start of the step, as the rows of those
-    // others will: bodies led to an event's time would not be where such rows expect them. Nor are successive blows among
-    // such bodies led here: another may come first.
+    // A plastic impact among bodies that may meet others after it acts at the start of the step, as the rows of those
+    // others will: bodies moved to an event's time would not be where such rows expect them. Nor are successive impacts among
+    // such bodies moved here: another may come first.
     const bool successive = options_.impacts == ImpactOrder::successive;
-    speed.assign(unknown_.size(), 0.0);
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        double& fastest = speed[unknown_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
+    speed.assign(solver_index_.size(), 0.0);
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        double& fastest = speed[solver_index_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
         fastest = std::max(fastest, norm(linear(predicted_[b])));
     }
-    const auto island = [&](int b) { return unknown_[b] >= 0 ? root(b) : b; };
+    const auto island = [&](int b) { return solver_index_[b] >= 0 ? root(b) : b; };
     for (const OpenPair& open : open_) {
         if (open.has_met()) continue;
         const int a = island(open.first), b = island(open.second);
@@ -82,19 +83,19 @@ void ContactStage::find_events() {
         plain[a] = plain[a] && bouncy[a] && !successive;
         plain[b] = plain[b] && bouncy[b] && !successive;
     }
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        if (unknown_[b] < 0) continue;
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        if (solver_index_[b] < 0) continue;
         const int island = root(static_cast<int>(b));
-        if (struck[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
-        if (climbing[island] > may_climb[island]) continue;
+        if (impact_pair[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
+        if (moving_along[island] > may_move_along[island]) continue;
         event_time_[b] = when[island];
-        if (!supported_[b] && !jointed_[b]) lead_[b] = when[island] / options_.time_step;
-        velocity_[b] = sum(velocity_[b], kick_[b], lead_[b]);
-        for (double& k : kick_[b]) k *= 1.0 - lead_[b];
+        if (!supported_[b] && !jointed_[b]) toi_fraction_[b] = when[island] / options_.time_step;
+        velocity_[b] = sum(velocity_[b], dv_ext_[b], toi_fraction_[b]);
+        for (double& k : dv_ext_[b]) k *= 1.0 - toi_fraction_[b];
     }
     for (Point& point : points_) {
-        if (point.strike < 0.0) continue;
-        const int body = unknown_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+        if (point.toi < 0.0) continue;
+        const int body = solver_index_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
         point.event = event_time_[body] >= 0.0;
         if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
     }
@@ -102,16 +103,16 @@ void ContactStage::find_events() {
 
 /// Sorts the points by key and finds each one's predecessor in the step before.
 void ContactStage::order_points() {
-    order_by_key(points_, strikes_, places_);
+    order_by_key(points_, toi_points_, places_);
     std::size_t old = 0;
     for (Point& point : points_) {
-        while (old < touches_.size() && touches_[old].contact.key < point.contact.key) ++old;
-        if (old == touches_.size() || touches_[old].contact.key != point.contact.key) continue;
-        point.before = touches_[old].normal;
-        point.pressed_before = touches_[old].pressed;
+        while (old < cache_.size() && cache_[old].contact.key < point.contact.key) ++old;
+        if (old == cache_.size() || cache_[old].contact.key != point.contact.key) continue;
+        point.before = cache_[old].normal;
+        point.compression_before = cache_[old].compression;
         if (point.solved) continue;
-        std::copy_n(touches_[old].tangent, 2, point.tangents);
-        if (resists_turning_) std::copy_n(touches_[old].turning, 3, own_rest(point).turning);
+        std::copy_n(cache_[old].tangent, 2, point.tangents);
+        if (resists_turning_) std::copy_n(cache_[old].turning, 3, own_extras(point).turning);
     }
     ordered_ = points_.size();
 }
@@ -119,7 +120,7 @@ void ContactStage::order_points() {
 /// Approach and push, from the current velocities.
 void ContactStage::measure(Point& point) const {
     point.approach = relative(point, point.contact.point.normal, velocity_, false);
-    point.push = relative(point, point.contact.point.normal, kick_, false);
+    point.dv_ext = relative(point, point.contact.point.normal, dv_ext_, false);
 }
 
 /// Approach, push and part in the impact of every point, from the current velocities.
@@ -134,17 +135,18 @@ void ContactStage::measure_points() {
         point.bounce = -1.0;
         if (is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
-        } else if (plastic_first_ && point.impact > 0.0) {  // a blow of this step has brought them together
+        } else if (plastic_first_ &&
+                   point.impact > 0.0) {  // an impact of this step has brought them together
             point.bounce = 0.0;
-        } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.push) < 0.0) {
-            const double ahead = 2.0 * (-point.push / h) * gap / (speed * speed);
+        } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.dv_ext) < 0.0) {
+            const double ahead = 2.0 * (-point.dv_ext / h) * gap / (speed * speed);
             const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
             else if (plastic_first_) point.bounce = 0.0;
         }
-        const double kick = norm(linear(kick_[contact.first])) + norm(linear(kick_[contact.second]));
+        const double kick = norm(linear(dv_ext_[contact.first])) + norm(linear(dv_ext_[contact.second]));
         point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
-        impact_needed_ = impact_needed_ || is_blow(point);
+        impact_needed_ = impact_needed_ || is_impact(point);
     }
 }
 

@@ -15,11 +15,11 @@ constexpr double slack_share = 1e-10;       // of the smaller body's radius
 constexpr double rounding = 1e-15;          // of a place and of a size: four roundings
 constexpr int late_rounds = 64;  // of solves that set others in motion towards a third: each finds pairs anew
 
-FrictionReport sweep(const ContactOptions& o, FrictionModel model, MixedSystem& island,
-                     std::vector<FrictionPoint>& points, DirectSolver& solver) {
+FrictionReport iterate(const ContactOptions& o, FrictionModel model, MixedSystem& island,
+                       std::vector<FrictionPoint>& points, DirectSolver& solver) {
     return o.solver == SolverKind::iterative
                ? solve_iterative(island, points, model, o.iterations, o.residual_tolerance)
-               : solve_hybrid(island, points, model, solver.pivot, solver.patience, o.iterations,
+               : solve_hybrid(island, points, model, solver.pivot, solver.backoff, o.iterations,
                               o.residual_tolerance);
 }
 
@@ -39,14 +39,14 @@ bool is_finite(const MixedSystem& system) {
     return true;
 }
 
-/// Sweeps; where they stop with few rows off by more than `enough`, as in the rough blow of an end whose pushing and
+/// PGS; where it stops with few rows off by more than `enough`, as in the rough impact of an end whose pushing and
 /// rubbing turn it alike, more of them go in circles, and a direct solve costs little.
-FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, double enough,
-                              MixedSystem& island, std::vector<FrictionPoint>& points, DirectSolver& solver) {
+FrictionReport pgs_or_direct(const ContactOptions& o, FrictionModel model, double enough, MixedSystem& island,
+                             std::vector<FrictionPoint>& points, DirectSolver& solver) {
     static thread_local MixedSystem start;  // their memory outlives a solve
     static thread_local std::vector<FrictionPoint> fresh;
     start = island, fresh = points;
-    FrictionReport report = sweep(o, model, island, points, solver);
+    FrictionReport report = iterate(o, model, island, points, solver);
     if (!report.finite || report.converged) return report;
     const double left = rows_residual(island, points, model).residual;
     if (!(left > enough)) return report;
@@ -58,7 +58,8 @@ FrictionReport sweep_or_solve(const ContactOptions& o, FrictionModel model, doub
                 island.rows[point.block].softness[i] = point.slip_softness;
         report.converged = direct.converged;
     }
-    report.rounds += direct.rounds, report.pivots += direct.pivots, report.sweeps += direct.sweeps;
+    report.rounds += direct.rounds, report.pivots += direct.pivots,
+        report.pgs_iterations += direct.pgs_iterations;
     return report;
 }
 
@@ -69,37 +70,37 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
                            std::vector<IndexPair> joints, std::vector<char> yielding)
     : detection_(std::move(detection)),
       materials_(materials),
-      unknown_(std::move(unknown)),
+      solver_index_(std::move(unknown)),
       options_(options),
       joints_(std::move(joints)),
       yielding_(std::move(yielding)) {
     if (options.threads > 1) team_ = std::make_shared<Team>(options.threads);
-    for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &parting_solver_}) {
+    for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &projection_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
         solver->team = team_.get();
     }
     detection_.help(team_.get());
-    sweeps_.help(team_.get());
-    parting_sweeps_.help(team_.get());
+    pgs_.help(team_.get());
+    projection_pgs_.help(team_.get());
     for (const SurfaceMaterial& material : materials_.distinct()) {
         conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
         oriented_ = oriented_ || material.is_oriented();
         resists_turning_ = resists_turning_ || material.resists_turning();
     }
-    const std::size_t bodies = unknown_.size();
+    const std::size_t bodies = solver_index_.size();
     for (std::size_t b = 0; b < bodies; ++b) {
-        if (unknown_[b] < 0) continue;
-        body_of_.resize(std::max(body_of_.size(), static_cast<std::size_t>(unknown_[b]) + 1));
-        body_of_[unknown_[b]] = static_cast<int>(b);
+        if (solver_index_[b] < 0) continue;
+        body_of_.resize(std::max(body_of_.size(), static_cast<std::size_t>(solver_index_[b]) + 1));
+        body_of_[solver_index_[b]] = static_cast<int>(b);
     }
     margin_.assign(bodies, 0.0);
     prescribed_.assign(bodies, Vec6{});
     jointed_.assign(bodies, 0);
     supported_.assign(bodies, 0);
     depth_.assign(bodies, 0.0);
-    sinking_.assign(bodies, 0.0);
-    lead_.assign(bodies, 0.0);
+    predicted_sinking_.assign(bodies, 0.0);
+    toi_fraction_.assign(bodies, 0.0);
     event_time_.assign(bodies, -1.0);
     ball_ = detection_.balls();
     swings_ = !detection_.single_points();
@@ -113,15 +114,15 @@ double ContactStage::relative(const Point& point, Vec3 direction, const std::vec
                               bool only_prescribed) const {
     const Contact& contact = point.contact;
     double total = 0.0;
-    if (!only_prescribed || unknown_[contact.first] < 0)
+    if (!only_prescribed || solver_index_[contact.first] < 0)
         total += dot(contact_row(direction, point.first_arm), velocity[contact.first]);
-    if (!only_prescribed || unknown_[contact.second] < 0)
+    if (!only_prescribed || solver_index_[contact.second] < 0)
         total -= dot(contact_row(direction, point.second_arm), velocity[contact.second]);
     return total;
 }
 
 /// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
-double ContactStage::carried(const Point& point, Vec3 direction) const noexcept {
+double ContactStage::surface_speed(const Point& point, Vec3 direction) const noexcept {
     if (!conveys_) return 0.0;
     const int a = point.contact.first, b = point.contact.second;
     return dot(direction, poses_[a].rotation * materials_[a].surface_velocity -
@@ -132,17 +133,17 @@ double ContactStage::carried(const Point& point, Vec3 direction) const noexcept 
 RowBlock ContactStage::row_block(const Point& point, int rows) const {
     const Contact& contact = point.contact;
     RowBlock block;
-    block.first = unknown_[contact.first];
-    block.second = unknown_[contact.second];
+    block.first = solver_index_[contact.first];
+    block.second = solver_index_[contact.second];
     block.size = std::min(rows, 3);
-    const double* const stretch = rest(point).stretch;
-    const Vec3 directions[3] = {contact.point.normal, stretch[0] * point.tangent,
-                                stretch[1] * cross(contact.point.normal, point.tangent)};
+    const double* const axis_scale = extras(point).axis_scale;
+    const Vec3 directions[3] = {contact.point.normal, axis_scale[0] * point.tangent,
+                                axis_scale[1] * cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
         block.right[i] = -relative(point, directions[i], prescribed_, true);
-        if (i > 0) block.right[i] -= carried(point, directions[i]);
+        if (i > 0) block.right[i] -= surface_speed(point, directions[i]);
     }
     block.lower[0] = 0.0;
     if (rows == 6) add_turning_rows(point, block);
@@ -172,11 +173,11 @@ void ContactStage::add_friction(const Point& point, int block, std::vector<Frict
     const PairMaterial material = this->material(point.contact);
     const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
     double normal = point.before;
-    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? rest(point).guessed : normal;
+    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? extras(point).guessed : normal;
     else if (point.solved) normal = point.normal;
     if (point.friction > 0.0) {
         friction.push_back({block, point.friction, soft, normal});
-        friction.back().stretched = rest(point).is_stretched();
+        friction.back().anisotropic = extras(point).is_anisotropic();
     }
     if (material.rolling > 0.0) friction.push_back({block, material.rolling / scale, 0.0, normal, 3, 2});
     if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
@@ -189,23 +190,23 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
     if (o.solver == SolverKind::direct && system.velocity.size() == system.mass.size() &&
         still_right(system, points, model))
         return {};
-    // What a resting solve leaves, the next step sees; what a blow leaves stays.
+    // What a resting solve leaves, the next step sees; what an impact leaves stays.
     const bool exact = &islands == &impact_solver_ || by_rows_;
     const double enough = exact ? o.residual_tolerance : o.unsettled_residual;
-    const bool foreseen = foreseen_ && &islands == &resting_solver_;
+    const bool warm_started = warm_started_ && &islands == &resting_solver_;
     const bool direct = o.solver == SolverKind::direct;
     const std::size_t most = direct ? system.rows.size() : ran_away_ ? not_too_large : 0;
-    const auto solve = [&o, model, enough, foreseen, most](
+    const auto solve = [&o, model, enough, warm_started, most](
                            MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
-        solver.foreseen = foreseen;
+        solver.warm_started = warm_started;
         if (island.rows.size() <= most) return solve_friction_direct(island, own, model, solver);
-        if (island.rows.size() > few_rows) return sweep(o, model, island, own, solver);
-        return sweep_or_solve(o, model, enough, island, own, solver);
+        if (island.rows.size() > few_rows) return iterate(o, model, island, own, solver);
+        return pgs_or_direct(o, model, enough, island, own, solver);
     };
     const FrictionReport report = islands.run(system, points, std::cref(solve), answered);
     counters_.friction_rounds += report.rounds;
     counters_.pivots += report.pivots;
-    counters_.sweeps += report.sweeps;
+    counters_.pgs_iterations += report.pgs_iterations;
     counters_.unsettled += !report.converged;
     return report;
 }
@@ -213,19 +214,19 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
 /// What is left of the step after a point's event, s.
 double ContactStage::time_left(const Point& point) const noexcept {
     const double h = options_.time_step;
-    return point.event ? std::max(h - point.strike, 1e-3 * h) : h;
+    return point.event ? std::max(h - point.toi, 1e-3 * h) : h;
 }
 
-double ContactStage::explained_depth(const Point& point) const noexcept {
-    return point.pressed_before + slack(point.contact);
+double ContactStage::elastic_depth(const Point& point) const noexcept {
+    return point.compression_before + slack(point.contact);
 }
 
 /// The radius of the smaller of two bodies, of those that move by themselves, m.
 double ContactStage::moving_size(const Contact& contact) const noexcept {
     const std::vector<double>& radius = detection_.radius();
     const int a = contact.first, b = contact.second;
-    if (unknown_[a] < 0) return radius[b];
-    return unknown_[b] < 0 ? radius[a] : std::min(radius[a], radius[b]);
+    if (solver_index_[a] < 0) return radius[b];
+    return solver_index_[b] < 0 ? radius[a] : std::min(radius[a], radius[b]);
 }
 
 /// A depth that is rounding: it may come back as a speed, which gives a billionth of a body's height at most.
@@ -250,7 +251,7 @@ double ContactStage::resting_right(Point& point) const {
     if (!touching) return -gap / h;
     const PairMaterial material = this->material(point.contact);
     const Regularisation row = regularise(material.compliance, material.damping, h);
-    const double depth = -row.violation_gain * std::max(gap, -explained_depth(point));
+    const double depth = -row.violation_gain * std::max(gap, -elastic_depth(point));
     // A rigid contact that opens is not pushed after its own speed.
     return material.compliance > 0.0 ? depth + row.upsilon * point.resting_approach() : depth;
 }
@@ -259,9 +260,9 @@ double ContactStage::resting_right(Point& point) const {
 bool ContactStage::is_pressed(const Point& point) const noexcept {
     const double h = options_.time_step, gap = point.contact.point.gap;
     if (point.solved) return point.normal > 0.0;
-    return point.before > 0.0 || point.strike >= 0.0 ||
+    return point.before > 0.0 || point.toi >= 0.0 ||
            (point.before < 0.0 &&
-            (is_closed(point.contact) || gap + h * (point.resting_approach() + point.push) < 0.0));
+            (is_closed(point.contact) || gap + h * (point.resting_approach() + point.dv_ext) < 0.0));
 }
 
 /// The resting row of a point; the tangents' bounds are left to the friction law.
@@ -276,23 +277,23 @@ RowBlock ContactStage::resting_row(Point& point) const {
     block.softness[0] = regularise(material.compliance, material.damping, h).softness;
     block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
     block.multiplier[0] = point.solved ? point.normal : std::max(0.0, point.before);
-    const PointRest& rest = this->rest(point);
+    const ContactExtras& extras = this->extras(point);
     if (point.friction > 0.0) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
-        for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangents[i - 1] / rest.stretch[i - 1];
+        for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangents[i - 1] / extras.axis_scale[i - 1];
     }
-    for (int i = 3; i < block.size; ++i) block.multiplier[i] = rest.turning[i - 3];
+    for (int i = 3; i < block.size; ++i) block.multiplier[i] = extras.turning[i - 3];
     return block;
 }
 
 bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
-    foreseen_ = ends_passed_ = ran_away_ = false;
+    warm_started_ = ends_passed_ = ran_away_ = false;
     if (options_.solver == SolverKind::iterative && !resists_turning_) {
-        bool left = false;
-        const bool finite = solve_by_sweeps(system, left);
-        if (!left) return finite;
+        bool unfinished = false;
+        const bool finite = solve_by_pgs(system, unfinished);
+        if (!unfinished) return finite;
     }
     std::vector<FrictionPoint>& friction = arrays_.friction;
     std::vector<Vec6>& next = next_;
@@ -310,39 +311,39 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         }
         if (round == 0) {  // at rest, the velocities before are those after
             system.velocity.resize(system.mass.size());
-            for (std::size_t b = 0; b < unknown_.size(); ++b)
-                if (unknown_[b] >= 0) system.velocity[unknown_[b]] = velocity_[b];
+            for (std::size_t b = 0; b < solver_index_.size(); ++b)
+                if (solver_index_[b] >= 0) system.velocity[solver_index_[b]] = velocity_[b];
         }
         const FrictionReport before = report;
         const bool late = round > 0 && options_.solver == SolverKind::direct;
         report = run(system, friction, resting_solver_, options_.friction, late ? &answered : nullptr);
-        report.rounds += before.rounds, report.sweeps += before.sweeps;
+        report.rounds += before.rounds, report.pgs_iterations += before.pgs_iterations;
         report.converged = report.converged && before.converged;  // islands may have been left as they were
         if (options_.friction == FrictionModel::box)
             for (const FrictionPoint& point : friction)
-                own_rest(points_[point.block - joints]).guessed = point.normal;
+                own_extras(points_[point.block - joints]).guessed = point.normal;
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();
         changed_.assign(next.size(), 1);
         if (outrun(next)) find_open_again();
         find_turned(next);
-        const std::size_t taken = points_.size();
-        late_blow_ = false;
-        if (find_strikes(next, true) > 0) take_back_strikes(taken, next);
-        if (blows_come_first() || stop_comes_first(system, known, next)) return true;
-        if (late_blow_) find_left_out(next);
+        const std::size_t dissipated_energy = points_.size();
+        late_impact_ = false;
+        if (find_impacts(next, true) > 0) move_impacts_to_start(dissipated_energy, next);
+        if (needs_plastic_impact() || needs_stop_impact(system, known, next)) return true;
+        if (late_impact_) find_deferred_impacts(next);
         if (points_.size() == known) {
             if (pass_other_ends(system, joints)) return true;
             break;
         }
         counters_.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
-            read_back(system.rows[joints + k], points_[k]);
-        if (joints == 0 && options_.solver == SolverKind::direct) foresee(system, known, round);
+            store_solution(system.rows[joints + k], points_[k]);
+        if (joints == 0 && options_.solver == SolverKind::direct) warm_start_by_pgs(system, known, round);
         order_points();
     }
-    mark_held(system);  // the last round may have brought rows to bodies that had none
+    mark_rows(system);  // the last round may have brought rows to bodies that had none
     judge(system, friction, report);
     if (!report.converged) {
         std::vector<double>& share = arrays_.share;
@@ -359,19 +360,19 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
                 z *= share[std::max(system.rows[k].first, system.rows[k].second)];
     }
 
-    touches_.clear();
+    cache_.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         Point& point = points_[k];
-        const Vec3 along = read_back(system.rows[joints + k], point);
-        Touch& touch = record(system, point, point.normal, along);
-        std::copy_n(rest(point).turning, 3, touch.turning);
+        const Vec3 along = store_solution(system.rows[joints + k], point);
+        CachedContact& cached = cache_contact(system, point, point.normal, along);
+        std::copy_n(extras(point).turning, 3, cached.turning);
     }
     if (report.finite) correct_events(system);
     return report.finite;
 }
 
 /// What a solve found for a point, along world tangents: it may have turned its own. Gives the impulse along the surface.
-Vec3 ContactStage::read_back(const RowBlock& block, Point& point) {
+Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
     Vec3 along, turning;
     for (int i = 1; i < block.size; ++i) {
         const Vec6& row = block.first >= 0 ? block.first_jacobian[i] : block.second_jacobian[i];
@@ -386,7 +387,7 @@ Vec3 ContactStage::read_back(const RowBlock& block, Point& point) {
     point.tangents[0] = dot(along, t);
     point.tangents[1] = dot(along, cross(n, t));
     if (block.size > 3) {
-        double* const own = own_rest(point).turning;
+        double* const own = own_extras(point).turning;
         own[0] = scale * dot(turning, t);
         own[1] = scale * dot(turning, cross(n, t));
         own[2] = scale * dot(turning, n);
@@ -395,38 +396,38 @@ Vec3 ContactStage::read_back(const RowBlock& block, Point& point) {
 }
 
 /// Takes down what a point did: its normal impulse, and that along the surface.
-ContactStage::Touch& ContactStage::record(const MixedSystem& system, const Point& point, double normal,
-                                          Vec3 along) {
-    Touch& touch = touches_.emplace_back();
+ContactStage::CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Point& point,
+                                                         double normal, Vec3 along) {
+    CachedContact& cached = cache_.emplace_back();
     const Vec3 n = point.contact.point.normal;
-    touch.contact = point.contact;
-    touch.normal = normal;
-    touch.pressed = pressed(system, point);
-    touch.impact = point.impact;
-    touch.impulse = normal * n + along + rest(point).impact_impulse;
-    touch.tangent[0] = dot(along, point.tangent);
-    touch.tangent[1] = dot(along, cross(n, point.tangent));
-    touch.friction = rest(point).stretch[0] * point.friction;
-    touch.active = touch.normal > 0.0 || touch.impact > 0.0 || is_closed(point.contact);
-    return touch;
+    cached.contact = point.contact;
+    cached.normal = normal;
+    cached.compression = compression(system, point);
+    cached.impact = point.impact;
+    cached.impulse = normal * n + along + extras(point).impact_impulse;
+    cached.tangent[0] = dot(along, point.tangent);
+    cached.tangent[1] = dot(along, cross(n, point.tangent));
+    cached.friction = extras(point).axis_scale[0] * point.friction;
+    cached.active = cached.normal > 0.0 || cached.impact > 0.0 || is_closed(point.contact);
+    return cached;
 }
 
-void ContactStage::mark_held(const MixedSystem& system) {
-    held_.assign(system.mass.size(), 0);
+void ContactStage::mark_rows(const MixedSystem& system) {
+    has_rows_.assign(system.mass.size(), 0);
     for (const RowBlock& block : system.rows) {
         for (const int body : {block.first, block.second})
-            if (body >= 0) held_[body] = 1;
-        for (const Beyond& other : block.beyond) held_[other.body] = 1;
+            if (body >= 0) has_rows_[body] = 1;
+        for (const FurtherBody& other : block.further) has_rows_[other.body] = 1;
     }
 }
 
 /// Velocities of all bodies after a solve; those without rows fly freely.
 void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
-    mark_held(system);
-    next.resize(unknown_.size());
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        const int u = unknown_[b];
-        next[b] = u >= 0 && held_[u] ? system.velocity[u] : sum(velocity_[b], kick_[b]);
+    mark_rows(system);
+    next.resize(solver_index_.size());
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        const int u = solver_index_[b];
+        next[b] = u >= 0 && has_rows_[u] ? system.velocity[u] : sum(velocity_[b], dv_ext_[b]);
     }
 }
 
@@ -448,18 +449,18 @@ bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
 
 /// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere.
 void ContactStage::correct_events(const MixedSystem& system) {
-    for (std::size_t b = 0; b < unknown_.size(); ++b) {
-        const int u = unknown_[b];
-        if (u < 0 || event_time_[b] < 0.0 || !held_[u]) continue;
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        const int u = solver_index_[b];
+        if (u < 0 || event_time_[b] < 0.0 || !has_rows_[u]) continue;
         if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
         // What a joint holds turns as it goes, or the joint would answer the difference with a speed.
         for (int i = 0; i < (jointed_[b] ? 6 : 3); ++i)
             correction_[u][i] +=
                 event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
-        const Vec3 more = whole_fall(static_cast<int>(b), linear(system.velocity[u]));
+        const Vec3 more = free_fall_correction(static_cast<int>(b), linear(system.velocity[u]));
         for (int i = 0; i < 3; ++i) correction_[u][i] += more[i];
     }
-    book_carried(system);
+    apply_support_impulses(system);
 }
 
 }  // namespace spook

@@ -1,4 +1,4 @@
-// Contacts in a step of rigid bodies: detection, impact, resting, and the parting of overlapping bodies.
+// Contacts in a step of rigid bodies: detection, impact, resting, and the position projection of overlapping bodies.
 //
 // A step with contacts (v and q are those at its start; positions are frozen until its end):
 //   1. detect      points that are closed, and pairs that will touch within this step: where, and when;
@@ -10,34 +10,34 @@
 //                    −g/h                     for an open one: it may close, no more;
 //                  then pairs that touch only because of these impulses, or of what joints alone make of forces, are
 //                  looked for, and all is solved again
-//                  (the iterative solver looks between its sweeps, and gives them rows in the same solve). If one of
-//                  these is to rebound, 2 comes again, with the plastic blows that set it in motion, then 3;
-//   4. parting     where the step ends, a displacement that parts overlapping bodies and leaves no trace in v.
+//                  (the iterative solver looks between its iterations, and gives them rows in the same solve). If one of
+//                  these is to rebound, 2 comes again, with the plastic impacts that set it in motion, then 3;
+//   4. projection  where the step ends, a displacement that removes overlaps and leaves no trace in v.
 //
-// What does not touch is not touched: a pair of open shapes gets rows only if a sweep of both along their motion
-// finds that they meet (`collision/sweep.hpp`). Bodies that contacts carry (`contacts/contact_carried.cpp`) are swept
+// What does not touch is not touched: a pair of open shapes gets rows only if a cast of both along their motion
+// finds that they meet (`collision/shape_cast.hpp`). Bodies that contacts carry (`contacts/supported_bodies.cpp`) are cast
 // with v, which their supports agree with; flying ones with v + h M⁻¹ f, whether or not they touch.
 //
-// A strike of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
+// An impact of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
 // arms of the meeting: impulses act there, with the part t/h of the step's forces before and the rest after, and both bodies
-// are led t v₋ + (h − t) v₊ along.
-// Other strikes act at the start of the step: the gap may close, no more; with restitution a step early, psi then
+// move by t v₋ + (h − t) v₊.
+// Other impacts act at the start of the step: the gap may close, no more; with restitution a step early, psi then
 // reduced to psi', psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching
 // speed, so that the fall still ahead is not won twice.
 //
 // Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
 // start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was
 // pressed in while it was one, the way its bodies went along the normal, enters r: what it gives back it has been
-// given. The rest is parted by positions, through the same solver with joints held: far more rigidly than their
+// given. The rest is removed by positions, through the same solver with joints held: far more rigidly than their
 // compliance, which at tiny steps yields more than a body does, and more rigidly than the contacts, so that joints
 // win where both cannot be. An overlap the scene began with goes at the rate 4 Ups per step; one that comes from
-// curved paths, features that swung in or sweeps that stopped early goes at once, in the step that makes it: there
+// curved paths, features that swung in or iterations that stopped early goes at once, in the step that makes it: there
 // the contacts have taken the energy that lifting the bodies back costs. What such a displacement of finite size
-// does to joints, momenta and energy is put right in `rigid/rigid_parting.cpp`.
+// does to joints, momenta and energy is put right in `rigid/rigid_projection.cpp`.
 //
 // Why a settled step cannot raise the energy (E kinetic and potential, constant force f, k = h M⁻¹ f): from
 // v₊ = v + k + M⁻¹ Gᵀ z and q₊ = q + h v₊ follows E₊ − E = z·G v₊ − ½ |v₊ − v|²_M. Of rigid contacts z·G v₊ = z·r
-// with r <= 0 but for rounding, friction takes (beta·D v₊ <= 0), and parting pays for what it lifts. So r has no
+// with r <= 0 but for rounding, friction takes (beta·D v₊ <= 0), and the projection pays for what it lifts. So r has no
 // Ups C v for a rigid contact that opens: it would push a body after its own speed, up to ½ Ups² |k|²_M a step.
 // A solve that stopped early proves nothing: its impulses z are shortened, island by island, to the largest s z for
 // which E₊ <= E. It exists: s = 0 is free fall, E₊ − E = −½ |k|²_M, and E₊ is convex in s.
@@ -51,10 +51,10 @@
 #include "contacts/contact_arrays.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_material.hpp"
-#include "contacts/contact_sweeps.hpp"
 #include "contacts/friction_direct.hpp"
-#include "contacts/friction_sweeps.hpp"
-#include "contacts/step_points.hpp"
+#include "contacts/friction_pgs.hpp"
+#include "contacts/pgs_solver.hpp"
+#include "contacts/step_contact.hpp"
 #include "linear/large_array.hpp"
 #include "run/named_enum.hpp"
 #include "run/team.hpp"
@@ -63,8 +63,8 @@ namespace spook {
 
 SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
 
-/// What bodies that touch but do not approach each other do while a blow passes. simultaneous: they take part in
-/// it. successive: only points that are approached take part, again and again until none is: a blow runs through a
+/// What bodies that touch but do not approach each other do while an impact passes. simultaneous: they take part in
+/// it. successive: only points that are approached take part, again and again until none is: an impact runs through a
 /// row of touching balls, and the last one leaves. Of open ones the next to close comes next, with those closed by then.
 SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
 
@@ -82,7 +82,8 @@ struct ContactOptions {
 };
 
 struct ContactCounters {  // exact, equal on every machine
-    std::uint64_t contacts = 0, impacts = 0, corrections = 0, friction_rounds = 0, pivots = 0, sweeps = 0,
+    std::uint64_t contacts = 0, impacts = 0, corrections = 0, friction_rounds = 0, pivots = 0,
+                  pgs_iterations = 0,
                   unsettled = 0;  // solves that stopped at a limit of rounds
 };
 
@@ -99,7 +100,7 @@ public:
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return detection_.possible(); }
 
-    /// Strikes of this body are met at the start of the step, like the stops of its joints, never at their own time.
+    /// Impacts of this body are met at the start of the step, like the stops of its joints, never at their own time.
     void leave_at_start(int body) noexcept { ball_[body] = 0; }
 
     /// Finds this step's contacts. `velocity` is v and `free_velocity` v + h M⁻¹ f, one per body of the scene.
@@ -108,19 +109,19 @@ public:
                 const std::vector<Vec6>& free_velocity);
 
     /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per
-    /// body of the scene. Then it is a step with contacts. Whether some stop among the joints is `struck`, and whether one
+    /// body of the scene. Then it is a step with contacts. Whether some stop among the joints is `hit`, and whether one
     /// `rebounds`.
-    bool meets(const std::vector<Vec6>& next, bool struck, bool rebounds);
+    bool meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds);
 
     /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
-    /// `system` is hit that hangs together with bodies in contact; asked anew after each impact.
+    /// `system` is hit that is connected to bodies in contact; asked anew after each impact.
     bool impact_needed(const MixedSystem& system) const { return impact_needed_ || stop_is_hit(system); }
 
     /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
-    double lead(int body) const noexcept { return lead_[body]; }
+    double toi_fraction(int body) const noexcept { return toi_fraction_[body]; }
 
     /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
-    /// solve(), of which those take part that hang together with a point. Bilateral ones keep G v₊ + Sig lambda = 0,
+    /// solve(), of which those take part that are connected to a point. Bilateral ones keep G v₊ + Sig lambda = 0,
     /// limits that touch do not close, those that are hit rebound, others, and motors, let go: right sides are not used.
     /// Fills system.velocity with v after the impact. It never raises the kinetic energy (with
     /// moving kinematic bodies: that of the rest).
@@ -140,58 +141,60 @@ public:
     const std::vector<Vec6>& correction() const noexcept { return correction_; }
 
     /// How overlapping bodies are to be displaced at the end of the step.
-    struct Parting {
+    struct PositionProjection {
         std::vector<Vec6> velocity;  // per moving body; empty when none is
-        Islands islands;             // of bodies that push each other, or hang together by joints
+        Islands islands;             // of bodies that push each other, or are connected by joints
         std::vector<char> grounded;  // per island: something that does not move by itself took part
-        std::vector<char> supplied;  // per island: what moves it, or a first overlap, may do work on it
-        double deepest = 0.0;        // overlap that nothing explains, m
+        std::vector<char>
+            externally_driven;  // per island: what moves it, or a first overlap, may do work on it
+        double deepest = 0.0;   // overlap that nothing explains, m
     };
-    const Parting& parting() const noexcept { return parting_; }
-    /// Whether displacements come by sweeps: cheap, and as exact as the next step will need.
-    bool parts_by_sweeps() const noexcept {
+    const PositionProjection& projection() const noexcept { return projection_; }
+    /// Whether displacements come by PGS: cheap, and as exact as the next step will need.
+    bool projects_by_pgs() const noexcept {
         return options_.solver == SolverKind::iterative && !resists_turning_;
     }
 
     /// Looks among the pairs of this step's points for overlaps with the bodies at `poses`, where the step ends, and
-    /// fills parting(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
+    /// fills projection(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
     /// `again` when the bodies are displaced: what is linear in the displacement is not all. Then it is false, too, where
-    /// the displacement before was of no use, or by sweeps so small that nothing comes of it.
-    bool part(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses, bool again);
+    /// the displacement before was of no use, or by PGS so small that nothing comes of it.
+    bool project_positions(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses,
+                           bool again);
 
-    /// Books the momentum [N s] that an island of parting() lost when it paid for its displacement as an impulse at
+    /// Books the momentum [N s] that an island of projection() lost when it paid for its displacement as an impulse at
     /// the first pushing contact with what does not move by itself: there forces keep adding up to the momentum, not
     /// moments to the angular one. An island that only joints tie to such a thing has nothing to book it at.
-    void pay(int island, Vec3 momentum) noexcept;
+    void apply_balancing_impulse(int island, Vec3 momentum) noexcept;
 
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
-    bool held(int unknown) const noexcept { return held_[unknown] != 0; }
+    bool has_rows(int index) const noexcept { return has_rows_[index] != 0; }
 
     /// What this step's contacts did.
-    struct Touch {
+    struct CachedContact {
         Contact contact;
         Vec3 impulse;                    // on the first body, impact and resting, N s
         double normal = 0.0;             // nu of the resting stage, N s
         double impact = 0.0;             // normal impulse of the impact, N s
         double tangent[2] = {0.0, 0.0};  // of the resting stage along the tangents, for a warm start
         double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
-        double pressed = 0.0;            // how far its bodies have pressed it in by the step's end, m
+        double compression = 0.0;        // how far its bodies have pressed it in by the step's end, m
         double friction = 0.0;           // mu of the pair, along its direction if it has one
         bool active = false;             // pushes, or closed
     };
-    const std::vector<Touch>& touches() const noexcept { return touches_; }
+    const std::vector<CachedContact>& cached_contacts() const noexcept { return cache_; }
 
     // contact_sleep.cpp: bodies that sleep have no pairs with each other, nor with what stands still.
-    /// These fall asleep where they are, and everybody who touches them: what their touches did stays, to be read.
+    /// These fall asleep where they are, and every body that touches them: what their touches did stays, to be read.
     void put_to_sleep(const std::vector<int>& bodies);
     /// These are awake again, with their touches as they were left.
     void wake(const std::vector<int>& bodies);
     /// A body that moves as it is told does so in this step, or stands still.
-    void stir(int body, bool moves) noexcept { detection_.stir(body, moves); }
-    /// Sleepers that touch one of those who `stirs`, by body.
-    std::vector<int> touching(const std::vector<char>& stirs) const;
-    /// Sleepers that somebody met, or was led into, since the step began.
-    const std::vector<int>& roused() const noexcept { return roused_; }
+    void mark_moving(int body, bool moves) noexcept { detection_.mark_moving(body, moves); }
+    /// Sleepers that touch one of the bodies that `is_moving` names.
+    std::vector<int> touching(const std::vector<char>& is_moving) const;
+    /// Sleepers that another body met, or was moved into, since the step began.
+    const std::vector<int>& woken() const noexcept { return woken_; }
     /// A step that all bodies sleep through.
     void sleep_through();
     /// Whether a surface of the contact moves along itself.
@@ -200,27 +203,30 @@ public:
 
     /// All that a later step depends on.
     struct Memory {
-        std::vector<Touch> touches, kept;
+        std::vector<CachedContact> cached_contacts, kept;
         std::vector<char> asleep;
         ContactCounters counters;
-        IslandSolver::PatienceOf resting, impact, parting;
+        IslandSolver::BackoffOf resting, impact, projection;
         DepthOfPair given;
         bool begun = false, by_rows = false;
     };
     void keep(Memory& memory) const {
-        memory.touches = touches_, memory.kept = kept_, memory.asleep = asleep_, memory.counters = counters_;
-        resting_solver_.patience(memory.resting);
-        impact_solver_.patience(memory.impact);
-        parting_solver_.patience(memory.parting);
-        memory.given = given_, memory.begun = begun_, memory.by_rows = by_rows_;
+        memory.cached_contacts = cache_, memory.kept = sleeping_cache_, memory.asleep = asleep_,
+        memory.counters = counters_;
+        resting_solver_.backoff(memory.resting);
+        impact_solver_.backoff(memory.impact);
+        projection_solver_.backoff(memory.projection);
+        memory.given = initial_penetration_, memory.begun = initial_penetration_known_,
+        memory.by_rows = by_rows_;
     }
     void remember(const Memory& memory) {
-        touches_ = memory.touches, counters_ = memory.counters;
+        cache_ = memory.cached_contacts, counters_ = memory.counters;
         lie_as(memory);
-        given_ = memory.given, begun_ = memory.begun, by_rows_ = memory.by_rows;
-        resting_solver_.be_patient(memory.resting);
-        impact_solver_.be_patient(memory.impact);
-        parting_solver_.be_patient(memory.parting);
+        initial_penetration_ = memory.given, initial_penetration_known_ = memory.begun,
+        by_rows_ = memory.by_rows;
+        resting_solver_.set_backoff(memory.resting);
+        impact_solver_.set_backoff(memory.impact);
+        projection_solver_.set_backoff(memory.projection);
     }
 
     /// Force [N] on `body` from `other` (or from all if −1), mean over the step.
@@ -235,58 +241,60 @@ public:
 
     ContactCounters counters() const noexcept { return counters_; }
     BlockLdlt::Counters factor_counters() const noexcept;
-    double residual() const noexcept { return residual_; }  // the last solve's or blow's rows_residual(), m/s
+    double residual() const noexcept {
+        return residual_;
+    }  // the last solve's or impact's rows_residual(), m/s
     /// A body whose rows the last solve left further from their law than `unsettled_residual`; −1 if there is none.
     int unsettled_body() const noexcept { return unsettled_body_; }
     double unsettled_by() const noexcept { return unsettled_by_; }  // m/s
     bool unsettled_sunk() const noexcept { return sunk_; }          // and not for what a row is off by
 
 private:
-    using Point = StepPoint;
-    void add_point(const Contact& contact, const Pose& first, const Pose& second, double strike);
+    using Point = StepContact;
+    void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
     void lie_as(const Memory& memory);
-    void rouse(const Contact& contact);
+    void wake_sleepers(const Contact& contact);
     bool sleeps(int body) const noexcept { return asleep_[body] != 0; }
     void orient(Point& point, const Pose& first, const Pose& second);
     PairMaterial material(const Contact& contact) const noexcept {
         return combined(materials_[contact.first], materials_[contact.second]);
     }
-    const PointRest& rest(const Point& point) const noexcept {
-        static constexpr PointRest none{};
-        return point.rest < 0 ? none : rests_[point.rest];
+    const ContactExtras& extras(const Point& point) const noexcept {
+        static constexpr ContactExtras none{};
+        return point.extras < 0 ? none : extras_[point.extras];
     }
-    PointRest& own_rest(Point& point) {
-        if (point.rest < 0) {
-            point.rest = static_cast<int>(rests_.size());
-            rests_.emplace_back();
+    ContactExtras& own_extras(Point& point) {
+        if (point.extras < 0) {
+            point.extras = static_cast<int>(extras_.size());
+            extras_.emplace_back();
         }
-        return rests_[point.rest];
+        return extras_[point.extras];
     }
     void find_open();
     void find_open_again();
-    bool is_blow(const Point& point) const noexcept;
-    bool blows_come_first();
-    bool find_left_out(const std::vector<Vec6>& velocity);
+    bool is_impact(const Point& point) const noexcept;
+    bool needs_plastic_impact();
+    bool find_deferred_impacts(const std::vector<Vec6>& velocity);
     void look_at(const std::vector<IndexPair>& near);
     OpenPair opened(const IndexPair& pair, const Separation& apart) const;
-    bool let_pass(std::size_t from);
-    bool passes_by(const Point& point, double overlap) const;
-    int find_strikes(const std::vector<Vec6>& velocity, bool late);
+    bool skip_grazing(std::size_t from);
+    bool is_grazing(const Point& point, double overlap) const;
+    int find_impacts(const std::vector<Vec6>& velocity, bool late);
     bool find_turned(const std::vector<Vec6>& velocity);
     bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
-    bool add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
-                    const std::vector<Vec6>& velocity, bool late);
-    bool add_strike_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
-    void take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity);
+    bool add_toi_points(IndexPair pair, const Pose& first, const Pose& second, double time,
+                        const std::vector<Vec6>& velocity, bool late);
+    bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
+    void move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
-    // contact_carried.cpp
-    void note_pressing(Point& point);
-    void find_carried();
-    bool climbs(int body) const;
-    bool lifts(const Point& point) const;
-    void let_go(int body, const Vec6& velocity);
-    Vec3 whole_fall(int body, Vec3 after) const;
-    void book_carried(const MixedSystem& system);
+    // supported_bodies.cpp
+    void note_supports(Point& point);
+    void find_supported();
+    bool moves_along_forces(int body) const;
+    bool pushes_against_forces(const Point& point) const;
+    void release_support(int body, const Vec6& velocity);
+    Vec3 free_fall_correction(int body, Vec3 after) const;
+    void apply_support_impulses(const MixedSystem& system);
     void order_points();
     void measure_points();
     void measure(Point& point) const;
@@ -296,41 +304,41 @@ private:
     RowBlock row_block(const Point& point, int rows) const;
     void add_turning_rows(const Point& point, RowBlock& block) const;
     void add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const;
-    double carried(const Point& point, Vec3 direction) const noexcept;
+    double surface_speed(const Point& point, Vec3 direction) const noexcept;
     double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                     bool only_prescribed) const;
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
                        FrictionModel model, const std::vector<char>* answered = nullptr);
-    const Islands& hanging(const MixedSystem& system, std::size_t joints) const;
+    const Islands& connected(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
     bool is_hit(const RowBlock& block) const noexcept;
     bool stop_is_hit(const MixedSystem& system) const;
-    bool stop_comes_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
+    bool needs_stop_impact(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     bool pass_other_ends(const MixedSystem& system, std::size_t joints);
-    void find_earliest_blows(MixedSystem& system, std::vector<std::size_t>& who);
-    void lead_forces(std::size_t body, MixedSystem& system);
-    Vec6 way_until(std::size_t body, double time) const;
+    void find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points);
+    void apply_forces_before(std::size_t body, MixedSystem& system);
+    Vec6 path_until(std::size_t body, double time) const;
     double gap_at(const Point& point, double time) const;
-    double both_known(const Point& point) const noexcept;
+    double last_impact_time(const Point& point) const noexcept;
     double closing_time(const Point& point) const;
-    void lead_point(Point& point);
-    void take_part(MixedSystem& system, const std::vector<std::size_t>& who,
+    void move_to_last_impact(Point& point);
+    void take_part(MixedSystem& system, const std::vector<std::size_t>& hit_points,
                    std::vector<RowBlock>& rows) const;
-    void share_blow(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& who) const;
-    void hit_exactly(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
-                     FrictionModel model);
+    void share_impact(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& hit_points) const;
+    void solve_impact(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
+                      FrictionModel model);
     void after_impact(const MixedSystem& system);
-    void mark_held(const MixedSystem& system);
+    void mark_rows(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
     bool outrun(const std::vector<Vec6>& velocity);
     double slop(const OpenPair& open) const noexcept;
-    double sunk_by(const Point& point, bool late) const;
+    double depth_at_toi(const Point& point, bool late) const;
     void index_points();
-    void leave_out_what_others_keep_off(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity);
-    bool keeps_off(const Meeting& earlier, const Meeting& later, int body,
-                   const std::vector<Vec6>& velocity) const;
-    bool is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                 const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing = {}) const;
+    void remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity);
+    bool occludes(const Meeting& earlier, const Meeting& later, int body,
+                  const std::vector<Vec6>& velocity) const;
+    bool is_internal_edge(const Mover& moving, int body, const Mover& other, const OpenPair& open,
+                          const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing = {}) const;
     Pose moved(int body, const std::vector<Vec6>& velocity) const;
     Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
     double meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const;
@@ -338,12 +346,12 @@ private:
     double resting_right(Point& point) const;
     bool is_pressed(const Point& point) const noexcept;
     RowBlock resting_row(Point& point) const;
-    Touch& record(const MixedSystem& system, const Point& point, double normal, Vec3 along);
-    double pressed(const MixedSystem& system, const Point& point) const;
-    Vec3 read_back(const RowBlock& block, Point& point);
-    // contact_iterative.cpp: the same by sweeps over compact contacts
-    bool solve_by_sweeps(MixedSystem& system, bool& left);
-    void foresee(MixedSystem& system, std::size_t known, int round);
+    CachedContact& cache_contact(const MixedSystem& system, const Point& point, double normal, Vec3 along);
+    double compression(const MixedSystem& system, const Point& point) const;
+    Vec3 store_solution(const RowBlock& block, Point& point);
+    // contact_pgs.cpp: the same by PGS over compact contacts
+    bool solve_by_pgs(MixedSystem& system, bool& unfinished);
+    void warm_start_by_pgs(MixedSystem& system, std::size_t known, int round);
     struct Unanswered {
         std::vector<int> island;          // of each point
         std::vector<char> open;           // islands to be solved
@@ -353,44 +361,44 @@ private:
     const Unanswered& find_unanswered(std::size_t bodies, std::size_t known);
     bool find_more(bool over);
     void take_in(std::size_t known);
-    void note_sinking();
+    void predict_sinking();
     bool is_settled(MixedSystem& system);
     bool runs_away(const MixedSystem& system) const;
     void hand_over();
     void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                const FrictionReport& report);
-    void judge_blow(const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel model);
-    void blame(double residual, int unknown);
+    void judge_impact(const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel model);
+    void blame(double residual, int index);
     void blame_sunk();
     void shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
                            std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
-    // contact_parting.cpp
-    void find_given();
-    void note_given();
+    // position_projection.cpp
+    void note_initial_penetrations();
+    void update_initial_penetrations();
     double way(int body, const std::vector<Pose>& poses) const;
-    void find_beside(const std::vector<Pose>& poses, double margin);
-    void add_lap(const Contact& contact, const std::vector<Pose>& poses, double excess);
+    void find_neighbours(const std::vector<Pose>& poses, double margin);
+    void add_penetration(const Contact& contact, const std::vector<Pose>& poses, double excess);
     double find_overlaps(const std::vector<Pose>& poses, bool again);
     double look_for_overlaps(const std::vector<Pose>& poses, double margin, bool again);
-    double find_overlaps_beside(const std::vector<Pose>& poses, double margin);
-    bool keep_parted(const std::vector<Pose>& poses);
-    bool parts_far(const Lap& lap) const noexcept;
-    void note_far();
-    bool is_looked_at(int a, int b) const noexcept {
-        return looked_at_.empty() || looked_at_[a] != 0 || looked_at_[b] != 0;
+    double find_neighbour_overlaps(const std::vector<Pose>& poses, double margin);
+    bool keep_projected(const std::vector<Pose>& poses);
+    bool moves_far(const PenetrationRecord& record) const noexcept;
+    void mark_far_islands();
+    bool is_reconsidered(int a, int b) const noexcept {
+        return reconsidered_.empty() || reconsidered_[a] != 0 || reconsidered_[b] != 0;
     }
     bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
-    double parting_speed(const Lap& lap, bool again) const;
-    bool part_directly(MixedSystem& parting, bool again);
-    bool part_by_sweeps(MixedSystem& parting, bool again);
-    void find_gives(const MixedSystem& parting);
-    double give_of(const Contact& contact, const std::vector<double>& gives) const noexcept;
-    void hold_joints(MixedSystem& parting, double least) const;
-    void note_parted(const MixedSystem& parting);
-    bool is_supplied(const Contact& contact) const;
+    double separation_speed(const PenetrationRecord& record, bool again) const;
+    bool project_directly(MixedSystem& projection, bool again);
+    bool project_by_pgs(MixedSystem& projection, bool again);
+    void find_body_compliance(const MixedSystem& projection);
+    double compliance_of(const Contact& contact, const std::vector<double>& compliances) const noexcept;
+    void hold_joints(MixedSystem& projection, double least) const;
+    void note_projected(const MixedSystem& projection);
+    bool is_externally_driven(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
-    double explained_depth(const Point& point) const noexcept;
+    double elastic_depth(const Point& point) const noexcept;
     double moving_size(const Contact& contact) const noexcept;
     double slack(const Contact& contact) const noexcept;
     double size(const Contact& contact) const noexcept;
@@ -401,87 +409,90 @@ private:
     Detection detection_;
     std::shared_ptr<Team> team_;  // of several threads, or none
     SharedValues<SurfaceMaterial> materials_;
-    std::vector<int> unknown_, body_of_;  // index of a body in MixedSystem, or −1; and back
+    std::vector<int> solver_index_, body_of_;  // index of a body in MixedSystem, or −1; and back
     ContactOptions options_;
     std::vector<IndexPair> joints_;
-    std::vector<char> jointed_;  // bodies with rows of joints
-    bool conveys_ = false;       // some surface moves along itself
-    bool supplies_ = false;      // or, in this step, something that does not move by itself
-    bool oriented_ = false;      // some surface has a friction that differs with the direction
+    std::vector<char> jointed_;        // bodies with rows of joints
+    bool conveys_ = false;             // some surface moves along itself
+    bool has_external_drive_ = false;  // or, in this step, something that does not move by itself
+    bool oriented_ = false;            // some surface has a friction that differs with the direction
     bool resists_turning_ = false;
     bool swings_ = false;     // some surface has sides: what turns on it may meet elsewhere
     std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
-    IslandSolver resting_solver_, impact_solver_, parting_solver_;
-    ContactSweeps sweeps_, parting_sweeps_;
-    MixedSystem parting_system_;
-    Parting parting_;
+    IslandSolver resting_solver_, impact_solver_, projection_solver_;
+    PgsSolver pgs_, projection_pgs_;
+    MixedSystem projection_system_;
+    PositionProjection projection_;
     std::vector<char> yielding_;
-    std::vector<double> gives_;      // of contacts of jointed bodies, see find_gives(), 1/kg
-    double expected_overlap_ = 0.0;  // of the last step: how near to look at balls, no more
-    LargeArray<Lap> laps_, parted_;  // points of the step's pairs where it ends; of all its partings
-    std::vector<Pose> lap_poses_;    // where bodies were at the last of them
-    bool far_ = false;               // the last may not have been enough, see parts_far()
-    std::vector<char> looked_at_;    // for whom not, by body; empty: for anybody
-    DepthOfPair given_;              // by pair: overlap the scene began with, as far as it is left, m
-    bool begun_ = false;             // whether it is known
-    bool by_rows_ = false;       // sweeps over few joints and contacts have failed: they are solved directly
+    std::vector<double> body_compliance_;  // of contacts of jointed bodies, see find_body_compliance(), 1/kg
+    double expected_overlap_ = 0.0;        // of the last step: how near to look at balls, no more
+    LargeArray<PenetrationRecord> penetrations_,
+        projected_;                      // points of the step's pairs where it ends; of all its projections
+    std::vector<Pose> projected_poses_;  // where bodies were at the last of them
+    bool moved_far_ = false;             // the last may not have been enough, see moves_far()
+    std::vector<char> reconsidered_;     // which bodies are, by body; empty: for every body
+    DepthOfPair initial_penetration_;    // by pair: overlap the scene began with, as far as it is left, m
+    bool initial_penetration_known_ = false;  // whether it is known
+    bool by_rows_ = false;       // PGS over few joints and contacts has failed: they are solved directly
     bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;     // velocities between sweeps, per body of the scene
-    std::vector<char> changed_;  // who has another than at the look before: the rest was judged then
-    std::size_t handed_over_ = 0, ordered_ = 0;  // points the sweeps have; points in order
+    std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
+    std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
+    std::size_t handed_over_ = 0, ordered_ = 0;  // points the PGS solver has; points in order
     Unanswered unanswered_;
-    std::vector<Touch> unordered_;
+    std::vector<CachedContact> unordered_;
     LargeArray<OpenPair> merged_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
     std::vector<Pose> poses_;
-    std::vector<Vec6> velocity_, kick_, predicted_;  // v, h M⁻¹ f, and what bodies are swept with
+    std::vector<Vec6> velocity_, dv_ext_, predicted_;  // v, h M⁻¹ f, and what bodies are cast along
     LargeArray<OpenPair> open_;
     int met_ = 0;                         // of them
-    std::vector<IndexPair> open_bodies_;  // of each, to look through many that nobody moved; empty: not yet
+    std::vector<IndexPair> open_bodies_;  // of each, to look through many that did not move; empty: not yet
     std::vector<Separation> apart_;       // of pairs, found on several threads
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread
     std::vector<MeetingOf> meetings_of_;          // by body and time
-    std::vector<IndexPair> beside_, seams_;       // pairs without points, where others part; those let in
-    std::vector<IndexPair> near_;                 // where the search was widened
-    std::vector<int> grown_;                      // whom it was widened for
-    std::vector<char> supported_;                 // bodies that closed contacts carry
-    struct Pressing {                             // of a closed point: whom the forces press on the other one
+    std::vector<IndexPair> neighbours_,
+        initial_overlaps_;         // pairs without points, where others part; those let in
+    std::vector<IndexPair> near_;  // where the search was widened
+    std::vector<int> grown_;       // the bodies it was widened for
+    std::vector<char> supported_;  // bodies that closed contacts carry
+    struct SupportPair {           // of a closed point: which body the forces press on the other
         int first, second;
-        bool first_presses, second_presses, both;  // on each other, carried or not
+        bool first_presses, second_presses, both;  // on each other, supported or not
     };
-    std::vector<Pressing> pressing_;
-    std::vector<Vec6> carried_kick_;  // what supports took of a body's kick until they let it go
-    std::vector<double> depth_;       // of a body's closed contacts, m
-    std::vector<double> sinking_;     // what sweeps that have not settled would add to it in this step, m
+    std::vector<SupportPair> support_pairs_;
+    std::vector<Vec6> support_impulse_dv_;  // what supports took of a body's kick until they let it go
+    std::vector<double> depth_;             // of a body's closed contacts, m
+    std::vector<double>
+        predicted_sinking_;  // what iterations that have not settled would add to it in this step, m
     std::vector<Contact> scratch_;
     std::vector<int> points_of_, points_begin_;  // points by moving body, and where each one's begin
     std::vector<int> root_;
     std::vector<std::uint64_t> known_;
-    std::vector<double> lead_, event_time_;
-    std::vector<double> clock_;  // of successive blows: up to when a body's way in the step is known, s
-    std::vector<Vec6> way_;      // and that way, m and rad
-    LargeArray<Point> points_, strikes_;
-    std::vector<PointRest> rests_;                                               // of points, in no order
-    std::vector<std::pair<std::uint64_t, std::size_t>> places_, parted_places_;  // of points, by key
-    std::vector<Touch> touches_;           // of the last step until the end of solve()
-    std::vector<Touch> kept_;              // of sleepers
-    std::vector<char> asleep_;             // by body; empty while none has slept
-    std::vector<int> roused_;              // sleepers met in this step
-    std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
-    std::vector<char> held_;               // moving bodies with rows, by unknown
+    std::vector<double> toi_fraction_, event_time_;
+    std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
+    std::vector<Vec6> path_;     // and that way, m and rad
+    LargeArray<Point> points_, toi_points_;
+    std::vector<ContactExtras> extras_;                                             // of points, in no order
+    std::vector<std::pair<std::uint64_t, std::size_t>> places_, projected_places_;  // of points, by key
+    std::vector<CachedContact> cache_;           // of the last step until the end of solve()
+    std::vector<CachedContact> sleeping_cache_;  // of sleepers
+    std::vector<char> asleep_;                   // by body; empty while none has slept
+    std::vector<int> woken_;                     // sleepers met in this step
+    std::vector<double> margin_, search_;        // where bodies may get, and where they are looked for, m
+    std::vector<char> has_rows_;                 // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
-    bool foreseen_ = false;       // the step's next solve starts from foresee()
-    bool settling_ = false;       // sweeps go on: what bodies do so far is not what they will
-    bool late_blow_ = false;      // a strike found after the solve needs an impact
-    bool plastic_first_ = false;  // plastic blows are met in the impact as well
+    bool warm_started_ = false;   // the step's next solve starts from warm_start_by_pgs()
+    bool iterating_ = false;      // PGS goes on: what bodies do so far is not final
+    bool late_impact_ = false;    // an impact found after the solve needs an impact
+    bool plastic_first_ = false;  // plastic impacts are met in the impact as well
     bool ends_passed_ = false;    // by the last solve
     int impact_rounds_ = 0;
     double residual_ = 0.0, unsettled_by_ = 0.0;
     bool sunk_ = false;
-    bool joint_is_worst_ = false;  // of what the last sweeps have left
+    bool joint_is_worst_ = false;  // of what the last iterations have left
     int unsettled_body_ = -1;
     ContactCounters counters_;
 };

@@ -2,12 +2,12 @@
 //
 // A manifold tells where two bodies touch at the start of a step. While they turn on it, an edge or a corner that was
 // far away may come down elsewhere; no row of that manifold knows of it. So the velocities a solve found are tried:
-// both bodies are led to the end of the step, and what lies deep there gets a row for the step itself. Its gap is the
+// both bodies are moved to the end of the step, and what lies deep there gets a row for the step itself. Its gap is the
 // one that to first order closes to the depth found, so the row holds the feature out and nothing before it.
 #include <algorithm>
 #include <cmath>
 
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
 
@@ -15,10 +15,10 @@ namespace spook {
 
 namespace {
 
-constexpr std::uint64_t swung_in = 1u << 15;  // marks a point whose feature has one in the manifold already
-constexpr double deep = 2e-3;                 // of the larger body's radius: what curved paths may overlap
-constexpr double same_place = 0.1;            // of it: points of one feature
-constexpr double same_way = 0.95;             // cosine of their normals
+constexpr std::uint64_t swung_in = 1u << 15;    // marks a point whose feature has one in the manifold already
+constexpr double deep = 2e-3;                   // of the larger body's radius: what curved paths may overlap
+constexpr double same_place = 0.1;              // of it: points of one feature
+constexpr double same_direction_cosine = 0.95;  // cosine of their normals
 
 /// Two of these touch at one point, wherever they turn.
 bool is_single(const Primitive& shape) noexcept {
@@ -34,7 +34,7 @@ bool ContactStage::is_known(const Contact& contact, std::size_t from, std::size_
         const Contact& old = point.contact;
         named = named || old.key == contact.key;
         return old.key >> feature_bits == contact.key >> feature_bits &&
-               dot(old.point.normal, contact.point.normal) > same_way &&
+               dot(old.point.normal, contact.point.normal) > same_direction_cosine &&
                norm(old.point.position - contact.point.position) < same_place * size;
     };
     const auto at = [this](std::size_t k) { return points_.begin() + static_cast<std::ptrdiff_t>(k); };
@@ -64,7 +64,7 @@ bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
         const Mover second{two.shape, two.part, poses_[b], linear(velocity[b]), angular(velocity[b])};
         const Pose first_end = first.body_at(h), second_end = second.body_at(h);
         scratch_.clear();
-        detection_.touch(pair, first_end, second_end, 0.0, scratch_);
+        detection_.collide_pair(pair, first_end, second_end, 0.0, scratch_);
         for (Contact& contact : scratch_) {
             if (contact.point.gap >= -(depth + deep * size)) continue;
             // Back to where both surfaces were at the start, half-way between them.

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "contacts/friction_acceleration.hpp"
-#include "contacts/friction_sweeps.hpp"
+#include "contacts/friction_pgs.hpp"
 #include "linear/elementary.hpp"
 #include "linear/vec.hpp"
 
@@ -16,7 +16,7 @@ constexpr double settled = 1e-10;  // of the largest normal impulse
 constexpr double exact = 1e-12;    // the same: an answer that another round would not better
 constexpr double falling = 0.1;    // of the residual before: worth another round
 constexpr double loosest = 1e-6;
-constexpr double reluctance =
+constexpr double direction_hysteresis =
     0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
 constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
 constexpr int plain_rounds = 3;         // most systems settle within these
@@ -24,21 +24,21 @@ constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it 
 constexpr double fair = 1e-9;           // one that is an answer
 // One that is not worth another try; where points are redundant, tries rarely settle and about halve it.
 constexpr double near = 1e-6, redundant_near = 3e-5;
-constexpr int sweep_turns = 1, turn_sweeps = 100;  // where Newton's path ends without an answer
+constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
 
 /// How much is spent on rounds of pivoting.
-struct Effort {
+struct IterationBudget {
     int rounds;
     int pivots = 60;  // of a round: the cone's need not be exact while its bounds still move
-    int lost =
+    int cycling =
         8;  // rounds in a row without an end of the pivoting: it goes in circles; 1: nor the first guess
     bool near = false;  // an answer is near: directions start from its slip, not from the predicted one
 };
-constexpr Effort quick{4, 4, 1};    // what rests or moves on as it did is found within these, exactly
-constexpr Effort small{12, 20, 1};  // nine systems in ten of few blocks settle
-constexpr Effort brief{6, 8,
-                       1};  // the same where points are redundant: the others are Newton's, at less cost
-constexpr Effort polish{6, 8, 1, true};  // after Newton's method
+constexpr IterationBudget quick{4, 4, 1};  // what rests or moves on as it did is found within these, exactly
+constexpr IterationBudget small{12, 20, 1};  // nine systems in ten of few blocks settle
+constexpr IterationBudget brief{
+    6, 8, 1};  // the same where points are redundant: the others are Newton's, at less cost
+constexpr IterationBudget polish{6, 8, 1, true};  // after Newton's method
 
 /// What rounds change of a system.
 struct Answer {
@@ -51,7 +51,7 @@ struct Answer {
 /// What a solve needs besides what it gives. One per thread: its memory outlives a solve, its values do not.
 struct Work {
     MixedSystem start, best;  // as it was, and the best end of Newton's method
-    std::vector<FrictionPoint> start_points, swept_points;
+    std::vector<FrictionPoint> start_points, pgs_points;
     Answer answer;
     Acceleration acceleration;
     MassFactors mass;
@@ -110,7 +110,7 @@ struct Law {
 
 /// Measures the disc law at one point; if it does not hold, prepares the point's next Newton step.
 Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double bound, double accepted,
-              double reluctant, const std::vector<Vec6>& velocity) {
+              double hysteresis, const std::vector<Vec6>& velocity) {
     const int one = point.row, two = point.row + 1;
     const double s1 = slip(block, point, one, velocity), s2 = slip(block, point, two, velocity);
     const double b1 = block.multiplier[one], b2 = block.multiplier[two];
@@ -123,7 +123,7 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
     block.softness[one] = block.softness[two] = point.slip_softness;
     if (reach > bound) {
         turn_tangents(block, point, -d1 / reach, -d2 / reach);
-        if (bound > 0.0) block.softness[two] += std::max(length(s1, s2) / bound, reluctant * scale);
+        if (bound > 0.0) block.softness[two] += std::max(length(s1, s2) / bound, hysteresis * scale);
         block.state[one] = RowState::at_lower;  // beta_1 = −mu nu: against the slip
         block.state[two] = RowState::free;
         law.moved = true;
@@ -134,10 +134,10 @@ Law step_cone(RowBlock& block, const FrictionPoint& point, double scale, double 
     return law;
 }
 
-/// Few systems have no fixed point the rounds can find (wedged bodies); sweeps may. A poor end of the rounds is
-/// replaced in any case: what sweeps leave obeys every bound, so it cannot throw bodies about.
-void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<FrictionPoint>& points,
-                      FrictionModel model, FrictionReport& report) {
+/// Few systems have no fixed point the rounds can find (wedged bodies); iterations may. A poor end of the rounds is
+/// replaced in any case: what iterations leave obeys every bound, so it cannot throw bodies about.
+void finish_by_pgs(MixedSystem& system, MixedSystem& start, std::vector<FrictionPoint>& points,
+                   FrictionModel model, FrictionReport& report) {
     if (start.rows.empty()) return;
     double speed = 0.0;
     for (std::size_t b = 0; b < start.mass.size(); ++b) {
@@ -145,16 +145,16 @@ void finish_by_sweeps(MixedSystem& system, MixedSystem& start, std::vector<Frict
         solve_six(factor_six(start.mass[b]), v);
         speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
     }
-    std::vector<FrictionPoint>& swept_points = work().swept_points;
-    swept_points = points;
-    const FrictionReport sweeps = solve_iterative(start, swept_points, model, 1000, 1e-10 * speed);
-    report.sweeps += sweeps.sweeps;
-    report.finite = report.finite || sweeps.finite;
-    if (!sweeps.converged && report.residual <= poor) return;
-    report.converged = sweeps.converged;
-    report.residual = sweeps.residual;
+    std::vector<FrictionPoint>& pgs_points = work().pgs_points;
+    pgs_points = points;
+    const FrictionReport pgs = solve_iterative(start, pgs_points, model, 1000, 1e-10 * speed);
+    report.pgs_iterations += pgs.pgs_iterations;
+    report.finite = report.finite || pgs.finite;
+    if (!pgs.converged && report.residual <= poor) return;
+    report.converged = pgs.converged;
+    report.residual = pgs.residual;
     system = start;
-    points = swept_points;
+    points = pgs_points;
 }
 
 /// Whether the system is one for Newton's method on the cone.
@@ -165,7 +165,7 @@ bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& 
         return false;  // it knows no friction of turning
     // Rigid joints need the factor of the whole, not a relief; and its units tie two bodies.
     return std::all_of(system.rows.begin(), system.rows.end(),
-                       [](const RowBlock& block) { return block.lower[0] == 0.0 && block.beyond.empty(); });
+                       [](const RowBlock& block) { return block.lower[0] == 0.0 && block.further.empty(); });
 }
 
 /// Whether some pair of bodies has several points, which may share a load in many ways.
@@ -177,22 +177,22 @@ bool is_redundant(const MixedSystem& system) {
     return std::adjacent_find(pairs.begin(), pairs.end()) != pairs.end();
 }
 
-/// Takes over what multipliers and velocities say: who pushes, who sticks, and which way the others slide.
+/// Takes over what multipliers and velocities say: which contacts push, which stick, and which way the others slide.
 void start_near(MixedSystem& system, const std::vector<FrictionPoint>& points,
                 const std::vector<double>& scale) {
     for (RowBlock& block : system.rows)
         block.state[0] = block.multiplier[0] > 0.0 ? RowState::free : RowState::at_lower;
     for (std::size_t k = 0; k < points.size(); ++k) {
         RowBlock& block = system.rows[points[k].block];
-        step_cone(block, points[k], scale[k], points[k].coefficient * block.multiplier[0], -1.0, reluctance,
-                  system.velocity);
+        step_cone(block, points[k], scale[k], points[k].coefficient * block.multiplier[0], -1.0,
+                  direction_hysteresis, system.velocity);
     }
 }
 
 /// Pivoting with bounds and directions renewed until the law holds. True when it does; a system that is not finite is
 /// reported.
 bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                      PivotSolver& solver, const Effort& effort, FrictionReport& report) {
+                      PivotSolver& solver, const IterationBudget& effort, FrictionReport& report) {
     auto solve = [&](bool same_matrix) {
         const PivotReport pivots = solver.solve(system, same_matrix);
         ++report.rounds;
@@ -202,12 +202,12 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
         return pivots.finite;
     };
     const RoundLimitKept kept(solver);
-    if (effort.lost == 1) solver.round_limit = effort.pivots;  // the first guess, too
+    if (effort.cycling == 1) solver.round_limit = effort.pivots;  // the first guess, too
     const bool some_unknown =
         std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
     if (some_unknown) {  // no step before: the normal forces without friction are the first guess
         for (const FrictionPoint& point : points) bound_rows(system.rows[point.block], point, 0.0);
-        if (!solve(false) || (effort.lost == 1 && !report.converged)) return false;
+        if (!solve(false) || (effort.cycling == 1 && !report.converged)) return false;
         for (FrictionPoint& point : points)
             if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
         for (const FrictionPoint& point : points)
@@ -228,7 +228,7 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     Acceleration& acceleration = work().acceleration;
     acceleration.begin();
     double accepted = settled;
-    int lost = 0;
+    int cycling = 0;
     Answer& answer = work().answer;
     bool answered = false;  // accepted; the next round may find it to rounding
     std::vector<double>&used = work().used, &given = work().given;
@@ -255,9 +255,9 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             if (model != FrictionModel::box)
                 change = std::max(change, point.coefficient * std::abs(now - point.normal));
             if (model == FrictionModel::cone && point.size == 2) {
-                const double reluctant = reluctance * std::ldexp(1.0, -std::max(0, round - 5));
+                const double hysteresis = direction_hysteresis * std::ldexp(1.0, -std::max(0, round - 5));
                 const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
-                                          exact * point.coefficient * largest, reluctant, system.velocity);
+                                          exact * point.coefficient * largest, hysteresis, system.velocity);
                 residual = std::max(residual, law.residual);
                 if (law.moved) same_matrix = false;
             }
@@ -283,8 +283,8 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             answer.rows = system.rows, answer.velocity = system.velocity;
             answer.points = points, answer.report = report;
         }
-        lost = report.converged ? 0 : lost + 1;
-        if (lost >= effort.lost) break;
+        cycling = report.converged ? 0 : cycling + 1;
+        if (cycling >= effort.cycling) break;
         if (points.empty() || model == FrictionModel::box) {
             report.residual = unbounded;  // the pivoting itself gave up
             break;
@@ -307,18 +307,18 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 /// a copy of it.
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
                     DirectSolver& direct, bool redundant, bool& kept, FrictionReport& report) {
-    if (direct.patience.waits()) return false;
+    if (direct.backoff.waits()) return false;
     kept = true;
     MixedSystem& start = work().start;
     std::vector<FrictionPoint>& start_points = work().start_points;
     start = system, start_points = points;
     const FrictionReport before = report;
-    const Effort& effort = system.rows.size() > few_blocks ? quick : redundant ? brief : small;
+    const IterationBudget& effort = system.rows.size() > few_blocks ? quick : redundant ? brief : small;
     if (settle_by_rounds(system, points, model, direct.pivot, effort, report)) {
-        direct.patience.succeeded();
+        direct.backoff.succeeded();
         return true;
     }
-    direct.patience.failed();
+    direct.backoff.failed();
     system = start;
     points = start_points;
     const int rounds = report.rounds, pivots = report.pivots;
@@ -328,7 +328,7 @@ bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, Fri
     return false;
 }
 
-/// Newton's method; where its path ends without an answer, a few sweeps choose anew who pushes and who slides, and it
+/// Newton's method; where its path ends without an answer, a few iterations choose anew which contacts push and which slide, and it
 /// goes on from there. Few blocks are handed to pivoting in the end, which shares loads evenly. False if all that is
 /// poor, and the system as it was. `kept`: work() has a copy of it already.
 bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
@@ -339,11 +339,12 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     report.residual = unbounded;
     const bool few = start.rows.size() <= few_blocks;
     bool is_best = true;  // the system, of what was met so far: a copy is taken when it is to be changed
-    for (int turn = 0; turn <= sweep_turns && !(report.residual <= (few ? fair : direct.newton.near_enough));
+    for (int turn = 0; turn <= pgs_turns && !(report.residual <= (few ? fair : direct.newton.near_enough));
          ++turn) {
         if (turn > 0) {
             if (is_best) best = system;
-            report.sweeps += solve_iterative(system, points, model, turn_sweeps, 0.0).sweeps;
+            report.pgs_iterations +=
+                solve_iterative(system, points, model, iterations_per_turn, 0.0).pgs_iterations;
         }
         const ConeReport found = direct.newton.solve(system, points);
         report.rounds += found.iterations;
@@ -402,7 +403,7 @@ bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& po
                     missing[block.first][a] += block.first_jacobian[i][a] * block.multiplier[i];
                 if (block.second >= 0)
                     missing[block.second][a] += block.second_jacobian[i][a] * block.multiplier[i];
-                for (const Beyond& other : block.beyond)
+                for (const FurtherBody& other : block.further)
                     missing[other.body][a] += other.jacobian[a] * block.multiplier[i];
             }
     for (const Vec6& part : missing)
@@ -416,11 +417,11 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     FrictionReport report;
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
     MixedSystem& start = work().start;
-    const Effort patient{max_rounds};
+    const IterationBudget full_budget{max_rounds};
     if (is_for_newton(system, points, model)) {
         const bool redundant = is_redundant(system);
         const bool near_none =
-            (direct.foreseen || (redundant && points.empty())) && system.rows.size() > few_blocks;
+            (direct.warm_started || (redundant && points.empty())) && system.rows.size() > few_blocks;
         direct.newton.near_enough = redundant ? redundant_near : near;
         bool kept = false;
         if (!near_none && settle_quickly(system, points, model, direct, redundant, kept, report))
@@ -432,10 +433,10 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
         if (!points.empty() || std::any_of(system.rows.begin(), system.rows.end(),
                                            [](const RowBlock& block) { return block.lower[0] == 0.0; }))
             start = system;
-        if (settle_by_rounds(system, points, model, direct.pivot, patient, report) || !report.finite)
+        if (settle_by_rounds(system, points, model, direct.pivot, full_budget, report) || !report.finite)
             return report;
     }
-    finish_by_sweeps(system, start, points, model, report);
+    finish_by_pgs(system, start, points, model, report);
     return report;
 }
 

@@ -11,8 +11,8 @@ namespace spook {
 struct DirectSolver {
     PivotSolver pivot;
     ConeNewton newton;
-    Patience patience;
-    bool foreseen = false;  // sweeps have set the start: no answer that pivoting could find near
+    RetryBackoff backoff;
+    bool warm_started = false;  // iterations have set the start: no answer that pivoting could find near
 };
 
 /// Solves `system` with the friction law `model` at `points`.
@@ -25,13 +25,13 @@ struct DirectSolver {
 /// Rounds end when normal forces and the law's residual have settled to 1e-10 of the largest normal impulse (after
 /// 25 rounds tenfold more every five, at most 1e-6), and go on while each leaves a tenth of that, down to 1e-12: where
 /// points are redundant, little in a bound is much in how they share their load. After `max_rounds` without an answer
-/// Gauss–Seidel sweeps finish, and replace a poor end in any case: their answer obeys every bound.
+/// Gauss–Seidel iterations finish, and replace a poor end in any case: their answer obeys every bound.
 /// Systems of contacts alone under the cone, or of more than 24 blocks without friction, get a few of these rounds,
 /// which settle exactly what rests or slides on; where they failed they wait, up to 16 solves, and more than 24 blocks
-/// that start from sweeps, or have redundant points and no friction, get none. What is left goes to Newton's method
+/// that start from iterations, or have redundant points and no friction, get none. What is left goes to Newton's method
 /// (`contacts/cone_newton.hpp`), where that ends beyond 1e-6 of the speeds (3e-5 where points are redundant, 1e-9 up to 24
-/// blocks) to 100 sweeps and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best within
-/// 1e-4 of the speeds is the answer, and converged within 1e-9; else sweeps finish.
+/// blocks) to 100 iterations and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best within
+/// 1e-4 of the speeds is the answer, and converged within 1e-9; else iterations finish.
 /// On return FrictionPoint::normal is the normal impulse; for the box it stays what bounds friction.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);

@@ -23,24 +23,24 @@ struct FrictionPoint {
     double normal =
         -1.0;  // nu of the step before, N s; negative: unknown; then, but for the box, of this one
     int row = 1, size = 2;  // which rows: two obey a disc (or box), one an interval
-    bool stretched =
+    bool anisotropic =
         false;  // the two rows differ in scale: their own part is solved exactly, not by projection
 };
 
 struct FrictionReport {
     int rounds = 0;  // solves of the whole system
     int pivots = 0;  // rows that changed state
-    int sweeps = 0;
+    int pgs_iterations = 0;
     double residual =
-        0.0;  // that the solve ended on: of the friction law, relative (direct), or a change, m/s (sweeps)
+        0.0;  // that the solve ended on: of the friction law, relative (direct), or a change, m/s (iterations)
     bool converged = true;
     bool finite = true;
 };
 
 /// The row that is furthest from its law, and by how much: each multiplier against where a step of projection would
 /// put it, as a velocity [m/s]. This is *the* residual: what a result reports, and what an "unsettled" run is judged by,
-/// for every solver (`ContactSweeps::worst` measures it over its own contacts). Sweeps end on the largest change of a
-/// sweep instead, the same map seen row by row while it is being followed. For the box `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not
+/// for every solver (`PgsSolver::worst` measures it over its own contacts). PGS ends on the largest change of an
+/// iteration instead, the same map seen row by row while it is being followed. For the box `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not
 /// told apart: where all are, that is the answer, and looking is cheaper.
 struct RowsResidual {
     double residual = 0.0;

@@ -12,7 +12,7 @@ void IslandFinder::begin(int bodies) {
 
 void IslandFinder::tie(const RowBlock& block) {
     tie(block.first, block.second);
-    for (const Beyond& other : block.beyond) tie(std::max(block.first, block.second), other.body);
+    for (const FurtherBody& other : block.further) tie(std::max(block.first, block.second), other.body);
 }
 
 const Islands& IslandFinder::find(const MixedSystem& system) {
@@ -32,7 +32,7 @@ bool IslandFinder::only_more() {
     return known == known_.size();
 }
 
-/// Whether a tie changes who hangs together.
+/// Whether a tie changes which bodies are connected.
 bool IslandFinder::join(Islands::Tie tie) {
     const auto root = [this](int b) {
         while (parent_[b] != b) b = parent_[b] = parent_[parent_[b]];

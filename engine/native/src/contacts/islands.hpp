@@ -1,4 +1,4 @@
-// Which bodies hang together by rows.
+// Which bodies are connected by rows.
 #pragma once
 
 #include <span>
@@ -50,7 +50,7 @@ private:
     Islands islands_;
     int bodies_ = -1;                         // islands_ are of so many,
     std::vector<Islands::Tie> known_, ties_;  //   and of these; those told since begin()
-    std::vector<Islands::Tie> more_;          // of those, who were not known
+    std::vector<Islands::Tie> more_;          // of those, which were not known
     int told_ = 0;                            // bodies
     std::vector<int> parent_;
     std::vector<char> has_rows_;

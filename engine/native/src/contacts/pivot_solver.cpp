@@ -4,14 +4,14 @@
 #include <cmath>
 #include <utility>
 
-#include "contacts/friction_sweeps.hpp"
+#include "contacts/friction_pgs.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int patience = 5;      // rounds without fewer offenders before Murty's rule
+constexpr int backoff = 5;       // rounds without fewer offenders before Murty's rule
 constexpr int max_restarts = 7;  // then Murty's rule
 constexpr int short_search = 4;  // rounds: too few for more offenders at its start than these
 constexpr int few_offenders = 4, offending_share = 25;  // and one row in so many
@@ -33,14 +33,14 @@ bool PivotSolver::is_known(const MixedSystem& system) const noexcept {
     for (std::size_t k = 0; k < pattern_.size(); ++k) {
         const RowBlock& block = system.rows[k];
         if (pattern_[k] != Pattern{block.first, block.second, block.size}) return false;
-        for (const Beyond& other : block.beyond) {
-            if (beyond == beyond_.size() || beyond_[beyond] != static_cast<int>(k) ||
-                beyond_[beyond + 1] != other.body)
+        for (const FurtherBody& other : block.further) {
+            if (beyond == further_.size() || further_[beyond] != static_cast<int>(k) ||
+                further_[beyond + 1] != other.body)
                 return false;
             beyond += 2;
         }
     }
-    return beyond == beyond_.size();
+    return beyond == further_.size();
 }
 
 bool PivotSolver::analyse(const MixedSystem& system) {
@@ -54,12 +54,12 @@ bool PivotSolver::analyse(const MixedSystem& system) {
     const int bodies = static_cast<int>(system.mass.size());
     bodies_ = -1;  // until the analysis is whole
     pattern_.clear();
-    beyond_.clear();
+    further_.clear();
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         pattern_.push_back({block.first, block.second, block.size});
-        for (const Beyond& other : block.beyond)
-            beyond_.push_back(static_cast<int>(k)), beyond_.push_back(other.body);
+        for (const FurtherBody& other : block.further)
+            further_.push_back(static_cast<int>(k)), further_.push_back(other.body);
     }
     sizes.assign(bodies, 6);
     is_constraint.assign(bodies, 0);
@@ -75,10 +75,10 @@ bool PivotSolver::analyse(const MixedSystem& system) {
         if (pattern_[k].second >= 0)
             second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern_[k].second, block});
     }
-    beyond_edge_.clear();
-    for (std::size_t k = 0; k < beyond_.size(); k += 2) {
-        beyond_edge_.push_back(static_cast<int>(edges.size()));
-        edges.push_back({beyond_[k + 1], bodies + beyond_[k]});
+    further_edge_.clear();
+    for (std::size_t k = 0; k < further_.size(); k += 2) {
+        further_edge_.push_back(static_cast<int>(edges.size()));
+        edges.push_back({further_[k + 1], bodies + further_[k]});
     }
     matrix_.analyse(sizes, edges, is_constraint);
     ++analyses_;
@@ -118,7 +118,7 @@ void PivotSolver::measure(const MixedSystem& system) {
             double own = 0.0;
             if (block.first >= 0) own += first[i];
             if (block.second >= 0) own += second[i];
-            for (const Beyond& other : block.beyond) {
+            for (const FurtherBody& other : block.further) {
                 Vec6 x = other.jacobian;
                 solve_six(mass_[other.body], x);
                 own += dot(other.jacobian, x);
@@ -145,8 +145,8 @@ bool PivotSolver::factor(const MixedSystem& system) {
             for (int a = 0; a < 6; ++a)
                 for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? jacobian[i][a] : 0.0;
         }
-        for (const Beyond& other : block.beyond) {
-            double* coupling = matrix_.coupling(beyond_edge_[beyond++]);
+        for (const FurtherBody& other : block.further) {
+            double* coupling = matrix_.coupling(further_edge_[beyond++]);
             for (int a = 0; a < 6; ++a) coupling[a] = is_free(block, 0) ? other.jacobian[a] : 0.0;
         }
     }
@@ -209,7 +209,8 @@ void PivotSolver::solve_free(MixedSystem& system, bool refined) {
         for (int a = 0; a < 6; ++a) {
             if (block.first >= 0) right_[6 * block.first + a] += block.first_jacobian[i][a] * z;
             if (block.second >= 0) right_[6 * block.second + a] += block.second_jacobian[i][a] * z;
-            for (const Beyond& other : block.beyond) right_[6 * other.body + a] += other.jacobian[a] * z;
+            for (const FurtherBody& other : block.further)
+                right_[6 * other.body + a] += other.jacobian[a] * z;
         }
     }
     state_ = right_;
@@ -283,12 +284,12 @@ bool PivotSolver::conjugate_directions() {
     return round > 0;
 }
 
-void PivotSolver::guess_by_sweeps(MixedSystem& system, int sweeps) {
+void PivotSolver::guess_by_pgs(MixedSystem& system, int iterations) {
     for (RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i)
             block.multiplier[i] = std::clamp(block.multiplier[i], block.lower[i], block.upper[i]);
     std::vector<FrictionPoint> none;
-    solve_iterative(system, none, FrictionModel::cone, sweeps, 0.0);
+    solve_iterative(system, none, FrictionModel::cone, iterations, 0.0);
     for (RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i) {
             if (bilateral(block, i) || block.lower[i] == block.upper[i]) continue;
@@ -326,7 +327,7 @@ int PivotSolver::offenders(const MixedSystem& system, bool mark_all) {
 
 /// Frees rigid rows that rest at zero without need: four corners on three is one answer of many, and rounding would
 /// choose. With them free, the relief finds the one of least norm.
-int PivotSolver::free_ties(MixedSystem& system) {
+int PivotSolver::free_degenerate_rows(MixedSystem& system) {
     int count = 0;
     for (const auto& [k, i, own] : bounded_) {
         RowBlock& block = system.rows[k];
@@ -364,7 +365,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
     const int refined_rounds = 50 + 4 * bounded;
     const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
-    int best = 1 << 30, left = patience;
+    int best = 1 << 30, left = backoff;
     bool tied = false;  // whether ties were freed
     for (int round = 0; round < last_round; ++round) {
         Watch::look();
@@ -389,20 +390,20 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         }
         if (count == 0) {
             report.converged = true;
-            if (tied || free_ties(system) == 0) break;
+            if (tied || free_degenerate_rows(system) == 0) break;
             tied = true;
             report.converged = false;
             continue;
         }
         if (round == 0 && round_limit <= short_search && count > few_offenders + bounded / offending_share)
             break;
-        if (count < best && refined) best = count, left = patience;
+        if (count < best && refined) best = count, left = backoff;
         else if (left > 0) --left;
         if (left == 0 && report.restarts < max_restarts) {
             tolerance_ = std::min(10.0 * tolerance_, loosest);
-            if (report.restarts > 1) guess_by_sweeps(system, 5 << report.restarts);
+            if (report.restarts > 1) guess_by_pgs(system, 5 << report.restarts);
             ++report.restarts;
-            best = 1 << 30, left = patience;
+            best = 1 << 30, left = backoff;
             if (report.restarts > 2) continue;
         }
         const bool all = left > 0 && refined;

@@ -22,8 +22,8 @@ struct PivotReport {
 /// Solves MixedSystem by block pivoting: free every row that wants to leave its bound, bind every row that broke
 /// one, all at once. Five rounds without fewer offenders are a stall. Rigid redundant contacts may contradict each
 /// other by rounding, so at each stall the tolerance, 1e-11 of the system's speed at first, is loosened tenfold, to
-/// 1e-7 at most; from the third on Gauss–Seidel sweeps guess the free set anew (fixed bounds make a convex quadratic
-/// problem, which sweeps descend); after seven only the offender of the largest index is flipped (Murty 1974), which
+/// 1e-7 at most; from the third on Gauss–Seidel iterations guess the free set anew (fixed bounds make a convex quadratic
+/// problem, which iterations descend); after seven only the offender of the largest index is flipped (Murty 1974), which
 /// ends for P-matrices. Rows start from RowBlock::state; bilateral rows never leave the free set.
 ///
 /// Singular systems (four rigid corners, Sig = 0): the factored matrix carries a compliance of `relief` times each
@@ -57,9 +57,9 @@ private:
     double refine(int rounds);
     bool conjugate_directions();
     double residual();
-    void guess_by_sweeps(MixedSystem& system, int sweeps);
+    void guess_by_pgs(MixedSystem& system, int iterations);
     int offenders(const MixedSystem& system, bool mark_all);
-    int free_ties(MixedSystem& system);
+    int free_degenerate_rows(MixedSystem& system);
 
     struct Bounded {  // a row that is not bilateral
         int block, row;
@@ -79,7 +79,7 @@ private:
     int bodies_ = -1;
     std::vector<Pattern> pattern_;
     std::vector<int> first_edge_, second_edge_;  // per row block, −1 if there is none
-    std::vector<int> beyond_, beyond_edge_;  // rows over more bodies: block and body of each, and its edge
+    std::vector<int> further_, further_edge_;  // rows over more bodies: block and body of each, and its edge
     std::vector<Bounded> bounded_;
     bool factored_ = false;
     std::vector<std::uint8_t> factored_free_, offends_;  // per bounded row
@@ -93,7 +93,7 @@ private:
 
 /// What the solves before tell the next one: a run that goes back must take it along. Pivoting that failed is asked again
 /// after 1, 2, 4, … and at most 16 other solves.
-struct Patience {
+struct RetryBackoff {
     int wait = 0;      // solves until it is asked again
     int failures = 0;  // of it in a row
 

@@ -24,19 +24,19 @@ inline constexpr double unbounded = std::numeric_limits<double>::infinity();
 enum class RowState : signed char { at_lower = -1, free = 0, at_upper = 1 };
 
 /// A body beyond the first two of a row that ties several.
-struct Beyond {
+struct FurtherBody {
     int body = 0;  // index into MixedSystem::mass
     Vec6 jacobian{};
 };
 
-/// The row of a block that is a joint's stop or a wire, and what a blow is to leave there.
+/// The row of a block that is a joint's stop or a wire, and what an impact is to leave there.
 struct StopRow {
-    int row = -1;           // of the block; −1: it has none
-    bool touching = false;  // as the step begins
-    bool struck = false;    // its rate leads there within the step
-    double rebound = 0.0;   // where it is hit, the rate it sends back, m/s or rad/s; else 0
-    bool answered = false;  // by a blow
-    bool spent = false;     // by the last of its step
+    int row = -1;                // of the block; −1: it has none
+    bool touching = false;       // as the step begins
+    bool hit = false;            // its rate leads there within the step
+    double rebound = 0.0;        // where it is hit, the rate it sends back, m/s or rad/s; else 0
+    bool answered = false;       // by an impact
+    bool limit_reached = false;  // by the last of its step
     // Of a stop with two ends:
     double room = unbounded;  // to the other end, m or rad
     double range = 0.0;       // from one to the other
@@ -57,7 +57,7 @@ struct RowBlock {
     Vec6 multiplier{};  // z: the start of an iteration, then the result
     std::array<RowState, 6> state{};
     StopRow stop;
-    std::span<const Beyond> beyond;  // whoever fills the rows keeps what it shows
+    std::span<const FurtherBody> further;  // what fills the rows keeps what it shows
 };
 
 /// Indices of bodies are those of moving bodies only; bodies that do not move appear in the rows' right sides.
@@ -77,7 +77,7 @@ inline double row_velocity(const RowBlock& block, int i, const std::vector<Vec6>
     double sum = 0.0;
     if (block.first >= 0) sum += dot(block.first_jacobian[i], velocity[block.first]);
     if (block.second >= 0) sum += dot(block.second_jacobian[i], velocity[block.second]);
-    for (const Beyond& other : block.beyond) sum += dot(other.jacobian, velocity[other.body]);
+    for (const FurtherBody& other : block.further) sum += dot(other.jacobian, velocity[other.body]);
     return sum;
 }
 

@@ -10,7 +10,7 @@ namespace spook {
 inline constexpr std::size_t ahead = 8;  // passes of such a loop
 
 /// Asks for all lines of it; of what does not begin where a line does, for all but what the last may hold of it.
-template <class T> void ask_for(const T& what) noexcept {
+template <class T> void prefetch(const T& what) noexcept {
     const char* const at = reinterpret_cast<const char*>(&what);
     for (std::size_t byte = 0; byte < sizeof(what); byte += 64) __builtin_prefetch(at + byte);
 }

@@ -46,7 +46,7 @@ struct Factor {
     double shift;   // taken from the diagonal of every constraint, in the factor only
 };
 
-/// What a sweep over the columns needs, for one instruction set.
+/// What a pass over the columns needs, for one instruction set.
 struct Kernels {
     /// Loads and factors; counts replaced pivots; −1 when a pivot is not finite (or vanishes with floor 0).
     /// With x not null it is carried through the forward substitution on the way.

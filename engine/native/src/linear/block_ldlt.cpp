@@ -333,7 +333,7 @@ void BlockLdlt::raw_scales() {
 }
 
 kernel::Factor BlockLdlt::view() const noexcept {
-    auto* self = const_cast<BlockLdlt*>(this);  // the sweeps of a solve only read
+    auto* self = const_cast<BlockLdlt*>(this);  // the passes of a solve only read
     return {columns_.data(),      static_cast<std::int64_t>(columns_.size()),
             row_size_.data(),     row_offset_.data(),
             targets_.data(),      values_.data(),

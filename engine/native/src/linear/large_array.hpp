@@ -1,4 +1,4 @@
-// A vector for arrays that are swept once per step. Beyond a few megabytes the walk through the page table costs
+// A vector for arrays that are walked through once per step. Beyond a few megabytes the walk through the page table costs
 // as much as the numbers themselves, so large ones ask the kernel for large pages.
 #pragma once
 

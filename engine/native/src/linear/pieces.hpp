@@ -1,4 +1,4 @@
-// Long work comes in pieces, so that whoever asked for it can end it in time.
+// Long work comes in pieces, so that the caller that asked for it can end it in time.
 #pragma once
 
 namespace spook {

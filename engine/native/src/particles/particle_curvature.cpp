@@ -75,7 +75,7 @@ void ParticleSystem::half_kick_back() {
     }
     if (!stiff_strings_)
         for (Link& link : rows_.link) link.lambda = 0.0;
-    parts_.sweeps.work = {};
+    parts_.pgs.work = {};
     parts_.saddle.count_from_here();
 }
 

@@ -60,9 +60,9 @@ ParticleSystem::ParticleSystem(const ParticleScene& scene, StageList stages)
     first_rhs_.resize(rows_.size());
     const ParticleMethod& method = scene.method;
     const bool composed = half_step_ && method.composition > 2;
-    parts_.sweeps.iterations = method.iterations;
-    parts_.sweeps.tolerance = method.residual_tolerance;
-    parts_.sweeps.prepare(nodes_);
+    parts_.pgs.iterations = method.iterations;
+    parts_.pgs.tolerance = method.residual_tolerance;
+    parts_.pgs.prepare(nodes_);
     if (parts_.solver == ParticleSolver::block)
         parts_.saddle.analyse(nodes_, rows_,
                               {parts_.h, method.floor, method.refinements, stiff_strings_, !composed});
@@ -106,7 +106,7 @@ void ParticleSystem::lay_out_plain() {
 void ParticleSystem::reset(StageClock* clock) {
     clock_ = clock;
     velocity_ready_ = false;
-    parts_.sweeps.work = {};
+    parts_.pgs.work = {};
     parts_.saddle.reset();
     for (int body = 0; body < bodies(); ++body) {
         nodes_.x[nodes_.of_body[body]] = scene_.bodies[body].position;

@@ -7,7 +7,7 @@
 #include "particles/open_paths.hpp"
 #include "particles/particle_forces.hpp"
 #include "particles/particle_nodes.hpp"
-#include "particles/row_sweeps.hpp"
+#include "particles/row_pgs.hpp"
 #include "particles/saddle_blocks.hpp"
 
 namespace spook {
@@ -20,7 +20,7 @@ struct ParticleParts {
     ParticleForces forces;
     OpenPaths paths;      // if the rows form open paths, and nothing couples them otherwise
     SaddleBlocks saddle;  // if they branch, close loops or stiffen strings
-    RowSweeps sweeps;     // if they are solved iteratively
+    RowPgs pgs;           // if they are solved iteratively
 };
 
 /// What samplers read at the current sample.

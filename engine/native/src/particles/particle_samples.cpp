@@ -56,7 +56,7 @@ void ParticleSystem::keep(Memory& memory) const {
     memory.lambda.resize(rows_.size());
     for (std::size_t k = 0; k < rows_.size(); ++k) memory.lambda[k] = rows_.link[k].lambda;
     memory.velocity_ready = velocity_ready_;
-    memory.sweeps = parts_.sweeps.work;
+    memory.pgs = parts_.pgs.work;
     memory.redundancy = parts_.saddle.memory();
     if (composition_) memory.composition = composition_->state();
 }
@@ -66,7 +66,7 @@ void ParticleSystem::go_back(const Memory& memory) {
     nodes_.v = memory.v;
     for (std::size_t k = 0; k < rows_.size(); ++k) rows_.link[k].lambda = memory.lambda[k];
     velocity_ready_ = memory.velocity_ready;
-    parts_.sweeps.work = memory.sweeps;
+    parts_.pgs.work = memory.pgs;
     parts_.saddle.restore(memory.redundancy);
     if (composition_) composition_->go_back(memory.composition);
     unread_ = -1;
@@ -99,7 +99,7 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
                                           parts_.forces.fields().size() * scene_.bodies.size());
     report.counters["rows_assembled"] = inner * rows;
     report.counters["contacts"] = 0;
-    report.counters["sweeps"] = parts_.sweeps.work.sweeps;
+    report.counters["sweeps"] = parts_.pgs.work.pgs_iterations;
     report.counters["back_substitutions"] =
         parts_.solver == ParticleSolver::path || parts_.solver == ParticleSolver::block ? inner * passes : 0;
     std::int64_t blocks = 0;
@@ -118,7 +118,7 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["back_substitutions"] = rows > 0 ? composition_->newton_iterations() : 0;
         report.counters["block_operations"] = composition_->newton_iterations() * blocks;
     }
-    report.residual = parts_.sweeps.work.residual;
+    report.residual = parts_.pgs.work.residual;
 }
 
 std::vector<double> ParticleSystem::final_state() {

@@ -83,7 +83,7 @@ void ParticleSystem::solve_rows_again() {
     switch (parts_.solver) {
         case ParticleSolver::path: parts_.paths.substitute(rows_); break;
         case ParticleSolver::block: parts_.saddle.substitute(nodes_, rows_); break;
-        case ParticleSolver::iterative: parts_.sweeps.solve(nodes_, rows_); break;
+        case ParticleSolver::iterative: parts_.pgs.solve(nodes_, rows_); break;
         case ParticleSolver::none: break;
     }
 }

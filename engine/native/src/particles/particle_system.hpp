@@ -22,7 +22,7 @@ namespace spook {
 
 class ParticleSystem {
 public:
-    /// Built from the stages; throws std::invalid_argument for those it cannot run, or for rows nobody solves.
+    /// Built from the stages; throws std::invalid_argument for those it cannot run, or for rows that no stage solves.
     ParticleSystem(const ParticleScene& scene, StageList stages);
 
     ParticleSystem(const ParticleSystem&) = delete;  // parts refer to each other
@@ -71,7 +71,7 @@ public:
         std::vector<Vec3> x, v;
         std::vector<double> lambda;
         bool velocity_ready = false;
-        RowSweeps::Work sweeps;
+        RowPgs::Work pgs;
         RedundantRows::Memory redundancy;
         ParticleComposition::State composition;
     };

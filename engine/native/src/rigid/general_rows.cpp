@@ -5,7 +5,7 @@
 //   wire       g = Σ |p_(i+1) − p_i| − L     p_i points of bodies or of the world; one-sided: it only pulls, λ <= 0;
 //              + Σ r_k q_k for the drums it is wound on
 //   eye        the wire behind a point of it goes through there at the rate of Σ |p_(i+1) − p_i| over what follows
-//              (and of its drums): kept at zero as far as friction reaches, see following_bounds.hpp
+//              (and of its drums): kept at zero as far as friction reaches, see load_dependent_bounds.hpp
 #include <algorithm>
 #include <numbers>
 

@@ -159,20 +159,20 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
     const Vec3 w1 = first.angular_velocity, w2 = second.angular_velocity;
     const auto spun = [](Vec3 w, Vec3 r) { return cross(w, cross(w, r)); };
     const Vec3 bend = spun(w2, ends.second_arm) - spun(w1, ends.first_arm);
-    const Vec3 parting =
+    const Vec3 separation_rate =
         second.velocity + cross(w2, ends.second_arm) - first.velocity - cross(w1, ends.first_arm);
     if (joint.kind == JointKind::distance) {
         const Vec3 d = joint.span + ends.gap;
-        const double length = norm(d), along = dot(d, parting) / length;
-        *bias = (dot(parting, parting) - along * along + dot(d, bend)) / length;
+        const double length = norm(d), along = dot(d, separation_rate) / length;
+        *bias = (dot(separation_rate, separation_rate) - along * along + dot(d, bend)) / length;
         return;
     }
     Vec3 axes[3];
     for (int k = 0; k < 3; ++k) axes[k] = carried(first, joint.axes[k]);
     const JointHolds holds = joint.holds;
     for (int k = holds.linear_first; k < holds.linear_end; ++k)
-        *bias++ =
-            dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), parting) + dot(spun(w1, axes[k]), ends.gap);
+        *bias++ = dot(axes[k], bend) + 2.0 * dot(cross(w1, axes[k]), separation_rate) +
+                  dot(spun(w1, axes[k]), ends.gap);
     if (holds.turning == Turning::free) return;
     if (holds.turning == Turning::held) {
         // q = t₁* t₂ with t' = ½ w t gives q'' = ¼ t₁* (d w₂ − w₁ d) t₂, d = w₂ − w₁.
@@ -203,9 +203,9 @@ double axial_bias(const JointConstants& joint, const BodyState& first, const Bod
     if (joint.kind != JointKind::prismatic) return dot(turning, w2 - w1);
     const Ends ends(joint, first, second);
     const Vec3 bend = cross(w2, cross(w2, ends.second_arm)) - cross(w1, cross(w1, ends.first_arm));
-    const Vec3 parting =
+    const Vec3 separation_rate =
         second.velocity + cross(w2, ends.second_arm) - first.velocity - cross(w1, ends.first_arm);
-    return dot(axis, bend) + 2.0 * dot(turning, parting) + dot(cross(w1, turning), ends.gap);
+    return dot(axis, bend) + 2.0 * dot(turning, separation_rate) + dot(cross(w1, turning), ends.gap);
 }
 
 AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept {

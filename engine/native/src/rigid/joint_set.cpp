@@ -195,7 +195,7 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
 }
 
 /// The right side of a row that only pushes `inwards`. What the scene began with beyond the limit is no violation: it
-/// would come back as a speed, at a tiny step as megajoules. The bodies are led back instead (given_back()). A rebound goes
+/// would come back as a speed, at a tiny step as megajoules. The bodies are moved back instead (given_back()). A rebound goes
 /// no further within the step than its `room`, to the other end.
 double JointSet::one_sided(double inwards, double violation, double rate, const Regularisation& row,
                            double restitution, double room, State& state, StopRow& stop) noexcept {
@@ -207,8 +207,8 @@ double JointSet::one_sided(double inwards, double violation, double rate, const 
     double value = open ? -violation / time_step_ : row.upsilon * rate - row.violation_gain * violation;
     stop.touching = !open || state.met * inwards > 0.0;
     stop.rebound = 0.0;
-    stop.struck = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
-    if (restitution > 0.0 && stop.struck)
+    stop.hit = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
+    if (restitution > 0.0 && stop.hit)
         value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
     else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
         value = -row.violation_gain * violation;

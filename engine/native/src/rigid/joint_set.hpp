@@ -68,9 +68,9 @@ public:
         bool broken = false;
         signed char at_limit = 0;  // 1 or −1: the lower or upper limit was closed in the last step,
         signed char closed = 0;    // and is in this one
-        signed char met = 0;       // the end at which a blow of the step has left it: it was on its way there
+        signed char met = 0;  // the end at which an impact of the step has left it: it was on its way there
         double rebounds =
-            0.0;  // only what arrives faster than this, m/s or rad/s: a blow of the step has answered it
+            0.0;  // only what arrives faster than this, m/s or rad/s: an impact of the step has answered it
         double given =
             -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
         double angle = 0.0;  // unwrapped coordinate of a hinge that needs it

@@ -41,12 +41,12 @@ void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet
     coordinates_ = 0;
     plane_.clear();
     pivots_.clear();
-    if (hang(tied) && close(start) && order()) return flatten(), free_pivots();
+    if (attach(tied) && close(start) && order()) return flatten(), free_pivots();
     coordinates_ = 0;
 }
 
 /// The forest, by breadth: every body as near to the world as it can be.
-bool JointTree::hang(std::span<const int> tied) {
+bool JointTree::attach(std::span<const int> tied) {
     struct Hung {
         int body, joint, parent;  // joint: −1 if it floats; parent: a body, −1 the world
     };
@@ -162,8 +162,9 @@ bool JointTree::close(const LargeArray<BodyState>& start) {
         loop.block = static_cast<int>(k);
         loop.first = block.first < 0 ? -1 : node_of_[block.first];
         loop.second = block.second < 0 ? -1 : node_of_[block.second];
-        const auto hangs = [&](int node) { return node >= 0 && nodes_[node].joint == block.joint; };
-        if (hangs(loop.first) || hangs(loop.second) || (loop.first < 0 && loop.second < 0)) continue;
+        const auto is_attached = [&](int node) { return node >= 0 && nodes_[node].joint == block.joint; };
+        if (is_attached(loop.first) || is_attached(loop.second) || (loop.first < 0 && loop.second < 0))
+            continue;
         loop.rows = loop.kept = block.size;
         for (int i = 0; i < block.size; ++i) {
             loop.row[i] = i;

@@ -25,7 +25,7 @@ namespace spook {
 
 class JointTree {
 public:
-    /// Takes the scene if it can: every tied body hangs by joints it knows on the world or on a body that floats, in
+    /// Takes the scene if it can: every constrained body is attached by joints it knows to the world or on a body that floats, in
     /// small trees, and what closes loops is not redundant at the start. Empty otherwise.
     void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
                  const LargeArray<BodyState>& start);
@@ -35,7 +35,7 @@ public:
     int rows() const noexcept { return rows_; }
     /// The axis of the world that all hinges turn about and all slides lie across (0: x), if numbers of a plane do; −1.
     int across() const noexcept { return plane_.empty() ? -1 : plane_.normal(); }
-    /// Whether every body hangs on a ball joint of the world and nothing else, and so turns like a free one.
+    /// Whether every body is attached to a ball joint of the world and nothing else, and so turns like a free one.
     bool pivots() const noexcept { return !pivots_.empty(); }
     /// Whether the joints of the forest hold where the bodies are, as joint coordinates take for granted.
     bool holds(const LargeArray<BodyState>& bodies);
@@ -46,8 +46,8 @@ public:
     bool stage(double tau, LargeArray<BodyState>& bodies, double* increments, std::int64_t& rounds) noexcept;
 
 private:
-    struct Node {  // a body with the joint it hangs on; a parent stands before all that hang on it
-        // joint: −1 of a root that floats; end: of the nodes that hang on it.
+    struct Node {  // a body with the joint it is attached to; a parent stands before all attached to it
+        // joint: −1 of a root that floats; end: of the nodes attached to it.
         int body = -1, joint = -1, parent = -1, end = 0;
         int turns = 0, slides = 0;  // coordinates: 0, 1 about the axis or 3; along slide_axes
         int first = 0;              // of its coordinates
@@ -75,7 +75,7 @@ private:
         Vec3 end_place, end_reach, end_along[6];
         Vec3 half;         // vector part of the turn, body axes
         Vec3 momentum;     // angular, world axes
-        Vec3 push, twist;  // momenta gained; then those of all that hangs on it
+        Vec3 push, twist;  // momenta gained; then those of all that is attached to it
     };
     struct Closing {  // a joint that closes a loop, with the rows the forest does not fulfil anyway
         int block, first, second;  // nodes, −1: fixed
@@ -95,7 +95,7 @@ private:
         Vec3 linear[6][2], angular[6][2];
     };
 
-    bool hang(std::span<const int> tied);
+    bool attach(std::span<const int> tied);
     bool close(const LargeArray<BodyState>& start);
     void drop_fulfilled_rows();
     bool independent(const LargeArray<BodyState>& start);

@@ -3,7 +3,7 @@
 // A lock's rows have equal coefficients in all directions, so that the basis they are written in drops out. With x the
 // velocity of the child at the joint (linear, angular), u that of its parent there, μ the impulse on the child there:
 //   x − u + C μ = y,   N x = q + μ,   so   μ = K u + d,   K = (N⁻¹ + C)⁻¹,   d = K (y + C q) − q
-// N and q are mass and momentum of all that hangs on the joint. K and d, moved to the parent's centre, are what its
+// N and q are mass and momentum of all that is attached to the joint. K and d, moved to the parent's centre, are what its
 // own mass and momentum gain: leaves first. Velocities then follow from the root on. This is the elimination of the
 // saddle system [[M, Gᵀ], [G, −Sig]], child before parent, with nothing stored that lever arms say: 6 × 6 numbers
 // a link instead of four blocks of them. K comes from N by one rank-one step per direction, so that C = 0 is exact.

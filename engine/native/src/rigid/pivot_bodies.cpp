@@ -10,7 +10,7 @@ namespace {
 
 /// Turns `axes` (columns) until aᵀ `tensor` a is diagonal for each of them: Jacobi's method. The moments.
 Vec3 principal(Mat3 tensor, Mat3& axes) noexcept {
-    for (int sweep = 0; sweep < 20; ++sweep) {
+    for (int iteration = 0; iteration < 20; ++iteration) {
         bool turned = false;
         for (int p = 0; p < 2; ++p)
             for (int q = p + 1; q < 3; ++q) {

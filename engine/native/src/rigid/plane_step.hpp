@@ -25,7 +25,7 @@ public:
         int refinements = 1, corrections = 0;
         double cap = 0.0;  // of a correction, part of the joint's size
     };
-    /// Takes the scene if every tied body moves in the plane and is held there by hinges, locks, slides and planar joints
+    /// Takes the scene if every constrained body moves in the plane and is held there by hinges, locks, slides and planar joints
     /// on each other, and somewhere on what is fixed. Empty otherwise.
     void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
                  const Options& options);
@@ -41,12 +41,12 @@ public:
                const LargeArray<BodyState>& bodies);
 
     void read(const LargeArray<BodyState>& bodies) noexcept;
-    /// All of a tied body's state but its inertia in world axes.
+    /// All of a constrained body's state but its inertia in world axes.
     void write(LargeArray<BodyState>& bodies) const noexcept;
 
     /// The impulses of a step and the velocities they lead to. False where a pivot is too small.
     bool find_velocities() noexcept;
-    /// Twice the kinetic energy of the k-th tied body with those velocities [J].
+    /// Twice the kinetic energy of the k-th constrained body with those velocities [J].
     double motion(int k) const noexcept {
         const Node& n = nodes_[k];
         return n.mass * dot(n.next_velocity, n.next_velocity) + n.next_spin * n.next_rate;
@@ -55,7 +55,7 @@ public:
     /// Of all rows of the scene, where the step before began.
     void read_violations(std::span<const double> all) noexcept;
     void write_violations(std::span<double> all) const noexcept;
-    /// Velocity and angular momentum of the k-th tied body before the last take_velocities().
+    /// Velocity and angular momentum of the k-th constrained body before the last take_velocities().
     void read_before(int k, Vec3 velocity, Vec3 spin) noexcept {
         nodes_[k].next_velocity = plane_(velocity);
         nodes_[k].next_spin = spin[plane_.normal];

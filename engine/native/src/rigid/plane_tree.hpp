@@ -17,9 +17,9 @@ namespace spook {
 
 class PlaneTree {
 public:
-    /// A body on one hinge or slide; a parent stands before all that hang on it.
+    /// A body on one hinge or slide; a parent stands before all attached to it.
     struct Node {
-        int body = -1, parent = -1, end = 0;  // end: of the nodes that hang on it
+        int body = -1, parent = -1, end = 0;  // end: of the nodes attached to it
         bool slides = false;
         int place = 0;            // of its coordinate among the unknowns
         Vec2 parent_arm, arm;     // from the centres to the joint, at the start
@@ -69,7 +69,7 @@ private:
         TurnLessOne turned;
         Vec2 shift;
         double spins = 0.0;
-        Vec2 push;  // momenta gained; then those of all that hangs on it
+        Vec2 push;  // momenta gained; then those of all that is attached to it
         double twist = 0.0;
         Vec2 end_place, end_centre, end_along;
         HalfTurn pose;  // since the scene's start

@@ -65,7 +65,7 @@ void RigidSystem::composed_step(double h, int depth) {
     ++live_.stage_steps;
     if (solved) return;
     if (depth + 1 == MOST_HALVINGS) {
-        live_.lost = tied_.empty() ? free_.front() : tied_.front();
+        live_.lost = constrained_.empty() ? free_.front() : constrained_.front();
         return;
     }
     live_.bodies = start;
@@ -127,7 +127,7 @@ void RigidSystem::guess(std::size_t stage, double span) {
 void RigidSystem::remember(std::size_t stage, double span) {
     double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
     // A loop can come to a singular position, where long extrapolation leads into another of its branches.
-    const bool loops = !in_tree_ && joints_.count() > static_cast<int>(tied_.size());
+    const bool loops = !in_tree_ && joints_.count() > static_cast<int>(constrained_.size());
     const auto known =
         static_cast<int>(std::min<std::int64_t>(live_.stage_steps, loops ? 3 : DIFFERENCES - 1));
     for (std::size_t i = 0; i < unknowns_; ++i) bias_[i] = multiplier_[i] / span;
@@ -171,7 +171,7 @@ bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
     if (clock_) clock_->mark(Stage::assemble_rows);
     if (!hold_rows(tau)) return false;
     if (!in_tree_) remember(stage, span);
-    for (int i : tied_) {
+    for (int i : constrained_) {
         BodyState& s = live_.bodies[i];
         s.displacement = trial_[i].displacement;
         if (constants_[i].particle) continue;
@@ -190,7 +190,7 @@ bool RigidSystem::composed_stage(double tau, std::size_t stage) {
         if (!hold_stage(tau, span, stage)) return false;
         if (clock_) clock_->mark(Stage::solve_block);
     } else {
-        for (int i : tied_) integrate_body(i);
+        for (int i : constrained_) integrate_body(i);
     }
     for (const std::vector<int>* some : {&free_, &driven_})
         for (int i : *some)
@@ -210,7 +210,7 @@ void RigidSystem::read_composition() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     const auto blocks = joints_.blocks();
     const auto solve = [&] {  // multiplier_ from the rows' right sides
-        if (!factor_and_solve()) live_.not_solved = tied_.front();
+        if (!factor_and_solve()) live_.not_solved = constrained_.front();
         for (std::size_t row = 0; row < rows; ++row) multiplier_[row] = -solution_[row];
     };
     assemble_blocks();
@@ -221,12 +221,12 @@ void RigidSystem::read_composition() {
         for (int i = 0; i < blocks[k].size; ++i, ++row) right_[row] = -row_speed(k, i, false);
     solve();
     push(multiplier_.data());
-    for (int i : tied_)
+    for (int i : constrained_)
         if (!constants_[i].particle) refresh(constants_[i], live_.bodies[i]);
     find_bias(bias_.data());
     double* right = right_.data() + rows;
     for (row = 0; row < rows; ++row) right_[row] = -h_ * bias_[row];
-    for (int i : tied_) {
+    for (int i : constrained_) {
         const Vec3 p = constants_[i].mass * kick(i), l = h_ * constants_[i].torque;
         for (int k = 0; k < 3; ++k) *right++ = p[k];
         for (int k = 0; k < 3 && !constants_[i].particle; ++k) *right++ = l[k];

@@ -29,7 +29,7 @@ void RigidSystem::find_bias(double* bias) const {
 }
 
 /// Places for what each step compares, also where surfaces may touch and none does.
-void RigidSystem::make_room_beyond() {
+void RigidSystem::make_room_for_half_step() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     trial_ = live_.bodies;
     violation_.assign(rows, 0.0);
@@ -58,9 +58,9 @@ void RigidSystem::start_half_step() {
             fill_block_momenta();
             find_bias(bias_.data());
             for (std::size_t row = 0; row < rows; ++row) right_[row] -= h_ * bias_[row];
-            if (!factor_and_solve()) live_.not_solved = tied_.front();
+            if (!factor_and_solve()) live_.not_solved = constrained_.front();
             const double* x = solution_.data() + rows;
-            for (int i : tied_) {
+            for (int i : constrained_) {
                 const Vec3 v{x[0], x[1], x[2]};
                 x += 3;
                 if (constants_[i].particle) {
@@ -78,7 +78,7 @@ void RigidSystem::start_half_step() {
 }
 
 /// The same with contacts, which have no accelerations to ask for: half of what a whole step would change. Where they last
-/// and surfaces are flat that is the same; a blow in it, or a gap that closes, is of order 1 in any case.
+/// and surfaces are flat that is the same; an impact in it, or a gap that closes, is of order 1 in any case.
 void RigidSystem::start_half_step_touching() {
     const Live start = live_;
     const MixedSystem mixed = mixed_;
@@ -88,7 +88,7 @@ void RigidSystem::start_half_step_touching() {
     mixed_ = mixed;
     contacts_ = fresh_contacts_;
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
-    rounds_ = sweeps_ = 0;
+    rounds_ = pgs_iterations_ = 0;
     residual_ = 0.0;
     for (int i = 0; i < bodies(); ++i) {
         if (!constants_[i].moves()) continue;
@@ -126,9 +126,9 @@ double RigidSystem::row_speed(int block, int row, bool solved) const {
         const double* j = end_rows(block, end) + 6 * row;
         const BodyState& s = live_.bodies[body];
         Vec3 v = s.velocity, w = s.angular_velocity;
-        if (solved && slot_[body] >= 0) {
-            const double* x =
-                solution_.data() + matrix_.offset(static_cast<int>(joints_.blocks().size()) + slot_[body]);
+        if (solved && solver_index_[body] >= 0) {
+            const double* x = solution_.data() +
+                              matrix_.offset(static_cast<int>(joints_.blocks().size()) + solver_index_[body]);
             v = {x[0], x[1], x[2]};
             w = constants_[body].particle ? Vec3{} : Vec3{x[3], x[4], x[5]};
         }
@@ -160,7 +160,7 @@ void RigidSystem::correct_curvature() {
     std::vector<double>& ahead = bias_;
     for (int round = 0; round < method_.corrections; ++round) {
         const double* x = solution_.data() + rows_;
-        for (int i : tied_) {
+        for (int i : constrained_) {
             BodyState& s = trial_[i];
             s = live_.bodies[i];
             s.velocity = {x[0], x[1], x[2]};

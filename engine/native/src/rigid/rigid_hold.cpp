@@ -27,8 +27,8 @@ void RigidSystem::prepare_hold() {
     change_.assign(rows, 0.0);
     last_plain_ = last_step_ = change_;
     mixing_.assign(2 * rows * MIXED, 0.0);
-    rate_.assign(tied_.size(), {});
-    axes_.assign(tied_.size(), {});
+    rate_.assign(constrained_.size(), {});
+    axes_.assign(constrained_.size(), {});
     extent_.clear();
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
         for (int i = 0; i < blocks[k].size; ++i) extent_.push_back(joints_.gain(k, i).extent);
@@ -60,7 +60,7 @@ bool RigidSystem::factor_dense() {
         const double *mine = end_rows(m.block, m.end), *its = end_rows(m.other, m.other_end);
         const double over = 1.0 / constants_[body].mass;
         const BodyConstants& c = constants_[body];
-        const Mat3& r = axes_[slot_[body]];
+        const Mat3& r = axes_[solver_index_[body]];
         for (int i = 0; i < blocks[m.block].size; ++i, mine += 6) {
             const Vec3 push = over * Vec3{mine[0], mine[1], mine[2]};
             Vec3 twist;
@@ -81,8 +81,9 @@ bool RigidSystem::factor_dense() {
 
 /// Violations where the momenta lead in τ; the largest, in sizes of its joint; infinite when a body turns too fast.
 double RigidSystem::violations_ahead(double tau) {
-    for (std::size_t k = 0; k < tied_.size(); ++k)
-        if (!lead(constants_[tied_[k]], axes_[k], tau, live_.bodies[tied_[k]], rate_[k], trial_[tied_[k]]))
+    for (std::size_t k = 0; k < constrained_.size(); ++k)
+        if (!lead(constants_[constrained_[k]], axes_[k], tau, live_.bodies[constrained_[k]], rate_[k],
+                  trial_[constrained_[k]]))
             return std::numeric_limits<double>::infinity();
     violations_at(trial_, violation_.data());
     double worst = 0.0;
@@ -170,9 +171,9 @@ bool RigidSystem::iterate(double tau, bool dense) {
 
 /// Λ for which the rows, assembled at the start of the stage, hold at its end. False if there is none near.
 bool RigidSystem::hold_rows(double tau) {
-    for (std::size_t k = 0; k < tied_.size(); ++k)
-        if (!constants_[tied_[k]].particle)
-            axes_[k] = inertia_axes(constants_[tied_[k]], live_.bodies[tied_[k]]);
+    for (std::size_t k = 0; k < constrained_.size(); ++k)
+        if (!constants_[constrained_[k]].particle)
+            axes_[k] = inertia_axes(constants_[constrained_[k]], live_.bodies[constrained_[k]]);
     for (int i : driven_) {
         trial_[i] = live_.bodies[i];
         move(constants_[i], tau, trial_[i]);

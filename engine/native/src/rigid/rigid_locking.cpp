@@ -31,15 +31,17 @@ constexpr double TOLD = 1e-3;      // of the largest share: a joint that is name
 void RigidSystem::find_loops() {
     if (composed_) return;
     const auto blocks = joints_.blocks();
-    const int world = static_cast<int>(tied_.size());  // all that does not move by itself
-    std::vector<int> closing(tied_.size() + 1), root(tied_.size());
+    const int world = static_cast<int>(constrained_.size());  // all that does not move by itself
+    std::vector<int> closing(constrained_.size() + 1), root(constrained_.size());
     std::iota(closing.begin(), closing.end(), 0);
     std::iota(root.begin(), root.end(), 0);
     const auto find = [](std::vector<int>& up, int i) {
         while (up[i] != i) i = up[i] = up[up[i]];
         return i;
     };
-    const auto place = [&](int body) { return body < 0 || slot_[body] < 0 ? world : slot_[body]; };
+    const auto place = [&](int body) {
+        return body < 0 || solver_index_[body] < 0 ? world : solver_index_[body];
+    };
     std::vector<int> anchor(blocks.size(), -1),
         closes;  // per block: one of its members; some member of a loop
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
@@ -56,7 +58,7 @@ void RigidSystem::find_loops() {
         if (a == b && anchor[k] >= 0) closes.push_back(anchor[k]);
         closing[a] = b;
     }
-    std::vector<int> loop_of(tied_.size(), -1), at(tied_.size());
+    std::vector<int> loop_of(constrained_.size(), -1), at(constrained_.size());
     for (int member : closes) {
         int& loop = loop_of[find(root, member)];
         if (loop >= 0) continue;
@@ -95,7 +97,7 @@ void RigidSystem::find_loops() {
         Loop& loop = loops_[index];
         std::vector<int> sizes;
         for (int k : loop.blocks) sizes.push_back(blocks[k].size);
-        for (int member : loop.members) sizes.push_back(constants_[tied_[member]].particle ? 3 : 6);
+        for (int member : loop.members) sizes.push_back(constants_[constrained_[member]].particle ? 3 : 6);
         std::vector<std::uint8_t> is_row(sizes.size(), 0);
         std::fill_n(is_row.begin(), loop.blocks.size(), std::uint8_t{1});
         loop.probe.analyse(sizes, edges[index], is_row, true);
@@ -157,7 +159,7 @@ void RigidSystem::find_extents(Loop& loop) {
     const int rows = static_cast<int>(loop.blocks.size());
     for (const BlockEdge& edge : loop.probe.edges()) {
         const JointBlock& block = joints_.blocks()[loop.blocks[edge.first]];
-        const int k = edge.second - rows, body = tied_[loop.members[k]];
+        const int k = edge.second - rows, body = constrained_[loop.members[k]];
         if (body != block.first && body != block.second) continue;
         const JointSet::State& state = joints_.states[block.joint];
         const Vec3 arm = body == block.second ? state.second_reach : state.first_reach;
@@ -179,7 +181,7 @@ double RigidSystem::motion_of(const Loop& loop) const {
     double motion = 0.0;  // J
     const int row_blocks = static_cast<int>(joints_.blocks().size());
     for (int member : loop.members) {
-        const int i = tied_[member];
+        const int i = constrained_[member];
         const double* x = solution_.data() + matrix_.offset(row_blocks + member);
         const Vec3 v{x[0], x[1], x[2]};
         motion += 0.5 * constants_[i].mass * dot(v, v);
@@ -232,7 +234,7 @@ void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
     const double* y =
         loop.repeated.data() + loop.weakness.size();  // minus the change of the probe's velocities
     for (std::size_t k = 0; k < loop.members.size(); ++k) {
-        const int i = tied_[loop.members[k]];
+        const int i = constrained_[loop.members[k]];
         const double* x = solution_.data() + matrix_.offset(row_blocks + loop.members[k]);
         const BodyConstants& body = constants_[i];
         const BodyState& s = live_.bodies[i];
@@ -266,21 +268,21 @@ void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
 /// 2 J of what motors and springs alone would set in motion.
 double RigidSystem::driven(const Loop& loop) {
     if (loop.drives.empty()) return 0.0;
-    push_.assign(tied_.size(), {});
+    push_.assign(constrained_.size(), {});
     for (int k : loop.drives) {
         const JointBlock& block = joints_.blocks()[k];
         for (const bool second : {false, true}) {
             const int body = second ? block.second : block.first;
-            if (body < 0 || slot_[body] < 0) continue;
+            if (body < 0 || solver_index_[body] < 0) continue;
             const double* j = jacobian(k, second);
             for (int i = 0; i < block.size; ++i)
                 for (int axis = 0; axis < 6; ++axis, ++j)
-                    push_[slot_[body]][axis] += *j * solution_[matrix_.offset(k) + i];
+                    push_[solver_index_[body]][axis] += *j * solution_[matrix_.offset(k) + i];
         }
     }
     double sum = 0.0;
     for (int member : loop.members) {
-        const int i = tied_[member];
+        const int i = constrained_[member];
         const Vec6& p = push_[member];
         const Vec3 linear{p[0], p[1], p[2]}, twist{p[3], p[4], p[5]};
         sum += dot(linear, linear) / constants_[i].mass;
@@ -324,7 +326,7 @@ std::vector<double> RigidSystem::shares(const Loop& loop) const {
 }
 
 /// Redundant rows had to be told apart, which those that agree need not: of which loop?
-void RigidSystem::note_parted() {
+void RigidSystem::note_projected() {
     const Loop* worst = nullptr;
     double largest = 0.0;
     for (Loop& loop : loops_) {

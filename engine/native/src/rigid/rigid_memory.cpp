@@ -8,7 +8,7 @@ namespace spook {
 
 void RigidSystem::keep(Memory& memory) const {
     if (contacts_ && live_.velocity_ready) {
-        memory = before_ahead_;
+        memory = before_solve_ahead_;
         return;
     }
     memory.redundancy = redundant_.memory();
@@ -65,7 +65,7 @@ void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
     if (in_plane_) leave_plane();
     in_plane_ = false;
     const Load before = steady_.empty() ? Load{constants.force, constants.torque} : steady_[body];
-    if (!is_zero(force - before.force) || !is_zero(torque - before.torque)) stir(body);
+    if (!is_zero(force - before.force) || !is_zero(torque - before.torque)) mark_moving(body);
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
     constants.force = force;
     constants.torque = torque;

@@ -18,8 +18,8 @@ void RigidSystem::take_plane() {
     at_hand_ = true;
     if (method_.corrections > 0) plane_.read_violations(live_.last_violation);
     if (!half_step_) return;
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const BodyMomenta& before = live_.before[tied_[k]];
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
+        const BodyMomenta& before = live_.before[constrained_[k]];
         plane_.read_before(static_cast<int>(k), before.velocity, before.angular_momentum);
     }
 }
@@ -28,16 +28,16 @@ void RigidSystem::write_plane() {
     plane_.write(live_.bodies);
     if (method_.corrections > 0) plane_.write_violations(live_.last_violation);
     if (!half_step_) return;
-    for (std::size_t k = 0; k < tied_.size(); ++k)
-        live_.before[tied_[k]] = {plane_.velocity_before(static_cast<int>(k)),
-                                  plane_.spin_before(static_cast<int>(k))};
+    for (std::size_t k = 0; k < constrained_.size(); ++k)
+        live_.before[constrained_[k]] = {plane_.velocity_before(static_cast<int>(k)),
+                                         plane_.spin_before(static_cast<int>(k))};
 }
 
 /// The bodies as steps in space need them.
 void RigidSystem::leave_plane() {
     if (at_hand_) write_plane();
     at_hand_ = false;
-    for (int i : tied_) refresh(constants_[i], live_.bodies[i]);
+    for (int i : constrained_) refresh(constants_[i], live_.bodies[i]);
 }
 
 /// False if the step is one for the space.

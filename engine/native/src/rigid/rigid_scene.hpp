@@ -149,7 +149,7 @@ struct RigidMethod {
     double residual_tolerance = 1e-10;  // m/s
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;              // m/s
-    double sleep_speed = 0.0, sleep_after = 0.5;  // m/s, s: who is slower for so long sleeps; 0: nobody
+    double sleep_speed = 0.0, sleep_after = 0.5;  // m/s, s: what is slower for so long sleeps; 0: none
     int threads = 1;                              // of the contact stage
     int composition = 2;                // order; above 2 a symmetric composition of constrained steps
     bool string_stiffness = false;      // the geometric stiffness of loaded joints, implicitly
@@ -157,7 +157,7 @@ struct RigidMethod {
     int corrections = 0;                // extra solves per step for the curvature of the rows
     double correction_cap = 0.3;        // of the joint's arms, or rad
     bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs
-    bool force_rotation = false;   // give particles a rotation nobody sees, to measure what it costs
+    bool force_rotation = false;   // give particles a rotation that is not seen, to measure what it costs
     bool force_block = false;      // factor blocks also where numbers of a plane would do
 };
 

@@ -1,10 +1,10 @@
 // Sleeping: bodies at rest are left out of the steps until something comes to them.
 //
-// Bodies that hang together by contacts, joints or springs are an island; what does not move by itself joins none. An
+// Bodies that are connected by contacts, joints or springs are an island; what does not move by itself joins none. An
 // island whose bodies all were slower than the method's sleep_speed, |v| + |w| r and as measured by where they got,
 // for so many steps in a row falls asleep: velocities zero, places as they are to the last bit, forces to be read as
-// they were. It takes no part in a step but for being met: it stays in the search for pairs of those who are awake,
-// at rest. Whatever gets a point with a sleeper, or moves what it touches or hangs on, wakes its island, and the
+// they were. It takes no part in a step but for being met: it stays in the search for pairs of those that are awake,
+// at rest. Whatever gets a point with a sleeper, or moves what it touches or is attached to, wakes its island, and the
 // velocities of that step are found anew: nothing was moved yet. Falling asleep takes the kinetic energy that was left,
 // and lying there neither takes nor gives any.
 //
@@ -29,10 +29,10 @@ void RigidSystem::take_sleep(const RigidScene& scene) {
     if (!(method_.sleep_speed > 0.0) || !fresh_contacts_ || !fresh_contacts_->possible()) return;
     SleepRules& rules = sleep_rules_;
     rules.may.assign(constants_.size(), 0);
-    for (const int i : tied_) rules.may[i] = 1;
+    for (const int i : constrained_) rules.may[i] = 1;
     for (std::size_t i = 0; i < floaters_.size(); ++i)
         if (!floaters_[i].empty()) rules.may[i] = 0;
-    std::vector<char> driven(scene.joints.size(), !following_.empty());
+    std::vector<char> driven(scene.joints.size(), !load_dependent_.empty());
     for (const TimeDrive& drive : drives_) {
         if (drive.kind == DriveKind::load) rules.may[drive.index] = 0;
         if (drive.kind == DriveKind::motor || drive.kind == DriveKind::push || drive.kind == DriveKind::rest)
@@ -64,7 +64,7 @@ void RigidSystem::take_sleep(const RigidScene& scene) {
         rules.reach.push_back(reach);
     }
     rules.after = static_cast<std::int64_t>(std::max(1.0, std::ceil(method_.sleep_after / h_ - 1e-9)));
-    left_.resize(constants_.size());
+    start_places_.resize(constants_.size());
 }
 
 void RigidSystem::begin_sleep() {
@@ -77,7 +77,7 @@ void RigidSystem::begin_sleep() {
 /// Sleepers get no part of their forces.
 void RigidSystem::leave_out_sleepers() {
     if (live_.sleep.sleepers == 0) return;
-    for (const int i : tied_)
+    for (const int i : constrained_)
         if (asleep(i)) share_[i] = 0.0;
 }
 
@@ -88,9 +88,9 @@ bool RigidSystem::rests(int block) const noexcept {
 }
 
 /// Whether an island of what parts sleeps, and nothing is to be parted there.
-bool RigidSystem::rests(const std::vector<int>& parted) const {
-    return live_.sleep.sleepers > 0 && std::all_of(parted.begin(), parted.end(), [this](int k) {
-               return asleep(tied_[k]) && parting_->velocity[k] == Vec6{};
+bool RigidSystem::rests(const std::vector<int>& members) const {
+    return live_.sleep.sleepers > 0 && std::all_of(members.begin(), members.end(), [this](int k) {
+               return asleep(constrained_[k]) && projection_->velocity[k] == Vec6{};
            });
 }
 
@@ -108,10 +108,11 @@ void RigidSystem::keep_jacobians() {
 
 /// The velocities of a step that some bodies may sleep through.
 void RigidSystem::velocities_beside_sleepers() {
-    wake_carried();
+    wake_by_moving_bodies();
     while (live_.sleep.sleepers > 0) {
-        const auto stands = [this](int i) { return !stirs(i); };
-        if (live_.sleep.sleepers == tied_.size() && std::all_of(driven_.begin(), driven_.end(), stands)) {
+        const auto stands = [this](int i) { return !is_moving(i); };
+        if (live_.sleep.sleepers == constrained_.size() &&
+            std::all_of(driven_.begin(), driven_.end(), stands)) {
             contacts_->sleep_through();
             touching_ = false;
             return;
@@ -122,32 +123,32 @@ void RigidSystem::velocities_beside_sleepers() {
         leave_out_sleepers();
         find_velocities();
         share_.clear();
-        if (contacts_->roused().empty()) return;
-        const std::vector<int> roused = contacts_->roused();
+        if (contacts_->woken().empty()) return;
+        const std::vector<int> woken = contacts_->woken();
         go_back(before_waking_);
         residual_ = residual;
-        wake(roused);
+        wake(woken);
     }
     find_velocities();
 }
 
 /// Whether a body that moves as it is told does so.
-bool RigidSystem::stirs(int i) const noexcept {
+bool RigidSystem::is_moving(int i) const noexcept {
     const BodyState& s = live_.bodies[i];
     return constants_[i].motion == Motion::kinematic &&
            norm(s.velocity) + sleep_rules_.reach[i] * norm(s.angular_velocity) >
                rounding * method_.sleep_speed;
 }
 
-/// Wakes whom a body that moves as it is told touches or holds.
-void RigidSystem::wake_carried() {
+/// Wakes the bodies that a body that moves as it is told touches or holds.
+void RigidSystem::wake_by_moving_bodies() {
     if (live_.sleep.sleepers == 0 || driven_.empty()) return;
     std::vector<char> told(constants_.size(), 0);
     bool some = false;
     for (const int i : driven_) {
-        told[i] = stirs(i);
+        told[i] = is_moving(i);
         some = some || told[i] != 0;
-        contacts_->stir(i, told[i] != 0);
+        contacts_->mark_moving(i, told[i] != 0);
     }
     if (!some) return;
     std::vector<int> met = contacts_->touching(told);
@@ -158,7 +159,7 @@ void RigidSystem::wake_carried() {
     wake(met);
 }
 
-/// Wakes the islands of some bodies; who is awake begins anew to be at rest.
+/// Wakes the islands of some bodies; what is awake begins anew to be at rest.
 void RigidSystem::wake(const std::vector<int>& met) {
     Sleep& sleep = live_.sleep;
     std::vector<char> wakes(constants_.size() + 1, 0);
@@ -168,7 +169,7 @@ void RigidSystem::wake(const std::vector<int>& met) {
     }
     wakes[0] = 0;
     std::vector<int> woken;
-    for (const int i : tied_)
+    for (const int i : constrained_)
         if (wakes[sleep.island[i]]) woken.push_back(i);
     if (woken.empty()) return;
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {  // rows start from what they held
@@ -187,43 +188,43 @@ void RigidSystem::wake(const std::vector<int>& met) {
 }
 
 /// What acts on a body has been changed from outside.
-void RigidSystem::stir(int body) {
+void RigidSystem::mark_moving(int body) {
     if (sleep_rules_.on() && body >= 0) wake({body});
 }
 
-void RigidSystem::stir_joint(int joint) {
+void RigidSystem::wake_joint(int joint) {
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
         const JointBlock& block = joints_.blocks()[k];
         if (block.joint != joint) continue;
-        stir(block.first);
-        stir(block.second);
+        mark_moving(block.first);
+        mark_moving(block.second);
     }
 }
 
 /// Where bodies are as a step begins.
 void RigidSystem::note_places() {
-    for (const int i : tied_) left_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
+    for (const int i : constrained_) start_places_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
 }
 
 /// How fast a body's surface was in the step: by its velocities, or by where it got if that is more, m/s.
 double RigidSystem::pace(int i) const noexcept {
     const BodyState& s = live_.bodies[i];
-    const double way = norm(s.displacement - left_[i].displacement) / h_;
+    const double way = norm(s.displacement - start_places_[i].displacement) / h_;
     double speed = std::max(norm(s.velocity), way);
     if (constants_[i].particle) return speed;
-    const Quat turn = s.turn * conjugate(left_[i].turn);
+    const Quat turn = s.turn * conjugate(start_places_[i].turn);
     const double turned = 2.0 * norm(Vec3{turn.x, turn.y, turn.z}) / h_;
     return speed + sleep_rules_.reach[i] * std::max(norm(s.angular_velocity), turned);
 }
 
-/// The end of a step: who was met by what parted is awake, and islands that have been at rest fall asleep.
+/// The end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
 void RigidSystem::fall_asleep() {
     Sleep& sleep = live_.sleep;
-    if (!contacts_->roused().empty()) wake(contacts_->roused());
+    if (!contacts_->woken().empty()) wake(contacts_->woken());
     sleep.slept += static_cast<std::int64_t>(sleep.sleepers);
     const bool broke = !joints_.breaks.empty() && joints_.breaks.back().step == live_.step;
     bool some = false;
-    for (const int i : tied_) {
+    for (const int i : constrained_) {
         if (asleep(i)) continue;
         const bool still = sleep_rules_.may[i] != 0 && !broke && pace(i) < method_.sleep_speed;
         sleep.quiet[i] = still ? std::min(sleep.quiet[i] + 1, sleep_rules_.after) : 0;
@@ -234,22 +235,22 @@ void RigidSystem::fall_asleep() {
     std::vector<char> kept_up(constants_.size(), 0);
     const auto tie = [&](int a, int b) {
         for (const auto& [one, other] : {IndexPair{a, b}, IndexPair{b, a}})
-            if (stirs(other)) kept_up[one] = 1;
+            if (is_moving(other)) kept_up[one] = 1;
         arrays_.finder.tie(constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1);
     };
     for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
-    for (const ContactStage::Touch& touch : contacts_->touches()) {
-        tie(touch.contact.first, touch.contact.second);
-        if (contacts_->conveys(touch.contact))
-            kept_up[touch.contact.first] = kept_up[touch.contact.second] = 1;
+    for (const ContactStage::CachedContact& cached : contacts_->cached_contacts()) {
+        tie(cached.contact.first, cached.contact.second);
+        if (contacts_->conveys(cached.contact))
+            kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;
     }
-    for (const int i : tied_) arrays_.finder.tie(i, i);
+    for (const int i : constrained_) arrays_.finder.tie(i, i);
     const Islands& islands = arrays_.finder.find();
     std::vector<char> awake(static_cast<std::size_t>(islands.count), 0);
-    for (const int i : tied_)
+    for (const int i : constrained_)
         if (sleep.quiet[i] < sleep_rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;
     std::vector<int> tired, first(static_cast<std::size_t>(islands.count), 0);
-    for (const int i : tied_) {
+    for (const int i : constrained_) {
         const int island = islands.of_body[i];
         if (asleep(i) || awake[island]) continue;
         if (first[island] == 0) first[island] = i + 1;

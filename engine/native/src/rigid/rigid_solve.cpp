@@ -12,17 +12,17 @@ void RigidSystem::analyse_block() {
     const int row_blocks = static_cast<int>(blocks.size());
     std::vector<int> sizes;
     std::vector<BlockEdge> edges;
-    std::vector<std::uint8_t> is_constraint(blocks.size() + tied_.size(), 0);
+    std::vector<std::uint8_t> is_constraint(blocks.size() + constrained_.size(), 0);
     places_.assign(blocks.size(), {});
     std::size_t wide = 0;
     for (int k = 0; k < row_blocks; ++k) {
         sizes.push_back(blocks[k].size);
         is_constraint[k] = 1;
         const auto tie = [&](int body, int& edge, bool& particle) {
-            if (body < 0 || slot_[body] < 0) return;
+            if (body < 0 || solver_index_[body] < 0) return;
             edge = static_cast<int>(edges.size());
             particle = constants_[body].particle;
-            edges.push_back({k, row_blocks + slot_[body]});
+            edges.push_back({k, row_blocks + solver_index_[body]});
         };
         tie(blocks[k].first, places_[k].first_edge, places_[k].first_particle);
         tie(blocks[k].second, places_[k].second_edge, places_[k].second_particle);
@@ -35,16 +35,16 @@ void RigidSystem::analyse_block() {
         }
     }
     wide_.assign(wide, 0.0);
-    for (int body : tied_) sizes.push_back(constants_[body].particle ? 3 : 6);
+    for (int body : constrained_) sizes.push_back(constants_[body].particle ? 3 : 6);
     matrix_.analyse(sizes, edges, is_constraint, true);
     right_.assign(matrix_.unknowns(), 0.0);
     solution_.assign(matrix_.unknowns(), 0.0);
     redundant_.prepare(matrix_);
     for (int k = 0; k < row_blocks; ++k)
         for (int i = 0; i < sizes[k]; ++i) matrix_.diagonal(k)[i] = -blocks[k].softness[i];
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
         const int block = row_blocks + static_cast<int>(k), n = matrix_.size(block);
-        for (int i = 0; i < 3; ++i) matrix_.diagonal(block)[i * n + i] = constants_[tied_[k]].mass;
+        for (int i = 0; i < 3; ++i) matrix_.diagonal(block)[i * n + i] = constants_[constrained_[k]].mass;
     }
 }
 
@@ -102,9 +102,9 @@ void RigidSystem::assemble_blocks() {
 
 void RigidSystem::fill_inertias() {
     const int row_blocks = static_cast<int>(joints_.blocks().size());
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        if (constants_[tied_[k]].particle) continue;
-        const BodyState& s = live_.bodies[tied_[k]];
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
+        if (constants_[constrained_[k]].particle) continue;
+        const BodyState& s = live_.bodies[constrained_[k]];
         double* diagonal = matrix_.diagonal(row_blocks + static_cast<int>(k)) + 21;
         for (int row = 0; row < 3; ++row) std::copy_n(s.inertia.m + 3 * row, 3, diagonal + 6 * row);
         for (int i = 0; stiff_ && i < 9; ++i) diagonal[6 * (i / 3) + i % 3] += stiffness_[k].m[i];
@@ -113,8 +113,8 @@ void RigidSystem::fill_inertias() {
 
 void RigidSystem::fill_block_momenta() {
     double* right = right_.data() + rows_;
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const int i = tied_[k];
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
+        const int i = constrained_[k];
         const BodyConstants& body = constants_[i];
         const BodyState& s = live_.bodies[i];
         const Vec3 p = body.mass * (s.velocity + kick(i));
@@ -147,21 +147,21 @@ void RigidSystem::solve_locked() {
             next_[body] = {v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z};
         });
         if (finite && meet_late()) return solve_mixed(true);
-        for (int i : tied_)
+        for (int i : constrained_)
             if (finite)
                 take(i, {{next_[i][0], next_[i][1], next_[i][2]}, {next_[i][3], next_[i][4], next_[i][5]}});
     } else {
         finite = locked_.solve(live_.bodies, loads, method_.refinements, take);
     }
-    if (!finite) live_.not_solved = tied_.front();
-    tied_are_moved_ = at_once && finite;
+    if (!finite) live_.not_solved = constrained_.front();
+    constrained_are_moved_ = at_once && finite;
     undelivered_ = finite;
     if (clock_) clock_->mark(Stage::solve_block);
 }
 
 void RigidSystem::solve_block() {
     if (!locked_.empty()) return solve_locked();
-    if (stiff_) stiffen();
+    if (stiff_) add_geometric_stiffness();
     assemble_blocks();
     fill_inertias();
     fill_block_momenta();
@@ -169,13 +169,13 @@ void RigidSystem::solve_block() {
     if (clock_) clock_->mark(Stage::assemble_rows);
 
     if (!factor_and_solve()) {
-        live_.not_solved = tied_.front();
+        live_.not_solved = constrained_.front();
         return;
     }
     if (contacts_) {
         next_ = free_velocities_;
         const double* x = solution_.data() + rows_;
-        for (int i : tied_) {
+        for (int i : constrained_) {
             const int size = constants_[i].particle ? 3 : 6;
             std::copy_n(x, size, next_[i].data());
             x += size;
@@ -198,7 +198,7 @@ void RigidSystem::take_block_solution() {
         for (int i = 0; i < blocks[k].size; ++i) multiplier[i] = -*x++;
     }
     const bool at_once = !clock_ && !half_step_;  // moved while at hand; a timed run keeps the stages apart
-    for (int i : tied_) {
+    for (int i : constrained_) {
         BodyState& s = live_.bodies[i];
         s.velocity = {x[0], x[1], x[2]};
         x += 3;
@@ -208,7 +208,7 @@ void RigidSystem::take_block_solution() {
         }
         if (at_once) integrate_body(i);
     }
-    tied_are_moved_ = at_once;
+    constrained_are_moved_ = at_once;
 }
 
 bool RigidSystem::factor_and_solve() {
@@ -216,7 +216,7 @@ bool RigidSystem::factor_and_solve() {
         matrix_, method_.floor, right_.data(), solution_.data(), method_.refinements,
         [this](std::span<const double> left) { return settled(left); });
     if (redundant_.finite() && doubtful) find_contradiction();
-    if (redundant_.parted() && method_.corrections == 0 && !composed_) note_parted();
+    if (redundant_.parted() && method_.corrections == 0 && !composed_) note_projected();
     return redundant_.finite();
 }
 
@@ -232,7 +232,7 @@ bool RigidSystem::settled(std::span<const double> left) const {
 
 RigidSystem::Worst RigidSystem::worst_row(std::span<const double> left) const {
     Worst worst;
-    for (int i : tied_) {
+    for (int i : constrained_) {
         const Vec3 v = live_.bodies[i].velocity + kick(i);
         worst.speed = std::max({worst.speed, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
     }
@@ -271,12 +271,12 @@ int RigidSystem::busiest_block() const noexcept {
 }
 
 /// The bodies of a row beyond its first two: into it those that move by themselves, of others their speed.
-void RigidSystem::fill_beyond(int block, RowBlock& rows, BlockRight& numbers,
-                              std::vector<Beyond>& beyond) const {
+void RigidSystem::fill_further(int block, RowBlock& rows, BlockRight& numbers,
+                               std::vector<FurtherBody>& beyond) const {
     beyond.clear();
     const double* gradient = joints_.other_rows();
     for (int body : joints_.others(block)) {
-        Beyond other{slot_[body], {}};
+        FurtherBody other{solver_index_[body], {}};
         std::copy_n(gradient, 6, other.jacobian.data());
         gradient += 6;
         const BodyState& s = live_.bodies[body];
@@ -286,13 +286,13 @@ void RigidSystem::fill_beyond(int block, RowBlock& rows, BlockRight& numbers,
                 dot(other.jacobian, {s.velocity.x, s.velocity.y, s.velocity.z, s.angular_velocity.x,
                                      s.angular_velocity.y, s.angular_velocity.z});
     }
-    rows.beyond = beyond;
+    rows.further = beyond;
 }
 
 void RigidSystem::fill_rows() {
     const auto blocks = joints_.blocks();
     mixed_.rows.resize(blocks.size());
-    beyond_.resize(blocks.size());
+    further_.resize(blocks.size());
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         RowBlock& rows = mixed_.rows[k];
         if (rests(static_cast<int>(k))) {
@@ -304,7 +304,7 @@ void RigidSystem::fill_rows() {
         joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
                          rows.second_jacobian[0].data(), numbers);
         if (!joints_.others(static_cast<int>(k)).empty())
-            fill_beyond(static_cast<int>(k), rows, numbers, beyond_[k]);
+            fill_further(static_cast<int>(k), rows, numbers, further_[k]);
         for (int body : {blocks[k].first, blocks[k].second}) {
             if (body < 0 || constants_[body].motion != Motion::kinematic) continue;
             const BodyState& s = live_.bodies[body];
@@ -327,9 +327,9 @@ void RigidSystem::fill_rows() {
 }
 
 void RigidSystem::fill_masses() {
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const BodyConstants& body = constants_[tied_[k]];
-        const BodyState& s = live_.bodies[tied_[k]];
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
+        const BodyConstants& body = constants_[constrained_[k]];
+        const BodyState& s = live_.bodies[constrained_[k]];
         Mat6& mass = mixed_.mass[k];
         for (int row = 0; row < 3; ++row) {
             mass[7 * row] = body.mass;
@@ -341,8 +341,8 @@ void RigidSystem::fill_masses() {
 }
 
 void RigidSystem::fill_momenta(bool forces) {
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
-        const int i = tied_[k];
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
+        const int i = constrained_[k];
         const BodyState& s = live_.bodies[i];
         const Vec3 p = constants_[i].mass * (forces ? s.velocity + kick(i) : s.velocity);
         const Vec3 l = forces ? s.angular_momentum + twist(i) : s.angular_momentum;
@@ -351,26 +351,26 @@ void RigidSystem::fill_momenta(bool forces) {
 }
 
 void RigidSystem::take_velocities(bool angular_too, const std::function<bool(int)>& untouched) {
-    for (std::size_t k = 0; k < tied_.size(); ++k) {
+    for (std::size_t k = 0; k < constrained_.size(); ++k) {
         const Vec6& v = mixed_.velocity[k];
-        BodyState& s = live_.bodies[tied_[k]];
+        BodyState& s = live_.bodies[constrained_[k]];
         if (untouched && untouched(static_cast<int>(k))) {  // not a bit of it may change
-            if (!angular_too) kick_free_body(tied_[k]);
+            if (!angular_too) kick_free_body(constrained_[k]);
             continue;
         }
         s.velocity = {v[0], v[1], v[2]};
-        if (constants_[tied_[k]].particle) continue;
+        if (constants_[constrained_[k]].particle) continue;
         s.angular_momentum = s.inertia * Vec3{v[3], v[4], v[5]};
         if (angular_too) s.angular_velocity = {v[3], v[4], v[5]};
     }
 }
 
-/// Bodies led to the time of an event take the part of their forces that acts before it.
+/// Bodies moved to the time of an event take the part of their forces that acts before it.
 void RigidSystem::lead_events() {
     share_.assign(constants_.size(), 1.0);
     leave_out_sleepers();
-    for (int i : tied_) {
-        const double lead = contacts_->lead(i);
+    for (int i : constrained_) {
+        const double lead = contacts_->toi_fraction(i);
         if (lead == 0.0) continue;
         BodyState& s = live_.bodies[i];
         const Vec3 twist = lead * h_ * constants_[i].torque;
@@ -401,33 +401,34 @@ void RigidSystem::solve_mixed(bool touching) {
     const auto blocks = joints_.blocks();
     fill_masses();
     if (touching) lead_events();
-    const auto blow = [&] {
+    const auto impact_needed = [&] {
         return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
     };
     bool finite = true;
     other_ends_.clear();
     do {
         fill_rows();
-        while (blow()) impact();
+        while (impact_needed()) impact();
         fill_momenta(true);
         if (clock_) clock_->mark(Stage::assemble_rows);
         finite = touching ? contacts_->solve(mixed_, velocities_) : solve_joints();
-    } while (finite && (blow() || ((!touching || contacts_->ends_passed()) &&
-                                   find_other_ends())));  // the solve may find some that is to come first
+    } while (finite &&
+             (impact_needed() || ((!touching || contacts_->ends_passed()) &&
+                                  find_other_ends())));  // the solve may find some that is to come first
     if (touching) judge_contacts();
-    else if (solver_ == RigidSolver::iterative) judge_sweeps();
+    else if (solver_ == RigidSolver::iterative) judge_pgs();
     if (!finite) {
-        live_.not_solved = tied_.front();
+        live_.not_solved = constrained_.front();
         return;
     }
     if (contacts_ && !touching) {
         next_ = free_velocities_;
-        for (std::size_t k = 0; k < tied_.size(); ++k) next_[tied_[k]] = mixed_.velocity[k];
+        for (std::size_t k = 0; k < constrained_.size(); ++k) next_[constrained_[k]] = mixed_.velocity[k];
         if (meet_late()) return solve_mixed(true);
     }
-    if (!following_.empty() && (touching || solver_ == RigidSolver::iterative)) {
-        following_.begin();
-        following_.follow(mixed_, joints_);  // for the next step: here bounds are a step late
+    if (!load_dependent_.empty() && (touching || solver_ == RigidSolver::iterative)) {
+        load_dependent_.begin();
+        load_dependent_.follow(mixed_, joints_);  // for the next step: here bounds are a step late
     }
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         if (rests(static_cast<int>(k))) continue;
@@ -436,7 +437,7 @@ void RigidSystem::solve_mixed(bool touching) {
         std::copy_n(mixed_.rows[k].multiplier.data(), blocks[k].size, multiplier);
         if (breaks_ && !blocks[k].axial) joints_.break_overloaded(blocks[k].joint, live_.step);
     }
-    if (touching) take_velocities(false, [this](int k) { return !contacts_->held(k); });
+    if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
     else take_velocities(false, {});
     share_.clear();
     if (clock_) clock_->mark(solver_ == RigidSolver::iterative ? Stage::solve_iterative : Stage::pivot);

@@ -80,20 +80,20 @@ void RigidSystem::find_velocities() {
     joints_.begin_step();
     kick_free_bodies();
     if (contacts_ && find_contacts()) {
-        if (contacts_->roused().empty()) solve_mixed(true);
+        if (contacts_->woken().empty()) solve_mixed(true);
     } else if (solver_ == RigidSolver::block && live_.sleep.sleepers == 0) {
         solve_block();
     } else if (solver_ != RigidSolver::none) {
         solve_mixed(false);
     } else {
-        for (int i : tied_) kick_free_body(i);  // bodies that could touch but do not
+        for (int i : constrained_) kick_free_body(i);  // bodies that could touch but do not
     }
 }
 
 /// The velocities of the coming step, before it is begun.
-void RigidSystem::look_ahead() {
+void RigidSystem::solve_ahead() {
     if (live_.velocity_ready) return;
-    if (contacts_) keep(before_ahead_);
+    if (contacts_) keep(before_solve_ahead_);
     velocity_stage();
     if (at_hand_) deliver();
     live_.velocity_ready = true;
@@ -129,22 +129,22 @@ bool RigidSystem::find_contacts() {
         }
     }
     touching_ = contacts_->detect(poses_, velocities_, free_velocities_);
-    if (touching_) note_begin();
+    if (touching_) note_start_of_contacts();
     if (clock_) clock_->mark(Stage::collision);
     return touching_;
 }
 
 /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, next_:
-/// swept with their own they do not. Then the step is to be solved with contacts.
+/// cast along their own they do not. Then the step is to be solved with contacts.
 bool RigidSystem::meet_late() {
     const auto any = [this](auto is) {
         return mixed_values_ && std::any_of(mixed_.rows.begin(), mixed_.rows.end(), is);
     };
-    const bool struck = any([](const RowBlock& block) { return block.stop.struck; }),
+    const bool stop_hit = any([](const RowBlock& block) { return block.stop.hit; }),
                rebounds = any([](const RowBlock& block) { return block.stop.rebound != 0.0; });
-    if (!contacts_->meets(next_, struck, rebounds)) return false;
+    if (!contacts_->meets(next_, stop_hit, rebounds)) return false;
     touching_ = true;
-    note_begin();
+    note_start_of_contacts();
     return true;
 }
 
@@ -153,15 +153,15 @@ void RigidSystem::impact() {
     fill_momenta(false);
     contacts_->impact(mixed_);
     judge_contacts();
-    for (const int i : tied_)
-        if (contacts_->lead(i) > 0.0) share_[i] = 1.0 - contacts_->lead(i);
-    take_velocities(true, [this](int k) { return !contacts_->held(k); });
-    for (std::size_t k = 0; k < tied_.size(); ++k)
-        if (contacts_->held(static_cast<int>(k))) velocities_[tied_[k]] = mixed_.velocity[k];
+    for (const int i : constrained_)
+        if (contacts_->toi_fraction(i) > 0.0) share_[i] = 1.0 - contacts_->toi_fraction(i);
+    take_velocities(true, [this](int k) { return !contacts_->has_rows(k); });
+    for (std::size_t k = 0; k < constrained_.size(); ++k)
+        if (contacts_->has_rows(static_cast<int>(k))) velocities_[constrained_[k]] = mixed_.velocity[k];
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
-        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered || stop.spent) {
+        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered || stop.limit_reached) {
             JointSet::State& state = joints_.states[joints_.blocks()[k].joint];
-            const bool once = method_.impacts == ImpactOrder::simultaneous || stop.spent;
+            const bool once = method_.impacts == ImpactOrder::simultaneous || stop.limit_reached;
             state.rebounds = once ? unbounded : again * std::abs(stop.rebound);
             if (!stop.answered) continue;
             if (stop.rebound == 0.0) state.met = mixed_.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
@@ -197,18 +197,18 @@ bool RigidSystem::solve_joints() {
     std::vector<FrictionPoint> none;
     const FrictionReport report =
         solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
-    sweeps_ += static_cast<std::uint64_t>(report.sweeps);
+    pgs_iterations_ += static_cast<std::uint64_t>(report.pgs_iterations);
     return report.finite && settle_joints();
 }
 
-/// Joints that sweeps have left further off than the method allows are solved directly where few hang together, and from
-/// then on wherever sweeps do not settle: what many of these leave adds up.
+/// Joints that iterations have left further off than the method allows are solved directly where few are connected, and from
+/// then on wherever iterations do not settle: what many of these leave adds up.
 bool RigidSystem::settle_joints() {
     const Islands* islands = nullptr;
     std::vector<std::size_t>& rows = arrays_.rows;
     while (true) {
         const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
-        live_.by_rows = live_.by_rows || worst.residual > tolerated_by_sweeps();
+        live_.by_rows = live_.by_rows || worst.residual > pgs_tolerance();
         if (!live_.by_rows || !(worst.residual > method_.residual_tolerance)) return true;
         const auto island = [&](const RowBlock& block) {
             return islands->of_body[std::max(block.first, block.second)];
@@ -225,7 +225,7 @@ bool RigidSystem::settle_joints() {
         answered.clear();
         for (const RowBlock& block : mixed_.rows) answered.push_back(island(block) != own);
         IslandSolver& direct = arrays_.joint_solver;
-        direct.be_patient({});
+        direct.set_backoff({});
         direct.floor = method_.floor, direct.refinements = method_.refinements;
         std::vector<FrictionPoint> none;
         const FrictionReport report = direct.run(
@@ -239,18 +239,18 @@ bool RigidSystem::settle_joints() {
     }
 }
 
-/// What sweeps may leave of a row, m/s.
-double RigidSystem::tolerated_by_sweeps() const {
+/// What PGS may leave of a row, m/s.
+double RigidSystem::pgs_tolerance() const {
     double speed = 0.0;
     for (const Vec6& v : mixed_.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
     return method_.unsettled_residual + 1e-6 * speed;
 }
 
-/// Holds sweeps over joints alone to what contacts are held to.
-void RigidSystem::judge_sweeps() {
+/// Holds PGS over joints alone to what contacts are held to.
+void RigidSystem::judge_pgs() {
     const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
     residual_ = std::max(residual_, worst.residual);
-    if (!(worst.residual > tolerated_by_sweeps())) return;
+    if (!(worst.residual > pgs_tolerance())) return;
     const int blocks = static_cast<int>(joints_.blocks().size());
     note_unsettled(body_of(worst.row < blocks ? worst.row : other_ends_[worst.row - blocks]), worst.residual);
 }
@@ -260,21 +260,21 @@ void RigidSystem::integrate_body(int i) {
 }
 
 void RigidSystem::integrate_all() {
-    if (!tied_are_moved_)
-        for (int i : tied_)
+    if (!constrained_are_moved_)
+        for (int i : constrained_)
             if (!asleep(i)) integrate_body(i);
-    tied_are_moved_ = false;
+    constrained_are_moved_ = false;
     for (int i : free_) integrate_body(i);
     for (int i : driven_) integrate_body(i);
     if (contacts_ && !contacts_->correction().empty()) {
         const std::vector<Vec6>& extra = contacts_->correction();
-        for (std::size_t k = 0; k < tied_.size(); ++k)
-            if (!asleep(tied_[k]))
-                displace(constants_[tied_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
-                         {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[tied_[k]]);
+        for (std::size_t k = 0; k < constrained_.size(); ++k)
+            if (!asleep(constrained_[k]))
+                displace(constants_[constrained_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
+                         {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[constrained_[k]]);
     }
-    if (joints_.take_given()) lead_back();
-    if (touching_) part_overlaps();
+    if (joints_.take_given()) project_limits();
+    if (touching_) project_overlaps();
     if (clock_) clock_->mark(Stage::integrate_positions);
 }
 

@@ -8,7 +8,7 @@ namespace spook {
 
 namespace {
 
-/// A particle with a rotation nobody sees, to measure what its stages cost.
+/// A particle with a rotation that is not seen, to measure what its stages cost.
 RigidBodySpec turning(RigidBodySpec body) {
     body.particle = false;
     body.inertia = {body.mass, body.mass, body.mass};
@@ -40,7 +40,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if (!springs_.empty() || !fields_.empty()) force_.resize(constants_.size());
     take_loads(scene);
 
-    slot_.assign(constants_.size(), -1);
+    solver_index_.assign(constants_.size(), -1);
     const bool touching = stages_.runs(Stage::collision);
     std::size_t spare = 0;
     for (const JointBlock& block : joints_.blocks()) {
@@ -48,15 +48,15 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         spare_at_.push_back(spare);
         spare += static_cast<std::size_t>(12 * block.size);
         for (int body : {block.first, block.second})
-            if (body >= 0 && constants_[body].moves()) slot_[body] = 0;
+            if (body >= 0 && constants_[body].moves()) solver_index_[body] = 0;
         for (int body : joints_.others(static_cast<int>(spare_at_.size()) - 1))
-            if (constants_[body].moves()) slot_[body] = 0;
+            if (constants_[body].moves()) solver_index_[body] = 0;
     }
     spare_.assign(spare, 0.0);
     for (int body = 0; body < bodies(); ++body)
-        if (slot_[body] == 0 || (touching && constants_[body].moves())) {
-            slot_[body] = static_cast<int>(tied_.size());
-            tied_.push_back(body);
+        if (solver_index_[body] == 0 || (touching && constants_[body].moves())) {
+            solver_index_[body] = static_cast<int>(constrained_.size());
+            constrained_.push_back(body);
         } else if (constants_[body].moves()) {
             free_.push_back(body);
         } else if (constants_[body].motion == Motion::kinematic) {
@@ -84,7 +84,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         const SolverKind solver = stages_.runs(Stage::solve_iterative)   ? SolverKind::iterative
                                   : method_.solver == SolverKind::hybrid ? SolverKind::hybrid
                                                                          : SolverKind::direct;
-        fresh_contacts_.emplace(Detection(scene.colliders, dynamic, scene.no_contact), materials, slot_,
+        fresh_contacts_.emplace(Detection(scene.colliders, dynamic, scene.no_contact), materials,
+                                solver_index_,
                                 ContactOptions{h_, method_.friction, solver, method_.iterations,
                                                method_.residual_tolerance, method_.floor, method_.refinements,
                                                method_.impacts, method_.unsettled_residual, method_.threads},
@@ -101,16 +102,16 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
         !(method_.sleep_speed > 0.0))
-        locked_.analyse(constants_, joints_, tied_);
+        locked_.analyse(constants_, joints_, constrained_);
     if (solver_ == RigidSolver::block && locked_.empty()) analyse_block(), find_loops();
     take_sleep(scene);
     const bool tilted =  // joint coordinates see inertias along the bodies' own axes
         std::any_of(constants_.begin(), constants_.end(),
                     [](const BodyConstants& body) { return body.tilted; });
     if (composed_ && solver_ == RigidSolver::block && !tilted)
-        tree_.analyse(constants_, joints_, tied_, start_);
+        tree_.analyse(constants_, joints_, constrained_, start_);
     if (may_lie_in_plane(scene))
-        plane_.analyse(constants_, joints_, tied_,
+        plane_.analyse(constants_, joints_, constrained_,
                        {h_, method_.refinements, method_.corrections, method_.correction_cap});
     reset(nullptr);
 }
@@ -128,7 +129,7 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     }
     const bool wires = stages_.take(Stage::rub_wires), tyres = stages_.take(Stage::roll_tyres);
     const bool rub = stages_.take(Stage::rub_joints);
-    following_.take(joints_, wires, tyres, rub);
+    load_dependent_.take(joints_, wires, tyres, rub);
     breaks_ = stages_.take(Stage::break_joints);
     const bool coupled = stages_.take(Stage::couple_joints), held = stages_.take(Stage::hold_wires);
     const bool wound = stages_.take(Stage::wind_wires), meshes = stages_.take(Stage::meet_meshes);
@@ -170,7 +171,7 @@ void RigidSystem::take_stages(const RigidScene& scene) {
 
 void RigidSystem::reset(StageClock* clock) {
     live_ = {};
-    tied_are_moved_ = false;
+    constrained_are_moved_ = false;
     at_hand_ = plane_values_ = false;
     plane_solves_ = 0;
     replaying_ = false;
@@ -183,7 +184,7 @@ void RigidSystem::reset(StageClock* clock) {
     judge_loops();
     joints_.breaks.clear();
     clock_ = clock;
-    rounds_ = sweeps_ = 0;
+    rounds_ = pgs_iterations_ = 0;
     work_kept_ = work_taken_back_ = {};
     residual_ = 0.0;
     pivot_ = PivotSolver{};
@@ -200,18 +201,18 @@ void RigidSystem::reset(StageClock* clock) {
     if (stiff_) find_tensions();
     const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
     if (half_step_ || method_.corrections > 0) {
-        make_room_beyond();
+        make_room_for_half_step();
         if (!may_touch) start_half_step();
     }
     in_plane_ = !plane_.empty() && plane_.holds(constants_, acceleration_, live_.bodies);
     if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
-    mixed_.mass.assign(tied_.size(), Mat6{});
-    mixed_.momentum.resize(tied_.size());
-    mixed_.velocity.resize(tied_.size());
+    mixed_.mass.assign(constrained_.size(), Mat6{});
+    mixed_.momentum.resize(constrained_.size());
+    mixed_.velocity.resize(constrained_.size());
     for (const JointBlock& block : joints_.blocks()) {
         RowBlock rows;
-        rows.first = block.first < 0 ? -1 : slot_[block.first];
-        rows.second = block.second < 0 ? -1 : slot_[block.second];
+        rows.first = block.first < 0 ? -1 : solver_index_[block.first];
+        rows.second = block.second < 0 ? -1 : solver_index_[block.second];
         rows.size = block.size;
         rows.softness = block.softness;
         mixed_.rows.push_back(rows);
@@ -231,7 +232,7 @@ void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
         // What is seen lives at the sample; what goes on does not.
         LargeArray<BodyState> going;
         if (half_step_) {
-            look_ahead();
+            solve_ahead();
             going = live_.bodies;
             read_half_step();
         } else {
@@ -324,7 +325,7 @@ std::vector<double> RigidSystem::final_state() {
     if (live_.lost < 0 && live_.not_solved < 0) {
         if (composed_) read_composition();
         if (half_step_) {
-            look_ahead();
+            solve_ahead();
             read_half_step();
         }
     }
@@ -346,7 +347,7 @@ RigidSystem::Work RigidSystem::Work::operator+(const Work& more) const noexcept 
              factors.block_operations + more.factors.block_operations,
              factors.floored_pivots + more.factors.floored_pivots, factors.solves + more.factors.solves},
             rounds + more.rounds,
-            sweeps + more.sweeps};
+            pgs_iterations + more.pgs_iterations};
 }
 
 RigidSystem::Work RigidSystem::Work::operator-(const Work& less) const noexcept {
@@ -354,12 +355,12 @@ RigidSystem::Work RigidSystem::Work::operator-(const Work& less) const noexcept 
              factors.block_operations - less.factors.block_operations,
              factors.floored_pivots - less.factors.floored_pivots, factors.solves - less.factors.solves},
             rounds - less.rounds,
-            sweeps - less.sweeps};
+            pgs_iterations - less.pgs_iterations};
 }
 
 RigidSystem::Work RigidSystem::work_done() const noexcept {
     const LockedTree::Counters locked = locked_.counters();
-    Work done{matrix_.counters(), rounds_, sweeps_};
+    Work done{matrix_.counters(), rounds_, pgs_iterations_};
     done = done + Work{pivot_.counters()};
     done = done + Work{{locked.factorisations, locked.block_operations, 0, locked.solves}};
     const std::uint64_t readings = (1 + static_cast<std::uint64_t>(method_.refinements)) *
@@ -386,7 +387,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("floored_pivots", work.floored_pivots);
     put("back_substitutions", work.solves);
     put("pivot_rounds", done.rounds);
-    put("sweeps", done.sweeps);
+    put("sweeps", done.pgs_iterations);
     if (composed_) {
         report.counters["newton_iterations"] = live_.newton_iterations;
         report.counters["halved_steps"] = live_.halved_steps;
@@ -419,7 +420,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("corrections", contact.corrections);
     put("friction_rounds", contact.friction_rounds);
     put("pivots", contact.pivots);
-    put("sweeps", done.sweeps + contact.sweeps);
+    put("sweeps", done.pgs_iterations + contact.pgs_iterations);
     put("unsettled_solves", contact.unsettled);
 }
 

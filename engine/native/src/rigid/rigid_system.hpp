@@ -14,9 +14,9 @@
 #include "linear/block_ldlt.hpp"
 #include "linear/dense_rows.hpp"
 #include "linear/redundant_rows.hpp"
-#include "rigid/following_bounds.hpp"
 #include "rigid/joint_set.hpp"
 #include "rigid/joint_tree.hpp"
+#include "rigid/load_dependent_bounds.hpp"
 #include "rigid/locked_tree.hpp"
 #include "rigid/plane_step.hpp"
 #include "rigid/sleep.hpp"
@@ -43,11 +43,11 @@ struct BodyMomenta {
 /// free body keeps it to the last bit. A step in which nothing touches is solved as if contacts were impossible.
 class RigidSystem {
 public:
-    /// Built from the stages; throws std::invalid_argument for those it cannot run, or joints nobody solves.
+    /// Built from the stages; throws std::invalid_argument for those it cannot run, or joints that no stage solves.
     RigidSystem(const RigidScene& scene, StageList stages);
 
     const StageList& stages() const noexcept { return stages_; }
-    /// How stages run that have several ways, for those who ask.
+    /// How stages run that have several ways, for those that ask.
     void tell(StageChoices& choices) const;
 
     // For run_loop:
@@ -80,10 +80,10 @@ public:
     void set_load(int body, Vec3 force, Vec3 torque);
     void set_velocity(int body, Vec3 velocity, Vec3 angular_velocity);
     void set_motor(int joint, double speed, double max_force) {
-        if (joints_.set_motor(joint, speed, max_force)) stir_joint(joint);
+        if (joints_.set_motor(joint, speed, max_force)) wake_joint(joint);
     }
     void set_rest(int joint, double rest) {
-        if (joints_.set_rest(joint, rest)) stir_joint(joint);
+        if (joints_.set_rest(joint, rest)) wake_joint(joint);
     }
 
     void reset(StageClock* clock);
@@ -139,7 +139,7 @@ private:
         std::int64_t step = 0;   // steps of h begun
         std::int64_t moved = 0;  // steps of h after which positions are known
         Unsettled unsettled;
-        bool by_rows = false;  // sweeps over joints alone have failed: few are solved directly
+        bool by_rows = false;  // PGS over joints alone has failed: few are solved directly
         Sleep sleep;
         // Velocities at mid-step:
         bool velocity_ready = false;         // the velocities of the coming step are found already
@@ -189,7 +189,7 @@ private:
     SpringEnd spring_end(const End& end) const noexcept;
     void pull_aside(const SpringForce& spring) noexcept;
     void add_fluid(const Fluid& fluid, int body, Vec3& force, Vec3& torque) const noexcept;
-    void stiffen();
+    void add_geometric_stiffness();
     void find_tensions();
     void find_islands();
     void keep_angular_momentum();
@@ -210,7 +210,7 @@ private:
     bool find_repeated(Loop& loop);
     bool stops(const Live::Watched& seen, double motion) const noexcept;
     void note_locked(const Loop& loop);
-    void note_parted();
+    void note_projected();
     std::vector<double> shares(const Loop& loop) const;
     void find_extents(Loop& loop);
     void take_stages(const RigidScene& scene);
@@ -218,10 +218,10 @@ private:
     void deliver();
     void velocity_stage();
     void find_velocities();
-    void look_ahead();
+    void solve_ahead();
 
     // rigid_half_step.cpp: velocities at mid-step and the curvature of the rows
-    void make_room_beyond();
+    void make_room_for_half_step();
     void start_half_step();
     void start_half_step_touching();
     void read_half_step();
@@ -241,11 +241,11 @@ private:
     void leave_out_sleepers();
     void velocities_beside_sleepers();
     void keep_jacobians();
-    bool stirs(int body) const noexcept;
-    void wake_carried();
+    bool is_moving(int body) const noexcept;
+    void wake_by_moving_bodies();
     void wake(const std::vector<int>& met);
-    void stir(int body);
-    void stir_joint(int joint);
+    void mark_moving(int body);
+    void wake_joint(int joint);
     void note_places();
     double pace(int body) const noexcept;
     void fall_asleep();
@@ -294,12 +294,12 @@ private:
     bool find_other_ends();
     bool solve_joints();
     bool settle_joints();
-    double tolerated_by_sweeps() const;
-    void fill_beyond(int block, RowBlock& rows, BlockRight& numbers, std::vector<Beyond>& beyond) const;
+    double pgs_tolerance() const;
+    void fill_further(int block, RowBlock& rows, BlockRight& numbers, std::vector<FurtherBody>& beyond) const;
     void impact();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void note_unsettled(int body, double residual, bool sunk = false);
-    void judge_sweeps();
+    void judge_pgs();
     void judge_contacts();
     void solve_block();
     void solve_locked();
@@ -317,19 +317,19 @@ private:
     int busiest_block() const noexcept;
     void solve_mixed(bool touching);
     bool pivot_rows();
-    // rigid_parting.cpp: overlapping bodies are parted by positions
-    void note_begin();
-    void part_overlaps();
-    void lead_back();
+    // rigid_projection.cpp: overlaps are removed by positions
+    void note_start_of_contacts();
+    void project_overlaps();
+    void project_limits();
     void gather_islands();
-    void part_bodies();
-    double fundable(int island) const;
-    bool part_island(int island, double share);
+    void project_bodies();
+    double affordable_share(int island) const;
+    bool project_island(int island, double share);
     bool hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks);
     void keep_spin_energy(int body);
     bool keep_momenta(const std::vector<int>& members, double limit);
-    double taken(const std::vector<int>& members, const std::vector<int>& own_blocks) const;
-    double lifted(const std::vector<int>& members) const;
+    double dissipated_energy(const std::vector<int>& members, const std::vector<int>& own_blocks) const;
+    double lifting_energy(const std::vector<int>& members) const;
     Vec3 force(int body) const {
         const Vec3 f = constants_[body].mass * acceleration_[body];
         return force_.empty() ? f : f + force_[body];
@@ -384,22 +384,22 @@ private:
 
     // The state.
     Live live_;
-    Memory saved_, before_ahead_;  // the latter: before look_ahead(), with contacts
-    Memory before_waking_;         // before the velocities of a step in which somebody may wake
+    Memory saved_, before_solve_ahead_;  // the latter: before solve_ahead(), with contacts
+    Memory before_waking_;               // before the velocities of a step in which some body may wake
     JointSet joints_;
     bool replaying_ = false;                    // a block that ended unfit
     LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
 
     // One step's work.
     std::vector<Vec3> force_;         // of springs and centres, per body
-    std::vector<int> tied_;           // dynamic bodies that have rows
+    std::vector<int> constrained_;    // dynamic bodies that have rows
     std::vector<int> free_, driven_;  // dynamic bodies that never have rows; kinematic ones
-    bool tied_are_moved_ = false;
-    std::vector<int> slot_;  // per body: its place among the tied bodies, −1
+    bool constrained_are_moved_ = false;
+    std::vector<int> solver_index_;  // per body: its place among the constrained bodies, −1
     BlockLdlt matrix_;
     RedundantRows redundant_;
-    struct Loop {  // joints that close one, and all that hangs on them; see rigid_locking.cpp
-        std::vector<int> blocks, members;                // of joints; places among the tied bodies
+    struct Loop {  // joints that close one, and all that is attached to them; see rigid_locking.cpp
+        std::vector<int> blocks, members;                // of joints; places among the constrained bodies
         std::vector<int> drives;                         // blocks of motors, limits and springs
         std::vector<int> edges;                          // of matrix_, in the probe's order
         BlockLdlt probe;                                 // matrix_ of these with rigid rows
@@ -407,7 +407,7 @@ private:
         std::vector<double> weakness, repeated, square;  // per row; per unknown; per member, m²
     };
     std::vector<Loop> loops_;
-    std::vector<Vec6> push_;  // per tied body: of drives
+    std::vector<Vec6> push_;  // per constrained body: of drives
     LargeArray<double> right_, solution_;
     struct BlockPlace {
         int first_edge = -1, second_edge = -1;  // in matrix_
@@ -421,10 +421,10 @@ private:
     LargeArray<double> wide_;    // Jacobians of the bodies beyond a row's first two
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_;
-    std::vector<std::vector<Beyond>> beyond_, holding_beyond_;  // per block of joints: what its rows show
+    std::vector<std::vector<FurtherBody>> further_, holding_further_;  // per block of joints, of its rows
     std::vector<int> other_ends_;  // blocks of the step's joints whose stops have a row for each end
     PivotSolver pivot_;
-    FollowingBounds following_;
+    LoadDependentBounds load_dependent_;
     bool breaks_ = false;  // whether some joint may
     std::optional<ContactStage> contacts_, fresh_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
@@ -434,16 +434,16 @@ private:
         Vec3 displacement;
         double energy = 0.0;  // twice the kinetic one
     };
-    std::vector<Begun> begun_;       // per body: the start of a step with contacts
-    bool touching_ = false;          // whether the step had any
-    ContactStage::Parting leading_;  // of bodies beyond their joints' limits: no displacement
-    const ContactStage::Parting* parting_ = nullptr;  // what is at hand
+    std::vector<Begun> start_of_contacts_;               // per body: the start of a step with contacts
+    bool touching_ = false;                              // whether the step had any
+    ContactStage::PositionProjection limit_projection_;  // of bodies beyond their joints' limits
+    const ContactStage::PositionProjection* projection_ = nullptr;  // what is at hand
     std::vector<Pose> end_poses_;
-    LargeArray<BodyState> unparted_;                        // per body, before overlaps are parted
-    std::vector<double> taken_;                             // per island, see taken()
-    std::vector<std::vector<int>> parted_, parted_blocks_;  // per island: tied bodies, blocks of joints
-    std::vector<double> overstep_;                          // per row of joints, before
-    std::vector<std::size_t> overstep_at_;                  // per block
+    LargeArray<BodyState> before_projection_;  // per body, before overlaps are projected out
+    std::vector<double> dissipated_;           // per island, see dissipated_energy()
+    std::vector<std::vector<int>> island_members_, island_blocks_;  // per island: bodies, blocks of joints
+    std::vector<double> overstep_;                                  // per row of joints, before
+    std::vector<std::size_t> overstep_at_;                          // per block
     MixedSystem holding_;
     StepArrays arrays_;  // what is in them is of one call
     PivotSolver holding_pivot_;
@@ -452,8 +452,8 @@ private:
         Vec3 displacement;
         Quat turn;
     };
-    std::vector<Place> left_;  // per body: where it was as the step began
-    double residual_ = 0.0;    // largest an iterative solve stopped at, m/s
+    std::vector<Place> start_places_;  // per body: where it was as the step began
+    double residual_ = 0.0;            // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body
@@ -469,8 +469,8 @@ private:
     bool in_tree_ = false;
     std::size_t unknowns_ = 0;  // of a stage: rows, or joint coordinates
     std::vector<double> change_, last_plain_, last_step_, mixing_, extent_;
-    std::vector<Vec3> rate_;  // per tied body: turn over the stage, along them
-    std::vector<Mat3> axes_;  // per tied body, those of its inertia where the stage starts
+    std::vector<Vec3> rate_;  // per constrained body: turn over the stage, along them
+    std::vector<Mat3> axes_;  // per constrained body, those of its inertia where the stage starts
     bool dense_ = false;
     DenseRows dense_rows_;
     struct Meeting {                    // of two blocks on one moving body
@@ -478,17 +478,17 @@ private:
         int end, other_end, body;
     };
     std::vector<Meeting> meetings_;
-    std::vector<Mat3> stiffness_;            // per tied body: h²/4 of its joints' geometric stiffness, kg m²
-    std::vector<std::vector<int>> islands_;  // of tied bodies that nothing holds to the world
+    std::vector<Mat3> stiffness_;  // per constrained body: h²/4 of its joints' geometric stiffness, kg m²
+    std::vector<std::vector<int>> islands_;  // of constrained bodies that nothing holds to the world
     static constexpr int MOST_HALVINGS = 12;
     LargeArray<BodyState> step_start_[MOST_HALVINGS];
-    std::uint64_t rows_ = 0, rounds_ = 0, sweeps_ = 0;
+    std::uint64_t rows_ = 0, rounds_ = 0, pgs_iterations_ = 0;
 
     /// Work whose counters go_back() leaves alone, of solvers that are in no memory. How much of it blocks take back
     /// depends on how long they are, and that on the clock: it is no work of the run.
     struct Work {
         BlockLdlt::Counters factors;
-        std::uint64_t rounds = 0, sweeps = 0;
+        std::uint64_t rounds = 0, pgs_iterations = 0;
         Work operator+(const Work& more) const noexcept;
         Work operator-(const Work& less) const noexcept;
     };

@@ -1,4 +1,4 @@
-// What falling asleep asks of a scene, and who sleeps.
+// What falling asleep asks of a scene, and which bodies sleep.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace spook {
 
 /// Does not change during a run.
 struct SleepRules {
-    std::vector<char> may;        // per body; empty where nobody ever sleeps
+    std::vector<char> may;        // per body; empty where none ever sleeps
     std::vector<double> reach;    // per body: what its turning is measured at, m
     std::vector<IndexPair> ties;  // of joints and springs
     std::int64_t after = 0;       // steps at rest

@@ -12,9 +12,9 @@ namespace spook {
 struct StepArrays {
     IslandFinder finder;  // of whatever is asked for
     // hold_joints():
-    std::vector<int> place;                    // of tied bodies in their island, −1 of others
+    std::vector<int> place;                    // of constrained bodies in their island, −1 of others
     LargeArray<JointSet::State> joint_states;  // as they were before
-    std::vector<char> beyond;  // lead_back(): islands with something beyond its joint's limits
+    std::vector<char> beyond;  // project_limits(): islands with something beyond its joint's limits
     // settle_joints():
     IslandSolver joint_solver;
     std::vector<std::size_t> rows;  // by island

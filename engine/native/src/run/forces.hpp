@@ -27,14 +27,14 @@ struct CentralField {
     Vec3 centre;            // m
 };
 
-/// Force [N] on the first end, towards the second: apart = x₂ − x₁, parting = v₂ − v₁. Without a direction (ends at
+/// Force [N] on the first end, towards the second: apart = x₂ − x₁, separation_rate = v₂ − v₁. Without a direction (ends at
 /// one place) only a spring of rest length 0 pulls.
-inline Vec3 pull(const SpringForce& spring, Vec3 apart, Vec3 parting) noexcept {
+inline Vec3 pull(const SpringForce& spring, Vec3 apart, Vec3 separation_rate) noexcept {
     Vec3 pull = spring.stiffness * apart;
     if (spring.rest_length > 0.0 || spring.viscosity > 0.0) {
         const double length = norm(apart);
         const Vec3 u = length > 0.0 ? (1.0 / length) * apart : Vec3{};
-        const double rate = spring.viscosity * dot(u, parting);
+        const double rate = spring.viscosity * dot(u, separation_rate);
         pull += (rate - spring.stiffness * spring.rest_length) * u;
     }
     return pull;

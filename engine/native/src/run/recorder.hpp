@@ -38,7 +38,7 @@ public:
     /// Reserve everything for a run of that many steps and forget earlier samples.
     void prepare(std::int64_t steps);
 
-    /// The first sample number >= from that somebody wants; steps + 1 if nobody does.
+    /// The first sample number >= from that is wanted; steps + 1 if none is.
     std::int64_t next_wanted(std::int64_t from) const noexcept;
 
     /// Read the quantities wanted at sample n and reduce them.

@@ -1,7 +1,7 @@
 // The stages of a step: which there are, which of them a scene needs and why, and which a pipeline runs.
 //
 // A pipeline's choose_stages() looks at a scene once and decides every stage. The system is built from what it kept
-// and from nothing else: each part takes the stages it runs, and a stage nobody takes is an error at the start.
+// and from nothing else: each part takes the stages it runs, and a stage that no part takes is an error at the start.
 #pragma once
 
 #include <algorithm>
@@ -55,12 +55,12 @@ public:
         for (std::size_t k = 0; k < STAGES; ++k) listed_[k] = choices[k].kept;
     }
 
-    /// Whether the stage is listed; who asks will run it.
+    /// Whether the stage is listed; what asks will run it.
     bool take(Stage stage) noexcept {
         taken_[index(stage)] = listed_[index(stage)];
         return listed_[index(stage)];
     }
-    /// Whether the stage is listed and somebody runs it.
+    /// Whether the stage is listed and some part runs it.
     bool runs(Stage stage) const noexcept { return taken_[index(stage)]; }
     /// The stages that are run, in the order of the step.
     std::vector<Stage> taken() const {

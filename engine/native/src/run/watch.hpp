@@ -26,7 +26,7 @@ inline bool (*interrupted)() = nullptr;
 struct Stopped {};
 
 /// One run's clock. While it lives, look() may be called anywhere in the thread that runs; without one it does
-/// nothing. A look costs tens of nanoseconds: solvers look once per round or sweep.
+/// nothing. A look costs tens of nanoseconds: solvers look once per round or iteration.
 class Watch {
 public:
     static constexpr double patience = 0.02;  // s: work that takes longer is not done without a look

@@ -8,7 +8,7 @@
 
 namespace spook {
 
-class RowSweeps {
+class RowPgs {
 public:
     int iterations = 50;
     double tolerance = 0.0;  // m/s: the largest row residual at which a solve stops
@@ -18,7 +18,7 @@ public:
     void solve(const Nodes& nodes, DistanceRows& rows) noexcept;
 
     struct Work {
-        std::int64_t sweeps = 0;
+        std::int64_t pgs_iterations = 0;
         double residual = 0.0;  // of the last solve, m/s
     };
     Work work;

@@ -1,15 +1,15 @@
-// What sweeps read, laid out as they read it: bodies in a line each, contacts one behind the other.
+// What iterations read, laid out as they read it: bodies in a line each, contacts one behind the other.
 #include <cmath>
 #include <numeric>
 
 #include "contacts/contact_geometry.hpp"
-#include "contacts/contact_sweeps.hpp"
+#include "contacts/pgs_solver.hpp"
 
 namespace spook {
 
 namespace {
 
-SweptInertia inverse_inertia(const Mat6& mass) noexcept {
+PgsInertia inverse_inertia(const Mat6& mass) noexcept {
     const double a = mass[21], b = mass[22], c = mass[23], d = mass[28], e = mass[29], f = mass[35];
     if (b == 0.0 && c == 0.0 && e == 0.0) return {1.0 / a, 0.0, 0.0, 1.0 / d, 0.0, 1.0 / f};
     const double A = d * f - e * e, B = c * e - b * f, C = b * e - c * d;
@@ -20,7 +20,7 @@ SweptInertia inverse_inertia(const Mat6& mass) noexcept {
 
 }  // namespace
 
-void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
+void PgsSolver::start(MixedSystem& system, FrictionModel model) {
     bodies_ = static_cast<int>(system.mass.size());
     inertia_.resize(bodies_ + 1);
     round_ = true;
@@ -39,8 +39,8 @@ void ContactSweeps::start(MixedSystem& system, FrictionModel model) {
     begin(system, model);
 }
 
-void ContactSweeps::start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model,
-                                 double relaxation) {
+void PgsSolver::start_beside(const PgsSolver& other, MixedSystem& system, FrictionModel model,
+                             double relaxation) {
     relaxation_ = relaxation;
     bodies_ = other.bodies_;
     round_ = other.round_;
@@ -54,11 +54,11 @@ void ContactSweeps::start_beside(const ContactSweeps& other, MixedSystem& system
     begin(system, model);
 }
 
-Vec3 ContactSweeps::turned(int b, Vec3 moment) const noexcept {
+Vec3 PgsSolver::turned(int b, Vec3 moment) const noexcept {
     return round_ ? body(b).round * moment : inertia_[b].turn(moment);
 }
 
-void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
+void PgsSolver::begin(MixedSystem& system, FrictionModel model) {
     model_ = model;
     joint_count_ = static_cast<int>(system.rows.size());
     for (int b = 0; b < bodies_ && joint_count_ == 0; ++b) {
@@ -69,15 +69,15 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     body(bodies_) = {};
     contacts_.clear();
     slips_.clear();
-    rests_.clear();
+    extras_.clear();
     boxes_.clear();
     place_.clear();
     added_ = 0;
     parent_.resize(bodies_ + 1);
     std::iota(parent_.begin(), parent_.end(), 0);
     active_.assign(bodies_ + 1, 0);
-    spent_.assign(bodies_ + 1, 0);
-    left_.assign(bodies_ + 1, 0.0);
+    limit_reached_.assign(bodies_ + 1, 0);
+    last_change_.assign(bodies_ + 1, 0.0);
     parts_.resize(team_ != nullptr ? static_cast<std::size_t>(team_->size()) : 1);
     for (Part& part : parts_) {
         part.change.assign(bodies_ + 1, 0.0);
@@ -91,15 +91,15 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     scheduled_ = listed_ = sized_ = 0;
     order_.clear();
     level_end_.clear();
-    swept_ = joined_ = false;
+    started_ = joined_ = false;
     done_ = 0.0;
-    hot_.assign(bodies_ + 1, 0);
+    active_bodies_.assign(bodies_ + 1, 0);
     touched_.assign(bodies_ + 1, 0);
     all_touched_ = true;
     for (int k = 0; k < joint_count_; ++k) {
         const RowBlock& rows = system.rows[k];
         int anchor = std::max(rows.first, rows.second);
-        for (const Beyond& other : rows.beyond) {
+        for (const FurtherBody& other : rows.further) {
             if (anchor < 0) anchor = other.body;
             else if (other.body >= 0) join(anchor, other.body);
         }
@@ -107,7 +107,7 @@ void ContactSweeps::begin(MixedSystem& system, FrictionModel model) {
     }
 }
 
-int ContactSweeps::add(const SweepContact& given) {
+int PgsSolver::add(const PgsContact& given) {
     const int contact = added_++;
     if (bodies_of_.size() == static_cast<std::size_t>(joint_count_) + static_cast<std::size_t>(contact)) {
         link(given.first, given.second);
@@ -115,7 +115,7 @@ int ContactSweeps::add(const SweepContact& given) {
         contacts_.emplace_back();
     }
     const int place = place_[contact];
-    SweptContact& c = contacts_[place];
+    PackedContact& c = contacts_[place];
     c.first = given.first >= 0 ? given.first : bodies_;
     c.second = given.second >= 0 ? given.second : bodies_;
     c.normal = given.normal;
@@ -136,22 +136,22 @@ int ContactSweeps::add(const SweepContact& given) {
     if (given.friction > 0.0 || given.softness != 0.0 || !slips_.empty() || model_ != FrictionModel::cone)
         add_slip(given, place);
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0) push(c, impulse);
-    heat(c.first, c.second);
+    activate(c.first, c.second);
     touch(parts_[0], c.first);
     touch(parts_[0], c.second);
     return contact;
 }
 
-void ContactSweeps::arrange() {
+void PgsSolver::arrange() {
     if (scheduled_ < bodies_of_.size()) schedule();
     contacts_.resize(place_.size());
 }
 
 /// What else a contact has, and for the others that they have none of it.
-void ContactSweeps::add_slip(const SweepContact& given, int place) {
-    const SweptContact& c = contacts_[place];
+void PgsSolver::add_slip(const PgsContact& given, int place) {
+    const PackedContact& c = contacts_[place];
     slips_.resize(contacts_.size());
-    SweptSlip& slip = slips_[place];
+    PackedFriction& slip = slips_[place];
     slip.tangent = given.tangent;
     slip.friction = given.friction;
     const Vec3 direction[3] = {c.normal, given.tangent, given.across};
@@ -168,28 +168,28 @@ void ContactSweeps::add_slip(const SweepContact& given, int place) {
     slip.coupling[0] = part(1, 0);
     slip.coupling[1] = part(2, 0);
     const double inverse_mass = body(c.first).inverse_mass + body(c.second).inverse_mass,
-                 along = given.stretched ? dot(given.tangent, given.tangent) : 1.0,
-                 across = given.stretched ? dot(given.across, given.across) : 1.0;
+                 along = given.anisotropic ? dot(given.tangent, given.tangent) : 1.0,
+                 across = given.anisotropic ? dot(given.across, given.across) : 1.0;
     Box box;
     box.own[0] = inverse_mass * along + part(1, 1) + given.slip_softness;
     box.own[1] = part(1, 2);
     box.own[2] = inverse_mass * across + part(2, 2) + given.slip_softness;
-    box.stretched = given.stretched;
+    box.anisotropic = given.anisotropic;
     const double largest =
         0.5 * (box.own[0] + box.own[2]) + length(0.5 * (box.own[0] - box.own[2]), box.own[1]);
     slip.step = largest > 0.0 ? 1.0 / largest : 0.0;
 
-    const bool boxed = model_ != FrictionModel::cone || given.stretched || !boxes_.empty();
+    const bool boxed = model_ != FrictionModel::cone || given.anisotropic || !boxes_.empty();
     const Vec3 third = cross(c.normal, given.tangent);
     const bool plain = given.right[1] == 0.0 && given.right[2] == 0.0 && given.softness == 0.0 &&
                        given.slip_softness == 0.0 && third.x == given.across.x && third.y == given.across.y &&
                        third.z == given.across.z;
-    if (plain && !boxed && rests_.empty()) return;
-    if (rests_.empty())
+    if (plain && !boxed && extras_.empty()) return;
+    if (extras_.empty())
         for (std::size_t k = 0; k < slips_.size(); ++k)
-            rests_.push_back({.across = cross(contacts_[k].normal, slips_[k].tangent)});
-    rests_.resize(contacts_.size());
-    rests_[place] = {
+            extras_.push_back({.across = cross(contacts_[k].normal, slips_[k].tangent)});
+    extras_.resize(contacts_.size());
+    extras_[place] = {
         given.across,        given.right[1],
         given.right[2],      given.softness,
         given.slip_softness, given.normal_before >= 0.0 ? given.normal_before : given.impulse[0]};
@@ -198,8 +198,8 @@ void ContactSweeps::add_slip(const SweepContact& given, int place) {
     boxes_[place] = box;
 }
 
-void ContactSweeps::push(const SweptContact& c, Vec3 impulse) noexcept {
-    SweptBody &one = body(c.first), &two = body(c.second);
+void PgsSolver::push(const PackedContact& c, Vec3 impulse) noexcept {
+    PgsBody &one = body(c.first), &two = body(c.second);
     Vec6 &v = one.velocity, &w = two.velocity;
     const Vec3 turn = turned(c.first, cross(c.first_arm, impulse)),
                back = turned(c.second, cross(c.second_arm, impulse));

@@ -22,13 +22,13 @@ namespace spook {
 
 namespace {
 
-constexpr int most_rounds = 10;        // of Newton's method
-constexpr double held = 1e-13;         // of a joint's size: a violation that is rounding
-constexpr double nearly_held = 1e-11;  // and what may be left where rounding is worse
-constexpr int most_halvings = 4;       // of the displacement
-constexpr double rounding = 4e-16;     // of the energy
-constexpr int most_partings = 4;       // of a step
-constexpr std::size_t few_parted = 8;  // bodies of an island: most are no larger
+constexpr int most_rounds = 10;         // of Newton's method
+constexpr double held = 1e-13;          // of a joint's size: a violation that is rounding
+constexpr double nearly_held = 1e-11;   // and what may be left where rounding is worse
+constexpr int most_halvings = 4;        // of the displacement
+constexpr double rounding = 4e-16;      // of the energy
+constexpr int max_projections = 4;      // of a step
+constexpr std::size_t few_members = 8;  // bodies of an island: most are no larger
 
 double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
     return body.mass * dot(s.velocity, s.velocity) +
@@ -44,35 +44,36 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 }  // namespace
 
 /// What the step is to be compared with.
-void RigidSystem::note_begin() {
-    begun_.resize(constants_.size());
-    for (int i : tied_) {
+void RigidSystem::note_start_of_contacts() {
+    start_of_contacts_.resize(constants_.size());
+    for (int i : constrained_) {
         const BodyState& s = live_.bodies[i];
-        begun_[i] = {s.displacement, twice_energy(constants_[i], s)};
+        start_of_contacts_[i] = {s.displacement, twice_energy(constants_[i], s)};
     }
 }
 
 /// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first
 /// order, and turns bring other points down.
-void RigidSystem::part_overlaps() {
-    for (int round = 0; round < most_partings; ++round) {
+void RigidSystem::project_overlaps() {
+    for (int round = 0; round < max_projections; ++round) {
         end_poses_.resize(constants_.size());
         for (int i = 0; i < bodies(); ++i)
             end_poses_[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
-        if (!contacts_->part(mixed_, joints_.blocks().size(), end_poses_, round > 0)) return;
-        part_bodies();
+        if (!contacts_->project_positions(mixed_, joints_.blocks().size(), end_poses_, round > 0)) return;
+        project_bodies();
     }
 }
 
 /// The energy that contacts have taken from some bodies in this step so far, J: what forces and joints did on them,
 /// less what their kinetic energy has grown by; none if that is negative.
-double RigidSystem::taken(const std::vector<int>& members, const std::vector<int>& own_blocks) const {
+double RigidSystem::dissipated_energy(const std::vector<int>& members,
+                                      const std::vector<int>& own_blocks) const {
     double sum = 0.0;
     for (const int k : members) {
-        const int i = tied_[k];
+        const int i = constrained_[k];
         const BodyState& s = live_.bodies[i];
-        sum += 0.5 * (begun_[i].energy - twice_energy(constants_[i], s)) +
-               dot(force(i), s.displacement - begun_[i].displacement) +
+        sum += 0.5 * (start_of_contacts_[i].energy - twice_energy(constants_[i], s)) +
+               dot(force(i), s.displacement - start_of_contacts_[i].displacement) +
                h_ * dot(constants_[i].torque, s.angular_velocity);
     }
     for (const int k : own_blocks) {
@@ -80,10 +81,12 @@ double RigidSystem::taken(const std::vector<int>& members, const std::vector<int
         double work = 0.0;
         for (int i = 0; i < block.size; ++i) {
             double speed = row_velocity(block, i, mixed_.velocity);
-            if (block.first >= 0) speed += dot(block.first_jacobian[i], velocities_[tied_[block.first]]);
-            if (block.second >= 0) speed += dot(block.second_jacobian[i], velocities_[tied_[block.second]]);
-            for (const Beyond& other : block.beyond)
-                speed += dot(other.jacobian, velocities_[tied_[other.body]]);
+            if (block.first >= 0)
+                speed += dot(block.first_jacobian[i], velocities_[constrained_[block.first]]);
+            if (block.second >= 0)
+                speed += dot(block.second_jacobian[i], velocities_[constrained_[block.second]]);
+            for (const FurtherBody& other : block.further)
+                speed += dot(other.jacobian, velocities_[constrained_[other.body]]);
             work += 0.5 * block.multiplier[i] * speed;
         }
         sum += std::max(0.0, work);
@@ -92,41 +95,42 @@ double RigidSystem::taken(const std::vector<int>& members, const std::vector<int
 }
 
 /// What the displacement has cost against the forces, J.
-double RigidSystem::lifted(const std::vector<int>& members) const {
+double RigidSystem::lifting_energy(const std::vector<int>& members) const {
     double sum = 0.0;
     for (const int k : members) {
-        const int i = tied_[k];
-        sum -= dot(force(i), live_.bodies[i].displacement - unparted_[i].displacement);
+        const int i = constrained_[k];
+        sum -= dot(force(i), live_.bodies[i].displacement - before_projection_[i].displacement);
     }
     return sum;
 }
 
 /// The part of an island's displacement that what contacts took and its kinetic energy can pay for.
-double RigidSystem::fundable(int island) const {
-    const ContactStage::Parting& parting = *parting_;
-    if (parting.supplied[island] != 0) return 1.0;
+double RigidSystem::affordable_share(int island) const {
+    const ContactStage::PositionProjection& projection = *projection_;
+    if (projection.externally_driven[island] != 0) return 1.0;
     double cost = 0.0, twice = 0.0;
-    for (const int k : parted_[island]) {
-        const Vec6& d = parting.velocity[k];
-        cost -= h_ * dot(force(tied_[k]), {d[0], d[1], d[2]});
-        twice += twice_energy(constants_[tied_[k]], unparted_[tied_[k]]);
+    for (const int k : island_members_[island]) {
+        const Vec6& d = projection.velocity[k];
+        cost -= h_ * dot(force(constrained_[k]), {d[0], d[1], d[2]});
+        twice += twice_energy(constants_[constrained_[k]], before_projection_[constrained_[k]]);
     }
-    const double funds = taken_[island] + 0.5 * twice;
-    return cost <= funds ? 1.0 : 0.999 * funds / cost;
+    const double available_energy = dissipated_[island] + 0.5 * twice;
+    return cost <= available_energy ? 1.0 : 0.999 * available_energy / cost;
 }
 
-/// Who belongs to which island, and how far its joints are from where they hold.
+/// Which body belongs to which island, and how far its joints are from where they hold.
 void RigidSystem::gather_islands() {
-    const Islands& islands = parting_->islands;
+    const Islands& islands = projection_->islands;
     const auto count = static_cast<std::size_t>(islands.count);
-    if (parted_.size() < count) {  // lists keep their memory; later there may be more, of a few bodies each
-        parted_.resize(tied_.size()), parted_blocks_.resize(tied_.size());
-        for (std::vector<int>& members : parted_) members.reserve(few_parted);
-        taken_.reserve(tied_.size());
+    if (island_members_.size() <
+        count) {  // lists keep their memory; later there may be more, of a few bodies each
+        island_members_.resize(constrained_.size()), island_blocks_.resize(constrained_.size());
+        for (std::vector<int>& members : island_members_) members.reserve(few_members);
+        dissipated_.reserve(constrained_.size());
     }
-    for (std::size_t k = 0; k < count; ++k) parted_[k].clear(), parted_blocks_[k].clear();
-    for (std::size_t k = 0; k < tied_.size(); ++k)
-        if (islands.of_body[k] >= 0) parted_[islands.of_body[k]].push_back(static_cast<int>(k));
+    for (std::size_t k = 0; k < count; ++k) island_members_[k].clear(), island_blocks_[k].clear();
+    for (std::size_t k = 0; k < constrained_.size(); ++k)
+        if (islands.of_body[k] >= 0) island_members_[islands.of_body[k]].push_back(static_cast<int>(k));
     const auto blocks = joints_.blocks();
     overstep_at_.assign(blocks.size(), 0);
     std::size_t rows = 0;
@@ -134,93 +138,97 @@ void RigidSystem::gather_islands() {
         overstep_at_[k] = rows;
         rows += blocks[k].size;
         const int tied = std::max(mixed_.rows[k].first, mixed_.rows[k].second);
-        if (tied >= 0) parted_blocks_[islands.of_body[tied]].push_back(static_cast<int>(k));
+        if (tied >= 0) island_blocks_[islands.of_body[tied]].push_back(static_cast<int>(k));
     }
     overstep_.resize(rows);
     for (std::size_t k = 0; k < blocks.size(); ++k)
         joints_.overstep(static_cast<int>(k), live_.bodies, overstep_.data() + overstep_at_[k]);
-    unparted_ = live_.bodies;
-    taken_.assign(islands.count, 0.0);
+    before_projection_ = live_.bodies;
+    dissipated_.assign(islands.count, 0.0);
 }
 
 /// Leads bodies that the scene has put beyond their joints' limits a part of the way back, at the rate of the limit's
 /// row: by positions, with all other rows where they are.
-void RigidSystem::lead_back() {
+void RigidSystem::project_limits() {
     const auto blocks = joints_.blocks();
-    arrays_.finder.begin(static_cast<int>(tied_.size()));
+    arrays_.finder.begin(static_cast<int>(constrained_.size()));
     for (std::size_t k = 0; k < blocks.size(); ++k)
         arrays_.finder.tie(mixed_.rows[k].first, mixed_.rows[k].second);
     for (std::size_t k = 0; k < blocks.size(); ++k)
         for (int body : joints_.others(static_cast<int>(k)))
-            if (slot_[body] >= 0) arrays_.finder.tie(mixed_.rows[k].first, slot_[body]);
-    leading_.islands = arrays_.finder.find();
-    const std::size_t islands = static_cast<std::size_t>(leading_.islands.count);
-    leading_.velocity.assign(tied_.size(), Vec6{});
-    leading_.grounded.assign(islands, 0);
-    leading_.supplied.assign(islands, 1);
-    parting_ = &leading_;
+            if (solver_index_[body] >= 0) arrays_.finder.tie(mixed_.rows[k].first, solver_index_[body]);
+    limit_projection_.islands = arrays_.finder.find();
+    const std::size_t islands = static_cast<std::size_t>(limit_projection_.islands.count);
+    limit_projection_.velocity.assign(constrained_.size(), Vec6{});
+    limit_projection_.grounded.assign(islands, 0);
+    limit_projection_.externally_driven.assign(islands, 1);
+    projection_ = &limit_projection_;
     gather_islands();
     std::vector<char>& beyond = arrays_.beyond;
     beyond.assign(islands, 0);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         if (rests(static_cast<int>(k))) continue;
         const int first = mixed_.rows[k].first, second = mixed_.rows[k].second;
-        const int island = leading_.islands.of_body[std::max(first, second)];
-        if (std::min(first, second) < 0) leading_.grounded[island] = 1;
+        const int island = limit_projection_.islands.of_body[std::max(first, second)];
+        if (std::min(first, second) < 0) limit_projection_.grounded[island] = 1;
         int row = 0;
         const double back = joints_.given_back(static_cast<int>(k), row);
         if (back == 0.0) continue;
         overstep_[overstep_at_[k] + row] -= back;
         beyond[island] = 1;
     }
-    for (int island = 0; island < leading_.islands.count; ++island)
-        if (beyond[island] != 0 && !part_island(island, 1.0))
-            for (const int k : parted_[island]) live_.bodies[tied_[k]] = unparted_[tied_[k]];
+    for (int island = 0; island < limit_projection_.islands.count; ++island)
+        if (beyond[island] != 0 && !project_island(island, 1.0))
+            for (const int k : island_members_[island])
+                live_.bodies[constrained_[k]] = before_projection_[constrained_[k]];
 }
 
-void RigidSystem::part_bodies() {
-    parting_ = &contacts_->parting();
+void RigidSystem::project_bodies() {
+    projection_ = &contacts_->projection();
     gather_islands();
-    for (int island = 0; island < parting_->islands.count; ++island) {
-        if (rests(parted_[island])) continue;
-        taken_[island] = taken(parted_[island], parted_blocks_[island]);
-        const double share = fundable(island);
+    for (int island = 0; island < projection_->islands.count; ++island) {
+        if (rests(island_members_[island])) continue;
+        dissipated_[island] = dissipated_energy(island_members_[island], island_blocks_[island]);
+        const double share = affordable_share(island);
         for (int halving = 0; halving < most_halvings; ++halving) {
-            if (part_island(island, std::ldexp(share, -halving))) break;
-            for (const int k : parted_[island]) live_.bodies[tied_[k]] = unparted_[tied_[k]];
+            if (project_island(island, std::ldexp(share, -halving))) break;
+            for (const int k : island_members_[island])
+                live_.bodies[constrained_[k]] = before_projection_[constrained_[k]];
         }
     }
 }
 
-bool RigidSystem::part_island(int island, double share) {
-    const ContactStage::Parting& parting = *parting_;
-    const std::vector<int>& members = parted_[island];
+bool RigidSystem::project_island(int island, double share) {
+    const ContactStage::PositionProjection& projection = *projection_;
+    const std::vector<int>& members = island_members_[island];
     for (const int k : members) {
-        const Vec6& d = parting.velocity[k];
-        displace(constants_[tied_[k]], share * h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
-                 live_.bodies[tied_[k]]);
+        const Vec6& d = projection.velocity[k];
+        displace(constants_[constrained_[k]], share * h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
+                 live_.bodies[constrained_[k]]);
     }
-    if (!hold_joints(members, parted_blocks_[island])) return false;
+    if (!hold_joints(members, island_blocks_[island])) return false;
     double limit = 0.0, now = 0.0;
-    for (const int k : members) limit += twice_energy(constants_[tied_[k]], unparted_[tied_[k]]);
-    if (parting.supplied[island] == 0) limit -= 2.0 * std::max(0.0, lifted(members) - taken_[island]);
+    for (const int k : members)
+        limit += twice_energy(constants_[constrained_[k]], before_projection_[constrained_[k]]);
+    if (projection.externally_driven[island] == 0)
+        limit -= 2.0 * std::max(0.0, lifting_energy(members) - dissipated_[island]);
     if (!(limit >= 0.0)) return false;
-    if (parting.grounded[island] == 0) return keep_momenta(members, limit);
+    if (projection.grounded[island] == 0) return keep_momenta(members, limit);
     for (const int k : members) {
-        keep_spin_energy(tied_[k]);
-        now += twice_energy(constants_[tied_[k]], live_.bodies[tied_[k]]);
+        keep_spin_energy(constrained_[k]);
+        now += twice_energy(constants_[constrained_[k]], live_.bodies[constrained_[k]]);
     }
     if (now <= limit) return true;
     const double left = std::sqrt(limit / now);
     Vec3 lost;
     for (const int k : members) {
-        BodyState& s = live_.bodies[tied_[k]];
-        lost += (1.0 - left) * constants_[tied_[k]].mass * s.velocity;
+        BodyState& s = live_.bodies[constrained_[k]];
+        lost += (1.0 - left) * constants_[constrained_[k]].mass * s.velocity;
         s.velocity *= left;
         s.angular_momentum *= left;
-        if (!constants_[tied_[k]].particle) refresh(constants_[tied_[k]], s);
+        if (!constants_[constrained_[k]].particle) refresh(constants_[constrained_[k]], s);
     }
-    if (parting_ != &leading_) contacts_->pay(island, lost);
+    if (projection_ != &limit_projection_) contacts_->apply_balancing_impulse(island, lost);
     return true;
 }
 
@@ -229,7 +237,7 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
     if (own_blocks.empty()) return true;
     const auto blocks = joints_.blocks();
     std::vector<int>& place = arrays_.place;
-    place.assign(tied_.size(), -1);
+    place.assign(constrained_.size(), -1);
     MixedSystem& system = holding_;
     system.mass.clear();
     for (std::size_t i = 0; i < members.size(); ++i) {
@@ -237,7 +245,7 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
         system.mass.push_back(mixed_.mass[members[i]]);
     }
     system.rows.resize(own_blocks.size());
-    holding_beyond_.resize(blocks.size());
+    holding_further_.resize(blocks.size());
     LargeArray<JointSet::State>& states = arrays_.joint_states;
     states = joints_.states;
     double last = 0.0;
@@ -256,8 +264,8 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
             joints_.assemble(k, live_.bodies, block.first_jacobian[0].data(), block.second_jacobian[0].data(),
                              unused);
             if (!joints_.others(k).empty()) {
-                fill_beyond(k, block, unused, holding_beyond_[k]);
-                for (Beyond& other : holding_beyond_[k]) other.body = place[other.body];
+                fill_further(k, block, unused, holding_further_[k]);
+                for (FurtherBody& other : holding_further_[k]) other.body = place[other.body];
             }
             double now[6];
             joints_.overstep(k, live_.bodies, now);
@@ -277,8 +285,8 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
         if (!holding_pivot_.solve(system).finite) return false;
         for (std::size_t i = 0; i < members.size(); ++i) {
             const Vec6& d = system.velocity[i];
-            displace(constants_[tied_[members[i]]], h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
-                     live_.bodies[tied_[members[i]]]);
+            displace(constants_[constrained_[members[i]]], h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
+                     live_.bodies[constrained_[members[i]]]);
         }
     }
     return false;
@@ -286,7 +294,7 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
 
 void RigidSystem::keep_spin_energy(int body) {
     const BodyConstants& constants = constants_[body];
-    const BodyState& before = unparted_[body];
+    const BodyState& before = before_projection_[body];
     BodyState& s = live_.bodies[body];
     const double most = twice_energy(constants, before), now = twice_energy(constants, s);
     const double linear = constants.mass * dot(s.velocity, s.velocity);
@@ -302,8 +310,8 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     double mass = 0.0;
     Vec3 momentum, spin, gained;
     for (const int k : members) {
-        const int i = tied_[k];
-        const BodyState &old = unparted_[i], &s = live_.bodies[i];
+        const int i = constrained_[k];
+        const BodyState &old = before_projection_[i], &s = live_.bodies[i];
         const Vec3 p = constants_[i].mass * s.velocity;
         mass += constants_[i].mass;
         momentum += p;
@@ -311,11 +319,11 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     }
     const auto turn_all = [&](Vec3 rate) {
         for (const int k : members) {
-            BodyState& s = live_.bodies[tied_[k]];
-            s.velocity += cross(rate, position_of(tied_[k]) - centre);
-            if (constants_[tied_[k]].particle) continue;
+            BodyState& s = live_.bodies[constrained_[k]];
+            s.velocity += cross(rate, position_of(constrained_[k]) - centre);
+            if (constants_[constrained_[k]].particle) continue;
             s.angular_momentum += s.inertia * rate;
-            refresh(constants_[tied_[k]], s);
+            refresh(constants_[constrained_[k]], s);
         }
     };
     const Vec3 back = solved(inertia, -gained);
@@ -323,9 +331,9 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     if (!is_zero(gained)) turn_all(back);
     double after = 0.0;
     for (const int k : members) {
-        const BodyState& s = live_.bodies[tied_[k]];
-        after += twice_energy(constants_[tied_[k]], s);
-        spin += constants_[tied_[k]].mass * cross(position_of(tied_[k]) - centre, s.velocity) +
+        const BodyState& s = live_.bodies[constrained_[k]];
+        after += twice_energy(constants_[constrained_[k]], s);
+        spin += constants_[constrained_[k]].mass * cross(position_of(constrained_[k]) - centre, s.velocity) +
                 s.angular_momentum;
     }
     if (after <= limit * (1.0 + rounding)) return true;
@@ -334,9 +342,9 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     if (!(rigid <= limit) || !finite(turn)) return false;
     const double share = std::sqrt((limit - rigid) / (after - rigid));
     for (const int k : members) {
-        const BodyConstants& body = constants_[tied_[k]];
-        BodyState& s = live_.bodies[tied_[k]];
-        const Vec3 v = drift + cross(turn, position_of(tied_[k]) - centre);
+        const BodyConstants& body = constants_[constrained_[k]];
+        BodyState& s = live_.bodies[constrained_[k]];
+        const Vec3 v = drift + cross(turn, position_of(constrained_[k]) - centre);
         s.velocity = v + share * (s.velocity - v);
         if (body.particle) continue;
         const Vec3 l = s.inertia * turn;

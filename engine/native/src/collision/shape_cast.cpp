@@ -1,4 +1,4 @@
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -211,7 +211,7 @@ double turning_speed(const Mover& mover, Vec3 n, double far) noexcept {
 
 }  // namespace
 
-double first_touch(const Mover& first, const Mover& second, double duration, double slop) noexcept {
+double time_of_impact(const Mover& first, const Mover& second, double duration, double slop) noexcept {
     const double far =
         norm(first.body.position - second.body.position) + duration * norm(first.velocity - second.velocity);
     const double first_far = far + turning_arm(second.shape, second.part),
@@ -238,7 +238,7 @@ double first_touch(const Mover& first, const Mover& second, double duration, dou
         if (!(speed * left > apart.gap + slop)) return -1.0;
         double until = (apart.gap + slop) / speed;
         if (round > 0 && turning > 0.0 && !led) {  // what turns away beside a surface would never get past it
-            until = std::max(until, parted_for(first, second, apart.normal, time, left, slop));
+            until = std::max(until, separated_for(first, second, apart.normal, time, left, slop));
             if (until >= left) return -1.0;
         }
         time += until;

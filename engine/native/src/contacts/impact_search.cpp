@@ -1,8 +1,8 @@
-// The contact stage's search for strikes: which open pairs meet within the step, when, and with which points.
+// The contact stage's search for impacts: which open pairs meet within the step, when, and with which points.
 #include <algorithm>
 #include <utility>
 
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
 #include "linear/ahead.hpp"
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
 constexpr double other_side = 0.5;        // the same
-constexpr double most_met = 0.1;          // of the open pairs: more are not carried along
+constexpr double most_met = 0.1;          // of the open pairs: more are not kept in the list
 
 }  // namespace
 
@@ -23,9 +23,9 @@ double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velo
     const Pose at_first = moved(open.first, velocity), at_second = moved(open.second, velocity);
     const Mover first = mover(open.pair.first, at_first, velocity),
                 second = mover(open.pair.second, at_second, velocity);
-    const double time = first_touch(first, second, options_.time_step, slop(open));
-    if (time < 0.0 || is_seam(first, open.first, second, open, velocity, time, late) ||
-        is_seam(second, open.second, first, open, velocity, time, late))
+    const double time = time_of_impact(first, second, options_.time_step, slop(open));
+    if (time < 0.0 || is_internal_edge(first, open.first, second, open, velocity, time, late) ||
+        is_internal_edge(second, open.second, first, open, velocity, time, late))
         return -1.0;
     return time;
 }
@@ -44,9 +44,9 @@ Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6
     return {own.shape, own.part, pose, linear(velocity[own.body]), angular(velocity[own.body])};
 }
 
-/// Sweeps the open pairs along `velocity`; those that meet get points. Late strikes, after the solve, come too late
-/// for an impact: if they need one, late_blow_ tells so, see blows_come_first().
-int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
+/// Casts the open pairs along `velocity`; those that meet get points. Late impacts, after the solve, come too late
+/// for an impact: if they need one, late_impact_ tells so, see needs_plastic_impact().
+int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
     meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
     for (auto& meetings : meetings_) meetings.clear();
     if (swings_ && !open_.empty()) index_points();
@@ -75,7 +75,7 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
             if (at + ahead < count) {
                 const OpenPair& later = open_[asked[at + ahead]];
                 for (const int body : {later.first, later.second})
-                    ask_for(poses_[body]), ask_for(kick_[body]);
+                    prefetch(poses_[body]), prefetch(dv_ext_[body]);
             }
             if (end - begin == open_.size() && (at + 1) % pairs_a_look == 0) Watch::look();  // on one thread
             if (const double time = meeting(open_[asked[at]], velocity, late); !(time < 0.0))
@@ -85,17 +85,18 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     std::vector<Meeting>& all = meetings_[0];
     for (std::size_t part = 1; part < meetings_.size(); ++part)
         all.insert(all.end(), meetings_[part].begin(), meetings_[part].end());
-    leave_out_what_others_keep_off(all, velocity);
+    remove_occluded(all, velocity);
     int found = 0;
     for (std::size_t at = 0; at < all.size(); ++at) {
         if (at + ahead < all.size()) {
             const OpenPair& later = open_[all[at + ahead].open];
-            ask_for(detection_.pose(later.pair.first)), ask_for(detection_.pose(later.pair.second));
-            for (const int body : {later.first, later.second}) ask_for(poses_[body]), ask_for(velocity[body]);
+            prefetch(detection_.pose(later.pair.first)), prefetch(detection_.pose(later.pair.second));
+            for (const int body : {later.first, later.second})
+                prefetch(poses_[body]), prefetch(velocity[body]);
         }
         const auto& [k, time] = all[at];
         OpenPair& open = open_[k];
-        if (late && add_strike_at_start(open, time, velocity)) {
+        if (late && add_toi_point_at_start(open, time, velocity)) {
             open.first = -1;
             ++found;
             continue;
@@ -103,8 +104,8 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
         const Pose first = moved(open.first, velocity), second = moved(open.second, velocity);
         const std::size_t known = points_.size();
         const bool met =
-            add_strike(open.pair, mover(open.pair.first, first, velocity).body_at(time),
-                       mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
+            add_toi_points(open.pair, mover(open.pair.first, first, velocity).body_at(time),
+                           mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
         const Vec3 led =
             (first.position - poses_[open.first].position) - (second.position - poses_[open.second].position);
         for (std::size_t i = known; i < points_.size(); ++i)
@@ -117,29 +118,30 @@ int ContactStage::find_strikes(const std::vector<Vec6>& velocity, bool late) {
     return found;
 }
 
-bool ContactStage::meets(const std::vector<Vec6>& next, bool struck, bool rebounds) {
-    plastic_first_ = rebounds;  // blows that a stop's rebound leads to are found again after it
-    late_blow_ = false;
-    changed_ = jointed_;  // others have been swept with what they fly with
+bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
+    plastic_first_ = rebounds;  // impacts that a stop's rebound leads to are found again after it
+    late_impact_ = false;
+    changed_ = jointed_;  // others have been cast along what they fly with
     if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
-    int found = find_strikes(next, true);
-    if (late_blow_ && struck && !plastic_first_) {  // as are those to a body that it only stops
+    int found = find_impacts(next, true);
+    if (late_impact_ && stop_hit && !plastic_first_) {  // as are those to a body that it only stops
         plastic_first_ = true;
-        found += find_strikes(next, true);
+        found += find_impacts(next, true);
     }
-    if (found > 0) take_back_strikes(closed_points, next);
+    if (found > 0) move_impacts_to_start(closed_points, next);
     if (points_.empty()) return false;
     counters_.contacts += points_.size();
     order_points();
     return true;
 }
 
-/// What add_strike() and take_back_strikes() make of spheres and planes without a point at their meeting: half of the
+/// What add_toi_points() and move_impacts_to_start() make of spheres and planes without a point at their meeting: half of the
 /// contacts of a heap that moves come so. False if they may rebound, if another side of what does not move by itself may be
 /// met than is faced at the start, or if the point of the start does not stop them.
-bool ContactStage::add_strike_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity) {
-    bool elsewhere = std::min(unknown_[open.first], unknown_[open.second]) < 0;
+bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
+                                          const std::vector<Vec6>& velocity) {
+    bool elsewhere = std::min(solver_index_[open.first], solver_index_[open.second]) < 0;
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection_.collider(collider);
         const bool flat = own.shape.kind == ShapeKind::plane;
@@ -150,7 +152,7 @@ bool ContactStage::add_strike_at_start(const OpenPair& open, double time, const 
     if (elsewhere) return false;
     const int a = open.first, b = open.second;
     scratch_.clear();
-    detection_.touch(open.pair, search_[a] + search_[b], scratch_);
+    detection_.collide_pair(open.pair, search_[a] + search_[b], scratch_);
     if (scratch_.empty()) return false;
     const Contact& contact = scratch_.front();
     add_point(contact, poses_[a], poses_[b], time);
@@ -162,23 +164,24 @@ bool ContactStage::add_strike_at_start(const OpenPair& open, double time, const 
 }
 
 /// The points of a pair that meets at `time`, with the bodies where they will be then.
-bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& second, double time,
-                              const std::vector<Vec6>& velocity, bool late) {
+bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose& second, double time,
+                                  const std::vector<Vec6>& velocity, bool late) {
     const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
     const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
     scratch_.clear();
-    detection_.touch(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius), scratch_);
+    detection_.collide_pair(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius),
+                            scratch_);
     bool met = false;
     for (const Contact& contact : scratch_) {
         add_point(contact, first, second, time);
         Point& point = points_.back();
         const double closing = -relative(point, contact.point.normal, velocity, false);
-        // What forces give to one of them in this step is no blow, though both got it before one was held.
-        const double push = std::max({std::abs(relative(point, contact.point.normal, kick_, false)),
-                                      std::abs(dot(contact.point.normal, linear(kick_[contact.first]))),
-                                      std::abs(dot(contact.point.normal, linear(kick_[contact.second])))});
+        // What forces give to one of them in this step is no impact, though both got it before one was held.
+        const double push = std::max({std::abs(relative(point, contact.point.normal, dv_ext_, false)),
+                                      std::abs(dot(contact.point.normal, linear(dv_ext_[contact.first]))),
+                                      std::abs(dot(contact.point.normal, linear(dv_ext_[contact.second])))});
         if (late && !plastic_first_ && material(contact).restitution > 0.0 && closing > 4.0 * push) {
-            late_blow_ = true;
+            late_impact_ = true;
             points_.pop_back();
             continue;
         }
@@ -190,38 +193,39 @@ bool ContactStage::add_strike(IndexPair pair, const Pose& first, const Pose& sec
     return met;
 }
 
-/// A strike that is no event acts with the bodies at the start of the step, or the angular momentum of both would
+/// An impact that is no event acts with the bodies at the start of the step, or the angular momentum of both would
 /// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
 /// taken back half-way between both bodies, or with the one that moves by itself.
-void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& velocity) {
+void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity) {
     const double h = options_.time_step;
-    const auto is_there = [](const Point& point) { return point.at_start || point.strike < 0.0; };
+    const auto is_there = [](const Point& point) { return point.at_start || point.toi < 0.0; };
     if (std::all_of(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end(), is_there)) return;
-    strikes_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
+    toi_points_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
     points_.resize(from);
-    for (std::size_t k = 0; k < strikes_.size();) {
-        if (k + ahead < strikes_.size()) {
-            const Contact& later = strikes_[k + ahead].contact;
-            for (const int body : {later.first, later.second}) ask_for(poses_[body]), ask_for(velocity[body]);
+    for (std::size_t k = 0; k < toi_points_.size();) {
+        if (k + ahead < toi_points_.size()) {
+            const Contact& later = toi_points_[k + ahead].contact;
+            for (const int body : {later.first, later.second})
+                prefetch(poses_[body]), prefetch(velocity[body]);
         }
-        const Contact meeting = strikes_[k].contact;
-        const double strike = strikes_[k].strike;
+        const Contact meeting = toi_points_[k].contact;
+        const double toi = toi_points_[k].toi;
         std::size_t end = k;
-        while (end < strikes_.size() &&
-               (strikes_[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
+        while (end < toi_points_.size() &&
+               (toi_points_[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
             ++end;
-        if (strike < 0.0 || strikes_[k].event || strikes_[k].at_start) {
-            for (; k < end; ++k) points_.push_back(strikes_[k]);
+        if (toi < 0.0 || toi_points_[k].event || toi_points_[k].at_start) {
+            for (; k < end; ++k) points_.push_back(toi_points_[k]);
             continue;
         }
         const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
                              static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
         scratch_.clear();
-        detection_.touch(pair, search_[meeting.first] + search_[meeting.second], scratch_);
+        detection_.collide_pair(pair, search_[meeting.first] + search_[meeting.second], scratch_);
         const std::size_t old = points_.size();
         bool stops = false;
         // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
-        const bool fixed = std::min(unknown_[meeting.first], unknown_[meeting.second]) < 0;
+        const bool fixed = std::min(solver_index_[meeting.first], solver_index_[meeting.second]) < 0;
         const double same =
             fixed ? same_side
             : have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape)
@@ -232,7 +236,7 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
             }))
             scratch_.clear();
         for (const Contact& contact : scratch_) {
-            add_point(contact, poses_[contact.first], poses_[contact.second], strike);
+            add_point(contact, poses_[contact.first], poses_[contact.second], toi);
             stops =
                 stops ||
                 contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
@@ -243,11 +247,12 @@ void ContactStage::take_back_strikes(std::size_t from, const std::vector<Vec6>& 
         }
         points_.resize(old);
         for (; k < end; ++k) {
-            Point& p = points_.emplace_back(strikes_[k]);
+            Point& p = points_.emplace_back(toi_points_[k]);
             const int a = p.contact.first, b = p.contact.second;
-            const bool alone = std::min(unknown_[a], unknown_[b]) < 0;  // then its arm is that of the meeting
-            const Vec3 own = linear(velocity[unknown_[a] < 0 ? b : a]);
-            p.contact.point.position -= p.strike * (alone ? own : 0.5 * (own + linear(velocity[b])));
+            const bool alone =
+                std::min(solver_index_[a], solver_index_[b]) < 0;  // then its arm is that of the meeting
+            const Vec3 own = linear(velocity[solver_index_[a] < 0 ? b : a]);
+            p.contact.point.position -= p.toi * (alone ? own : 0.5 * (own + linear(velocity[b])));
             if (alone) continue;
             p.first_arm = p.contact.point.position - poses_[a].position;
             p.second_arm = p.contact.point.position - poses_[b].position;

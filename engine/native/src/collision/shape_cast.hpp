@@ -34,6 +34,6 @@ double turning_arm(const Primitive& shape, const Pose& part) noexcept;
 /// they touch; negative if there is none. Conservative advancement (Mirtich 1996): a direction that separates two
 /// shapes by a gap keeps them apart until their approach along it has used the gap up. Shapes that slide along
 /// each other or pass by never touch.
-double first_touch(const Mover& first, const Mover& second, double duration, double slop) noexcept;
+double time_of_impact(const Mover& first, const Mover& second, double duration, double slop) noexcept;
 
 }  // namespace spook

@@ -32,8 +32,8 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 
 }  // namespace
 
-/// h²/4 K of every tied body, from the forces of the step before.
-void RigidSystem::stiffen() {
+/// h²/4 K of every constrained body, from the forces of the step before.
+void RigidSystem::add_geometric_stiffness() {
     const auto blocks = joints_.blocks();
     std::fill(stiffness_.begin(), stiffness_.end(), Mat3{});
     for (std::size_t k = 0; k < blocks.size(); ++k) {
@@ -45,11 +45,11 @@ void RigidSystem::stiffen() {
             impulse += state.multiplier[i] * Vec3{rows[0], rows[1], rows[2]};
         for (const bool second : {false, true}) {
             const int body = second ? blocks[k].second : blocks[k].first;
-            if (body < 0 || slot_[body] < 0 || constants_[body].particle) continue;
+            if (body < 0 || solver_index_[body] < 0 || constants_[body].particle) continue;
             const Vec3 arm = second ? state.second_reach : state.first_reach;
             const double pull = (second ? 1.0 : -1.0) * dot(arm, impulse), length2 = dot(arm, arm);
             if (!(pull > 0.0) || length2 == 0.0) continue;
-            Mat3& held = stiffness_[slot_[body]];
+            Mat3& held = stiffness_[solver_index_[body]];
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
                     held(i, j) += 0.25 * h_ * pull * ((i == j ? 1.0 : 0.0) - arm[i] * arm[j] / length2);
@@ -60,12 +60,12 @@ void RigidSystem::stiffen() {
 /// The forces at the start, which the stiffness of the first step is made of. The first round knows none and moves
 /// light bodies under a heavy load far too fast; its forces are right all the same.
 void RigidSystem::find_tensions() {
-    stiffness_.assign(tied_.size(), Mat3{});
+    stiffness_.assign(constrained_.size(), Mat3{});
     if (islands_.empty()) find_islands();
     if (!force_.empty()) apply_forces();
     const auto blocks = joints_.blocks();
     for (int round = 0; round < 3; ++round) {
-        if (round > 0) stiffen();
+        if (round > 0) add_geometric_stiffness();
         assemble_blocks();
         fill_inertias();
         fill_block_momenta();
@@ -80,20 +80,21 @@ void RigidSystem::find_tensions() {
 
 /// Tied bodies by what joins them, without those that the world, a fixed or a driven body holds.
 void RigidSystem::find_islands() {
-    std::vector<int> root(tied_.size() + 1);  // the last one is all that does not float
+    std::vector<int> root(constrained_.size() + 1);  // the last one is all that does not float
     std::iota(root.begin(), root.end(), 0);
     const auto find = [&root](int i) {
         while (root[i] != i) i = root[i] = root[root[i]];
         return i;
     };
     const auto place = [this](int body) {
-        return body < 0 || slot_[body] < 0 ? static_cast<int>(tied_.size()) : slot_[body];
+        return body < 0 || solver_index_[body] < 0 ? static_cast<int>(constrained_.size())
+                                                   : solver_index_[body];
     };
     for (const JointBlock& block : joints_.blocks())
         root[find(place(block.first))] = find(place(block.second));
     std::vector<std::vector<int>> members(root.size());
-    for (int k = 0; k < static_cast<int>(tied_.size()); ++k) members[find(k)].push_back(k);
-    const int held = find(static_cast<int>(tied_.size()));
+    for (int k = 0; k < static_cast<int>(constrained_.size()); ++k) members[find(k)].push_back(k);
+    const int held = find(static_cast<int>(constrained_.size()));
     for (int k = 0; k < static_cast<int>(members.size()); ++k)
         if (k != held && !members[k].empty()) islands_.push_back(members[k]);
 }
@@ -106,16 +107,17 @@ void RigidSystem::keep_angular_momentum() {
         const Vec3 centre = island_frame(island).centre;
         Vec3 missing;
         for (int k : island) {
-            if (constants_[tied_[k]].particle) continue;
+            if (constants_[constrained_[k]].particle) continue;
             const double* x = values(k);
-            missing += stiffness_[k] * (Vec3{x[3], x[4], x[5]} - live_.bodies[tied_[k]].angular_velocity);
+            missing +=
+                stiffness_[k] * (Vec3{x[3], x[4], x[5]} - live_.bodies[constrained_[k]].angular_velocity);
         }
         const Vec3 turn = turn_of(island, centre, missing);
         for (int k : island) {
             double* x = values(k);
-            const Vec3 v = cross(turn, position_of(tied_[k]) - centre);
+            const Vec3 v = cross(turn, position_of(constrained_[k]) - centre);
             for (int i = 0; i < 3; ++i) x[i] += v[i];
-            for (int i = 0; i < 3 && !constants_[tied_[k]].particle; ++i) x[3 + i] += turn[i];
+            for (int i = 0; i < 3 && !constants_[constrained_[k]].particle; ++i) x[3 + i] += turn[i];
         }
     }
 }
@@ -127,22 +129,23 @@ Vec3 RigidSystem::turn_of(const std::vector<int>& members, Vec3 centre, Vec3 ang
     Vec3 line{1.0, 0.0, 0.0};
     double most = 0.0;
     for (int k : members) {
-        const Vec3 r = position_of(tied_[k]) - centre;
-        const double share = constants_[tied_[k]].mass * dot(r, r);
+        const Vec3 r = position_of(constrained_[k]) - centre;
+        const double share = constants_[constrained_[k]].mass * dot(r, r);
         if (share > most) most = share, line = (1.0 / norm(r)) * r;
     }
     const Vec3 aside = cross(line, std::abs(line.x) < 0.6 ? Vec3{1.0, 0.0, 0.0} : Vec3{0.0, 1.0, 0.0});
     const Vec3 across = (1.0 / norm(aside)) * aside, axes[3] = {line, across, cross(line, across)};
     Mat3 inertia;
     for (int k : members) {
-        const BodyConstants& body = constants_[tied_[k]];
-        const Vec3 place = position_of(tied_[k]) - centre;
+        const BodyConstants& body = constants_[constrained_[k]];
+        const Vec3 place = position_of(constrained_[k]) - centre;
         const Vec3 r{dot(axes[0], place), dot(axes[1], place), dot(axes[2], place)};
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {
                 const double others = r[(i + 1) % 3] * r[(i + 1) % 3] + r[(i + 2) % 3] * r[(i + 2) % 3];
                 inertia(i, j) += body.mass * (i == j ? others : -r[i] * r[j]);
-                if (!body.particle) inertia(i, j) += dot(axes[i], live_.bodies[tied_[k]].inertia * axes[j]);
+                if (!body.particle)
+                    inertia(i, j) += dot(axes[i], live_.bodies[constrained_[k]].inertia * axes[j]);
             }
     }
     const Vec3 l = angular_momentum;
@@ -150,24 +153,24 @@ Vec3 RigidSystem::turn_of(const std::vector<int>& members, Vec3 centre, Vec3 ang
     return w.x * axes[0] + w.y * axes[1] + w.z * axes[2];
 }
 
-/// Centre of mass of some tied bodies, and their inertia about it as if they were one.
+/// Centre of mass of some constrained bodies, and their inertia about it as if they were one.
 RigidSystem::IslandFrame RigidSystem::island_frame(const std::vector<int>& members) const {
     IslandFrame frame;
     double mass = 0.0;
     for (int k : members) {
-        const BodyConstants& body = constants_[tied_[k]];
-        frame.centre += body.mass * position_of(tied_[k]);
+        const BodyConstants& body = constants_[constrained_[k]];
+        frame.centre += body.mass * position_of(constrained_[k]);
         mass += body.mass;
     }
     frame.centre *= 1.0 / mass;
     for (int k : members) {
-        const BodyConstants& body = constants_[tied_[k]];
-        const Vec3 r = position_of(tied_[k]) - frame.centre;
+        const BodyConstants& body = constants_[constrained_[k]];
+        const Vec3 r = position_of(constrained_[k]) - frame.centre;
         const double r2 = dot(r, r);
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j)
                 frame.inertia(i, j) += body.mass * ((i == j ? r2 : 0.0) - r[i] * r[j]) +
-                                       (body.particle ? 0.0 : live_.bodies[tied_[k]].inertia(i, j));
+                                       (body.particle ? 0.0 : live_.bodies[constrained_[k]].inertia(i, j));
     }
     return frame;
 }

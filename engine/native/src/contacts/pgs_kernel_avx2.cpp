@@ -1,5 +1,5 @@
 // Four contacts in vectors of four. Not fused multiply-add: that would round differently.
-#include "contacts/sweep_kernel.hpp"
+#include "contacts/pgs_kernel.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -9,7 +9,7 @@
 #pragma GCC target("avx2")
 #define SPOOK_ISA avx2
 #define SPOOK_FOURS
-#include "contacts/contact_update.inl"
+#include "contacts/pgs_contact.inl"
 #define FOURS inline __attribute__((always_inline))
 
 namespace spook {
@@ -40,9 +40,9 @@ FOURS void gather(const double* const from[4], int at, Four& a, Four& b, Four& c
 
 template <bool round_only> struct FourBodies {
     const int* at;
-    SweptBody* bodies;
-    const SweptInertia* inertia;
-    int nobody;
+    PgsBody* bodies;
+    const PgsInertia* inertia;
+    int fixed_body;
 
     FOURS void read(Three<Four>& v, Three<Four>& w, Four& inverse_mass, Four& round) const {
         const double* from[4];
@@ -67,7 +67,7 @@ template <bool round_only> struct FourBodies {
         transpose(e, f, g, h);
         const Four front[4] = {a, b, c, d}, back[4] = {e, f, g, h};
         for (int i = 0; i < 4; ++i) {
-            if (at[i] == nobody) continue;
+            if (at[i] == fixed_body) continue;
             double* const to = bodies[at[i]].velocity.data();
             *reinterpret_cast<FourInMemory*>(to) = front[i];
             *reinterpret_cast<FourInMemory*>(to + 4) = back[i];
@@ -75,18 +75,18 @@ template <bool round_only> struct FourBodies {
     }
 };
 
-template <bool with_slip, bool with_rest, bool round_only> struct FourContacts {
+template <bool with_slip, bool with_extras, bool round_only> struct FourContacts {
     static constexpr bool rough = with_slip;
     double* const* at;
     const double* const* slip;
-    const double* const* rest;
+    const double* const* extras;
     const int *firsts, *seconds;
-    SweptBody* bodies;
-    const SweptInertia* inertia;
-    int nobody;
+    PgsBody* bodies;
+    const PgsInertia* inertia;
+    int fixed_body;
 
-    FOURS FourBodies<round_only> first() const { return {firsts, bodies, inertia, nobody}; }
-    FOURS FourBodies<round_only> second() const { return {seconds, bodies, inertia, nobody}; }
+    FOURS FourBodies<round_only> first() const { return {firsts, bodies, inertia, fixed_body}; }
+    FOURS FourBodies<round_only> second() const { return {seconds, bodies, inertia, fixed_body}; }
     FOURS void arms(Three<Four>& first, Three<Four>& second, Four& right) const {
         Four names;
         gather(at, 0, names, first.x, first.y, first.z);
@@ -98,30 +98,30 @@ template <bool with_slip, bool with_rest, bool round_only> struct FourContacts {
         t.x = t.y = t.z = friction = Four{};
         if (with_slip) gather(slip, 0, t.x, t.y, t.z, friction);
     }
-    FOURS void normal_rest(Four& softness, Four& before) const {
+    FOURS void normal_extras(Four& softness, Four& before) const {
         softness = before = Four{};
-        if (!with_rest) return;
+        if (!with_extras) return;
         Four a, b;
-        gather(rest, 4, a, softness, b, before);
+        gather(extras, 4, a, softness, b, before);
     }
     FOURS void across(Three<Four>& u, const Three<Four>& normal, const Three<Four>& tangent) const {
-        if (!with_rest) {
+        if (!with_extras) {
             u = cross(normal, tangent);
             return;
         }
         Four a;
-        gather(rest, 0, u.x, u.y, u.z, a);
+        gather(extras, 0, u.x, u.y, u.z, a);
     }
     FOURS void tangent_scales(Four& coupling1, Four& coupling2, Four& step) const {
         Four a;
         gather(slip, 4, coupling1, coupling2, step, a);
     }
-    FOURS void tangent_rest(Four& right1, Four& right2, Four& softness) const {
+    FOURS void tangent_extras(Four& right1, Four& right2, Four& softness) const {
         right1 = right2 = softness = Four{};
-        if (!with_rest) return;
+        if (!with_extras) return;
         Four a, b, c;
-        gather(rest, 0, a, b, c, right1);
-        gather(rest, 4, right2, a, softness, b);
+        gather(extras, 0, a, b, c, right1);
+        gather(extras, 4, right2, a, softness, b);
     }
     FOURS void write(const Four* z, const Four& own_inverse) const {
         Four a = z[0], b = z[1], c = z[2], d = own_inverse;
@@ -134,34 +134,34 @@ template <bool with_slip, bool with_rest, bool round_only> struct FourContacts {
 }  // namespace
 }  // namespace avx2
 
-void avx2_sweep_four(const SweepGroup& group) {
+void avx2_solve_four(const PgsGroup& group) {
     using namespace avx2;
-    static_assert(offsetof(SweptContact, first_arm) == 8 && offsetof(SweptContact, second_arm) == 32 &&
-                  offsetof(SweptContact, normal) == 64 && offsetof(SweptContact, impulse) == 96 &&
-                  offsetof(SweptSlip, coupling) == 32 && offsetof(SweptRest, right_across) == 32 &&
-                  offsetof(SweptBody, inverse_mass) == 48 && offsetof(SweptInertia, yz) == 32);
+    static_assert(offsetof(PackedContact, first_arm) == 8 && offsetof(PackedContact, second_arm) == 32 &&
+                  offsetof(PackedContact, normal) == 64 && offsetof(PackedContact, impulse) == 96 &&
+                  offsetof(PackedFriction, coupling) == 32 && offsetof(PackedExtras, right_across) == 32 &&
+                  offsetof(PgsBody, inverse_mass) == 48 && offsetof(PgsInertia, yz) == 32);
     double* at[4];
-    const double *slip[4], *rest[4];
+    const double *slip[4], *extras[4];
     int first[4], second[4];
     for (int i = 0; i < 4; ++i) {
         at[i] = reinterpret_cast<double*>(group.contacts[i]);
         first[i] = group.contacts[i]->first;
         second[i] = group.contacts[i]->second;
         if (group.slips != nullptr) slip[i] = reinterpret_cast<const double*>(group.slips[i]);
-        if (group.rests != nullptr) rest[i] = reinterpret_cast<const double*>(group.rests[i]);
+        if (group.extras != nullptr) extras[i] = reinterpret_cast<const double*>(group.extras[i]);
     }
     FourInMemory& change = *reinterpret_cast<FourInMemory*>(group.change);
-    const auto solve = [&]<bool with_slip, bool with_rest>() __attribute__((always_inline)) {
+    const auto solve = [&]<bool with_slip, bool with_extras>() __attribute__((always_inline)) {
         const auto over = [&]<bool round_only>() __attribute__((always_inline)) {
             change = solve_contact<Four>(
-                FourContacts<with_slip, with_rest, round_only>{at, slip, rest, first, second, group.bodies,
-                                                               group.inertia, group.nobody},
+                FourContacts<with_slip, with_extras, round_only>{
+                    at, slip, extras, first, second, group.bodies, group.inertia, group.fixed_body},
                 Disc{}, false);
         };
         if (group.inertia == nullptr) over.template operator()<true>();
         else over.template operator()<false>();
     };
-    if (group.rests != nullptr) solve.template operator()<true, true>();
+    if (group.extras != nullptr) solve.template operator()<true, true>();
     else if (group.slips != nullptr) solve.template operator()<true, false>();
     else solve.template operator()<false, false>();
 }
@@ -170,6 +170,6 @@ void avx2_sweep_four(const SweepGroup& group) {
 #pragma GCC pop_options
 #else
 namespace spook {
-void avx2_sweep_four(const SweepGroup& group) { portable_sweep_four(group); }
+void avx2_solve_four(const PgsGroup& group) { portable_solve_four(group); }
 }  // namespace spook
 #endif

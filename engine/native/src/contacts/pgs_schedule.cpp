@@ -1,8 +1,8 @@
-// In which order contacts are swept: islands, and levels of contacts that share no body.
+// In which order contacts are updated: islands, and levels of contacts that share no body.
 #include <algorithm>
 #include <utility>
 
-#include "contacts/contact_sweeps.hpp"
+#include "contacts/pgs_solver.hpp"
 
 namespace spook {
 
@@ -12,31 +12,31 @@ constexpr double few_late = 0.1;  // of all items: so many get levels of their o
 
 }  // namespace
 
-int ContactSweeps::root(int body) noexcept {
+int PgsSolver::root(int body) noexcept {
     while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
     return body;
 }
 
 /// Joins the islands of both bodies.
-void ContactSweeps::link(int first, int second) {
+void PgsSolver::link(int first, int second) {
     bodies_of_.push_back({first >= 0 ? first : bodies_, second >= 0 ? second : bodies_});
     if (first >= 0 && second >= 0) join(first, second);
-    if (swept_ && (first >= 0 || second >= 0)) active_[root(first >= 0 ? first : second)] = 1;
+    if (started_ && (first >= 0 || second >= 0)) active_[root(first >= 0 ? first : second)] = 1;
 }
 
-void ContactSweeps::join(int first, int second) {
+void PgsSolver::join(int first, int second) {
     int a = root(first), b = root(second);
     if (a == b) return;
     if (a > b) std::swap(a, b);
     parent_[b] = a;
     joined_ = true;
-    left_[a] = larger(left_[a], left_[b]);
-    spent_[a] = spent_[a] || spent_[b];
+    last_change_[a] = larger(last_change_[a], last_change_[b]);
+    limit_reached_[a] = limit_reached_[a] || limit_reached_[b];
     active_[a] = active_[a] || active_[b];
 }
 
 /// Islands of all items, and levels of those that have none yet; contacts that have no place yet get one in that order.
-void ContactSweeps::schedule() {
+void PgsSolver::schedule() {
     const std::size_t items = bodies_of_.size();
     if (items - scheduled_ > few_late * static_cast<double>(items)) {  // all anew, or levels would be short
         scheduled_ = listed_ = sized_ = 0;
@@ -46,7 +46,8 @@ void ContactSweeps::schedule() {
         known_.assign(bodies_ + 1, 0);
     }
     if (joined_) {
-        for (Due& due : order_) due.island = root(std::min(due.first, due.second));
+        for (Scheduled& scheduled : order_)
+            scheduled.island = root(std::min(scheduled.first, scheduled.second));
         std::erase_if(roots_, [this](int island) { return parent_[island] != island; });
         joined_ = false;
         sized_ = 0;
@@ -103,39 +104,39 @@ void ContactSweeps::schedule() {
     select();
 }
 
-/// Contacts of hot bodies, in this sweep and, from then on, the next.
-void ContactSweeps::mark_hot() {
-    if (listed_ == 0) first_due_.assign(bodies_, -1);
-    next_due_.resize(2 * order_.size());
+/// Contacts of active bodies, in this iteration and, from then on, the next.
+void PgsSolver::mark_active() {
+    if (listed_ == 0) first_marked_.assign(bodies_, -1);
+    next_marked_.resize(2 * order_.size());
     for (; listed_ < order_.size(); ++listed_) {
         const int bodies[2] = {order_[listed_].first, order_[listed_].second};
         for (std::size_t side = 0; side < 2; ++side) {
             if (bodies[side] == bodies_) continue;
             const std::size_t at = 2 * listed_ + side;
-            next_due_[at] = std::exchange(first_due_[bodies[side]], static_cast<int>(at));
+            next_marked_[at] = std::exchange(first_marked_[bodies[side]], static_cast<int>(at));
         }
     }
-    due_now_.assign(order_.size() / 64 + 1, 0);
-    due_next_.assign(order_.size() / 64 + 1, 0);
+    marked_now_.assign(order_.size() / 64 + 1, 0);
+    marked_next_.assign(order_.size() / 64 + 1, 0);
     for (int b = 0; b < bodies_; ++b)
-        if (hot_[b] != 0) mark(b);
-    std::fill(due_next_.begin(), due_next_.end(), 0);
+        if (active_bodies_[b] != 0) mark(b);
+    std::fill(marked_next_.begin(), marked_next_.end(), 0);
     for (int b = 0; b < bodies_; ++b)
-        if ((hot_[b] & now_hot) != 0) mark(b);
+        if ((active_bodies_[b] & active_now) != 0) mark(b);
     marked_ = true;
 }
 
-void ContactSweeps::mark(int body) noexcept {
-    for (int at = first_due_[body]; at >= 0; at = next_due_[at]) {
+void PgsSolver::mark(int body) noexcept {
+    for (int at = first_marked_[body]; at >= 0; at = next_marked_[at]) {
         const std::size_t place = static_cast<std::size_t>(at) / 2;
         const std::uint64_t bit = std::uint64_t{1} << (place % 64);
-        due_now_[place / 64] |= bit;
-        due_next_[place / 64] |= bit;
+        marked_now_[place / 64] |= bit;
+        marked_next_[place / 64] |= bit;
     }
 }
 
 /// The contacts of islands that are active.
-void ContactSweeps::select() {
+void PgsSolver::select() {
     whole_ = std::all_of(roots_.begin(), roots_.end(), [this](int island) { return active_[island] != 0; });
     if (whole_) return;
     active_order_.clear();

@@ -1,4 +1,4 @@
-// One contact's share of a sweep, over single numbers or over vectors of them. Included once per instruction set, with
+// One contact's share of an iteration, over single numbers or over vectors of them. Included once per instruction set, with
 // SPOOK_ISA naming it. Only elementwise operations in a fixed order, and contraction is off: all round alike.
 
 #define SPOOK_ALWAYS inline __attribute__((always_inline))
@@ -71,7 +71,7 @@ template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from
     from.normal(normal, own);
     from.impulse(impulse, own_inverse);
     from.tangent(tangent, friction);  // nothing where it has none
-    from.normal_rest(softness, before);
+    from.normal_extras(softness, before);
     const R zero{}, old = impulse[0];
     const R asked = old - (dot(normal, u) + softness * old - right) * own_inverse;
     const R nu = asked <= 0.0 ? zero : asked;  // what is not a number stays
@@ -85,7 +85,7 @@ template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from
         R right1, right2, coupling1, coupling2, slip_softness, step;
         from.across(across, normal, tangent);
         from.tangent_scales(coupling1, coupling2, step);
-        from.tangent_rest(right1, right2, slip_softness);
+        from.tangent_extras(right1, right2, slip_softness);
         const R s1 = dot(tangent, u) + coupling1 * dn + slip_softness * impulse[1] - right1;
         const R s2 = dot(across, u) + coupling2 * dn + slip_softness * impulse[2] - right2;
         const R own_change = law(step, impulse[1], impulse[2], s1, s2, bound, d1, d2);
@@ -108,19 +108,19 @@ template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from
     return change;
 }
 
-/// A contact by itself. `nobody`, which does not move, is not written.
+/// A contact by itself. `fixed_body`, which does not move, is not written.
 struct Single {
     static constexpr bool rough = true;
-    SweptContact& c;
-    const SweptSlip& slip;
-    const SweptRest* rest;  // null: none
-    SweptBody* bodies;
-    const SweptInertia* inertia;  // null: all are round
-    int nobody;
+    PackedContact& c;
+    const PackedFriction& slip;
+    const PackedExtras* extras;  // null: none
+    PgsBody* bodies;
+    const PgsInertia* inertia;  // null: all are round
+    int fixed_body;
 
     struct Body {
-        SweptBody& own;
-        const SweptInertia* inertia;
+        PgsBody& own;
+        const PgsInertia* inertia;
         bool moves;
         SPOOK_ALWAYS void read(Three<double>& v, Three<double>& w, double& inverse_mass,
                                double& round) const {
@@ -137,7 +137,7 @@ struct Single {
         }
     };
     SPOOK_ALWAYS Body body(int at) const {
-        return {bodies[at], inertia != nullptr ? inertia + at : nullptr, at != nobody};
+        return {bodies[at], inertia != nullptr ? inertia + at : nullptr, at != fixed_body};
     }
     SPOOK_ALWAYS static Three<double> three(const Vec3& a) { return {a.x, a.y, a.z}; }
     SPOOK_ALWAYS Body first() const { return body(c.first); }
@@ -153,20 +153,20 @@ struct Single {
     SPOOK_ALWAYS void tangent(Three<double>& t, double& friction) const {
         t = three(slip.tangent), friction = slip.friction;
     }
-    SPOOK_ALWAYS void normal_rest(double& softness, double& before) const {
+    SPOOK_ALWAYS void normal_extras(double& softness, double& before) const {
         softness = before = 0.0;
-        if (rest != nullptr) softness = rest->softness, before = rest->normal_before;
+        if (extras != nullptr) softness = extras->softness, before = extras->normal_before;
     }
     SPOOK_ALWAYS void across(Three<double>& u, const Three<double>& n, const Three<double>& t) const {
-        u = rest != nullptr ? three(rest->across) : cross(n, t);
+        u = extras != nullptr ? three(extras->across) : cross(n, t);
     }
     SPOOK_ALWAYS void tangent_scales(double& coupling1, double& coupling2, double& step) const {
         coupling1 = slip.coupling[0], coupling2 = slip.coupling[1], step = slip.step;
     }
-    SPOOK_ALWAYS void tangent_rest(double& right1, double& right2, double& softness) const {
+    SPOOK_ALWAYS void tangent_extras(double& right1, double& right2, double& softness) const {
         right1 = right2 = softness = 0.0;
-        if (rest != nullptr)
-            right1 = rest->right_along, right2 = rest->right_across, softness = rest->slip_softness;
+        if (extras != nullptr)
+            right1 = extras->right_along, right2 = extras->right_across, softness = extras->slip_softness;
     }
     SPOOK_ALWAYS void write(const double* z, double) const {
         for (int k = 0; k < 3; ++k) c.impulse[k] = z[k];

@@ -1,4 +1,4 @@
-#include "rigid/following_bounds.hpp"
+#include "rigid/load_dependent_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,14 +8,14 @@
 
 namespace spook {
 
-void FollowingBounds::take(const JointSet& joints, bool eyes, bool tyres, bool bearings) {
+void LoadDependentBounds::take(const JointSet& joints, bool eyes, bool tyres, bool bearings) {
     for (int k = 0; eyes && k < static_cast<int>(joints.eyes().size()); ++k) eyes_.push_back(k);
     for (int k = 0; tyres && k < static_cast<int>(joints.tyres().size()); ++k) tyres_.push_back(k);
     for (int k = 0; bearings && k < static_cast<int>(joints.bearings().size()); ++k) bearings_.push_back(k);
     last_.resize(eyes_.size());
 }
 
-double FollowingBounds::follow(MixedSystem& solved, JointSet& joints) {
+double LoadDependentBounds::follow(MixedSystem& solved, JointSet& joints) {
     off_ = 0.0;
     for (int k = 0; k < static_cast<int>(eyes_.size()); ++k) follow_eye(k, solved, joints);
     for (int k : tyres_) follow_tyre(k, solved, joints);
@@ -24,7 +24,7 @@ double FollowingBounds::follow(MixedSystem& solved, JointSet& joints) {
     return off_;
 }
 
-void FollowingBounds::follow_eye(int eye, MixedSystem& solved, JointSet& joints) {
+void LoadDependentBounds::follow_eye(int eye, MixedSystem& solved, JointSet& joints) {
     const EyeRow& row = joints.eyes()[eyes_[eye]];
     RowBlock& own = solved.rows[row.block];
     double pull = -solved.rows[row.wire].multiplier[0];  // T₁ h
@@ -46,7 +46,7 @@ void FollowingBounds::follow_eye(int eye, MixedSystem& solved, JointSet& joints)
     joints.states[joints.blocks()[row.block].joint].bound[0] = next;
 }
 
-void FollowingBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& joints) {
+void LoadDependentBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& joints) {
     const TyreRows& of = joints.tyres()[tyre];
     RowBlock& rows = solved.rows[of.block];
     const double load = std::max(0.0, rows.multiplier[0]);
@@ -70,7 +70,7 @@ void FollowingBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& joint
     }
 }
 
-void FollowingBounds::follow_bearing(int bearing, MixedSystem& solved, JointSet& joints) {
+void LoadDependentBounds::follow_bearing(int bearing, MixedSystem& solved, JointSet& joints) {
     const BearingRow& of = joints.bearings()[bearing];
     RowBlock& rows = solved.rows[of.block];
     const RowBlock& holding = solved.rows[of.holding];
@@ -93,17 +93,17 @@ void FollowingBounds::follow_bearing(int bearing, MixedSystem& solved, JointSet&
 
 /// Rows with bounds and without contacts: solved again while bounds that follow other rows move.
 bool RigidSystem::pivot_rows() {
-    following_.begin();
+    load_dependent_.begin();
     for (int round = 0;; ++round) {
         const PivotReport report = pivot_.solve(mixed_, round > 0);
         rounds_ += static_cast<std::uint64_t>(report.rounds);
-        if (!report.finite || following_.empty()) return report.finite;
-        const double off = following_.follow(mixed_, joints_);
-        if (off <= FollowingBounds::AGREED) return true;
-        if (round < FollowingBounds::MOST_ROUNDS) continue;
+        if (!report.finite || load_dependent_.empty()) return report.finite;
+        const double off = load_dependent_.follow(mixed_, joints_);
+        if (off <= LoadDependentBounds::AGREED) return true;
+        if (round < LoadDependentBounds::MOST_ROUNDS) continue;
         // In speeds: what the missing impulse would have given the lightest of its bodies.
-        const RowBlock& rows = mixed_.rows[following_.worst()];
-        const int body = tied_[rows.second >= 0 ? rows.second : rows.first];
+        const RowBlock& rows = mixed_.rows[load_dependent_.worst()];
+        const int body = constrained_[rows.second >= 0 ? rows.second : rows.first];
         const double missed = off * std::abs(rows.multiplier[0]) / constants_[body].mass;
         if (missed > method_.unsettled_residual) note_unsettled(body, missed);
         return true;

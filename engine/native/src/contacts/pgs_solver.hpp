@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "contacts/friction_point.hpp"
-#include "contacts/sweep_kernel.hpp"
-#include "contacts/sweep_rows.hpp"
+#include "contacts/pgs_kernel.hpp"
+#include "contacts/pgs_rows.hpp"
 #include "linear/ahead.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
@@ -15,11 +15,11 @@
 
 namespace spook {
 
-/// One contact as the sweeps take it. The rows are C v₊ + Sig nu >= right[0] ⟂ nu >= 0 along the normal, and
+/// One contact as the iterations take it. The rows are C v₊ + Sig nu >= right[0] ⟂ nu >= 0 along the normal, and
 /// friction against the slip D v₊ + (gamma/h) beta − right[1 … 2] along the tangents.
-struct SweepContact {
+struct PgsContact {
     int first = -1, second = -1;   // moving bodies, −1 for one that does not move
-    Vec3 normal, tangent, across;  // orthogonal; unit, but the tangents of a friction that is stretched
+    Vec3 normal, tangent, across;  // orthogonal; unit, but the tangents of a friction that is anisotropic
     Vec3 first_arm, second_arm;    // from the centres of mass, m
     double right[3] = {0, 0, 0};   // m/s
     double softness = 0.0;         // Sig
@@ -27,43 +27,42 @@ struct SweepContact {
     double friction = 0.0;         // mu
     double normal_before = -1.0;  // nu of the step before, what the box bounds friction by; negative: unknown
     double impulse[3] = {0, 0, 0};  // nu, beta: the start, then the result
-    bool stretched = false;         // see FrictionPoint
+    bool anisotropic = false;       // see FrictionPoint
 };
 
-/// A contact costs one reading of its two bodies and one writing per sweep: the relative velocity at the point
+/// A contact costs one reading of its two bodies and one writing per iteration: the relative velocity at the point
 /// serves all three rows, their own 3×3 part of C M⁻¹ Cᵀ carries the normal's change over to the tangents.
-/// Islands are swept until they have settled, each for itself. Contacts may be added between sweeps, so that a pair
+/// Islands are updated until they have settled, each for itself. Contacts may be added between iterations, so that a pair
 /// that meets only because of this step's impulses has its rows in the same solve; islands then grow together.
-/// Rows are swept in the order they were given, or so that nobody sees a difference: four at once, and on several
+/// Rows are updated in the order they were given, or in an equivalent order with the same bits: four at once, and on several
 /// threads, where they share no body. Equal input gives equal bits, whatever the number of threads. Memory is kept.
-class ContactSweeps {
+class PgsSolver {
 public:
-    /// From now on contacts that share no body are swept on as many threads: the bits are the same. null: on one.
+    /// From now on contacts that share no body are updated on as many threads: the bits are the same. null: on one.
     void help(Team* team) noexcept { team_ = team; }
 
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
     /// The same, with the masses that `other` was started with; each change of a normal impulse is `relaxation` times what
     /// its own row asks for, between 0 and 2: what is spread over many rows gets there sooner with a little more than 1. The
-    /// last two sweeps are plain, so that what was pushed too far comes back.
-    void start_beside(const ContactSweeps& other, MixedSystem& system, FrictionModel model,
-                      double relaxation);
+    /// last two iterations are plain, so that what was pushed too far comes back.
+    void start_beside(const PgsSolver& other, MixedSystem& system, FrictionModel model, double relaxation);
     /// Announces a contact that add() will bring, in the same order; after arrange() those announced have their places, one
-    /// behind the other as they are swept: memory at random is what large heaps cost.
+    /// behind the other as they are updated: memory at random is what large heaps cost.
     void announce(int first, int second) { link(first, second); }
     void arrange();
     /// Adds a contact; its index counts from 0. What was not announced is kept in the order it was given.
-    int add(const SweepContact& contact);
+    int add(const PgsContact& contact);
 
-    /// Sweeps until no row changes by more than `tolerance` [m/s] in a sweep, or an island was swept `iterations`
-    /// times: it is spent then. `more` is called after the 2nd, 4th, 8th … sweep, and with true when all is done: it may
-    /// add contacts and says whether it did; those that come after the last sweep get `iterations` more, three times at
-    /// most. May be called again, to go on: then `more` is only asked in the end, and what is spent is swept only where
+    /// Iterates until no row changes by more than `tolerance` [m/s] in an iteration, or an island was updated `iterations`
+    /// times: it has reached its limit then. `more` is called after the 2nd, 4th, 8th … iteration, and with true when all is done: it may
+    /// add contacts and says whether it did; those that come after the last iteration get `iterations` more, three times at
+    /// most. May be called again, to go on: then `more` is only asked in the end, and what has reached its limit is updated only where
     /// a body is new to its contacts, was found by worst(), or was just changed by more than `focus` [m/s]: in a large
     /// heap something somewhere always asks.
     FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool(bool)>& more);
 
-    /// What has been done since start(), in sweeps over everything there is now; looking for the worst is work, too.
+    /// What has been done since start(), in iterations over everything there is now; looking for the worst is work, too.
     double work() const noexcept {
         return bodies_of_.empty() ? 0.0 : done_ / static_cast<double>(bodies_of_.size());
     }
@@ -87,51 +86,52 @@ public:
     RowsResidual worst(double focus) { return worst(focus, focus); }
 
 private:
-    struct Box {                    // what only boxes and stretched friction read
+    struct Box {                    // what only boxes and anisotropic friction read
         double own[3] = {0, 0, 0};  // (t, t), (t, u), (u, u), with gamma/h
-        bool stretched = false;
+        bool anisotropic = false;
     };
     struct Both {
         int first, second;  // bodies; bodies_ for one that does not move
     };
-    /// A contact in the order of a sweep.
-    struct Due {
+    /// A contact in the order of an iteration.
+    struct Scheduled {
         int item, first, second, island;  // joints and its place; its bodies and root
     };
     void begin(MixedSystem& system, FrictionModel model);
     Vec3 turned(int body, Vec3 moment) const noexcept;
-    SweptBody& body(int at) noexcept { return joints_.bodies()[at]; }
-    const SweptBody& body(int at) const noexcept { return joints_.bodies()[at]; }
-    void add_slip(const SweepContact& given, int place);
+    PgsBody& body(int at) noexcept { return joints_.bodies()[at]; }
+    const PgsBody& body(int at) const noexcept { return joints_.bodies()[at]; }
+    void add_slip(const PgsContact& given, int place);
     double update(std::size_t contact) noexcept;
-    void push(const SweptContact& contact, Vec3 impulse) noexcept;
+    void push(const PackedContact& contact, Vec3 impulse) noexcept;
     int root(int body) noexcept;
     void link(int first, int second);
     void join(int first, int second);
     void schedule();
     void select();
-    void fetch(const Due& later, const Due& soon) const noexcept;
-    static constexpr unsigned char now_hot = 2;  // and 1 in the sweep after
-    void heat(int first, int second) noexcept;
+    void fetch(const Scheduled& later, const Scheduled& soon) const noexcept;
+    static constexpr unsigned char active_now = 2;  // and 1 in the iteration after
+    void activate(int first, int second) noexcept;
     void mark(int body) noexcept;
-    void mark_hot();
-    void sweep_hot(double focus);
-    /// What one thread counts and keeps while it sweeps.
+    void mark_active();
+    void iterate_active(double focus);
+    /// What one thread counts and keeps while it iterates.
     struct alignas(64) Part {
-        std::size_t swept = 0, seen = 0,
-                    hot = 0;         // of fresh islands; of spent ones; those of them that were swept
+        std::size_t updated = 0, seen = 0,
+                    active_done =
+                        0;  // of fresh islands; of those at their limit; those of them that were updated
         std::vector<double> change;  // by root
-        std::vector<const Due*> picked;
+        std::vector<const Scheduled*> picked;
         std::vector<int> touched;  // bodies, see touched_
-        SweptContact none{};       // fills a group
+        PackedContact none{};      // fills a group
     };
     void touch(Part& part, int body) noexcept;
-    void note(Part& part, const Due& due, double change, double focus) noexcept;
-    void solve(Part& part, const Due* const group[4], int size, double focus) noexcept;
+    void note(Part& part, const Scheduled& scheduled, double change, double focus) noexcept;
+    void solve(Part& part, const Scheduled* const group[4], int size, double focus) noexcept;
     void solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
-    void solve_due(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
+    void solve_scheduled(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
     void solve_picked(Part& part, std::size_t picked, double focus) noexcept;
-    void sweep(double focus) noexcept;
+    void iterate(double focus) noexcept;
     void relax_no_more();
     void find_residuals();
     double residual_of(std::size_t contact) const noexcept;
@@ -139,35 +139,36 @@ private:
     Team* team_ = nullptr;
     std::vector<Part> parts_;
     FrictionModel model_ = FrictionModel::cone;
-    Sweeper joints_;
+    PgsRows joints_;
     int joint_count_ = 0, bodies_ = 0;
-    LargeArray<SweptInertia> inertia_;
+    LargeArray<PgsInertia> inertia_;
     bool round_ = true;  // all bodies are
     double relaxation_ = 1.0;
     std::vector<int> place_;  // of each contact, by index, in the arrays that follow
     int added_ = 0;
-    LargeArray<SweptContact> contacts_;
-    // Of each, from where some contact has it on: in large heaps memory is what sweeping costs.
-    LargeArray<SweptSlip> slips_;
-    LargeArray<SweptRest> rests_;
+    LargeArray<PackedContact> contacts_;
+    // Of each, from where some contact has it on: in large heaps memory is what iterating costs.
+    LargeArray<PackedFriction> slips_;
+    LargeArray<PackedExtras> extras_;
     LargeArray<Box> boxes_;
-    SweptSlip no_slip_{};
-    SweptRest no_rest_{};
+    PackedFriction no_slip_{};
+    PackedExtras no_extras_{};
     // Islands: bodies joined by union-find.
     std::vector<int> parent_;
     std::vector<Both> bodies_of_;  // of every item, joints first
     std::vector<int> roots_;       // of items
     std::vector<char> known_;      // those that are in the list, or were before they joined another
-    std::vector<char> active_, spent_;
-    std::vector<double> left_;  // the last sweep's change, by root; the largest since it is spent
+    std::vector<char> active_, limit_reached_;
+    std::vector<double>
+        last_change_;  // the last iteration's change, by root; the largest since it has reached its limit
     std::vector<unsigned char>
-        hot_;  // bodies whose rows were changed much: 2 in this sweep, 1 in the one before
-    // Where few are due: the contacts of hot bodies by their place in order_, a bit each, in this sweep and the next.
-    std::vector<std::uint64_t> due_now_, due_next_;
-    std::vector<int> first_due_,
-        next_due_;            // of each body a list of twice those places, plus one for the second body
+        active_bodies_;  // bodies whose rows were changed much: 2 in this iteration, 1 in the one before
+    // Where few are scheduled: the contacts of active bodies by their place in order_, a bit each, in this iteration and the next.
+    std::vector<std::uint64_t> marked_now_, marked_next_;
+    std::vector<int> first_marked_,
+        next_marked_;         // of each body a list of twice those places, plus one for the second body
     std::size_t listed_ = 0;  // places in those lists
-    bool marked_ = false, marking_ = false;  // these are right; a sweep goes by them
+    bool marked_ = false, marking_ = false;  // these are right; an iteration goes by them
     std::vector<int> size_;                  // contacts, by root, of so many in order_
     std::size_t sized_ = 0;
     // What worst() found of each contact, by place, and whose velocities have changed since.
@@ -175,17 +176,17 @@ private:
     std::vector<int> off_;
     std::vector<unsigned char> touched_;
     bool all_touched_ = true;
-    double done_ = 0.0;   // items swept, and looked at for less
-    bool swept_ = false;  // since start()
-    // The order of a sweep: levels, in each of them contacts that share no moving body, and every contact in a later one
+    double done_ = 0.0;     // items updated, and looked at for less
+    bool started_ = false;  // since start()
+    // The order of an iteration: levels, in each of them contacts that share no moving body, and every contact in a later one
     // than those before it that share one. Whatever is done at a level together, the bits are those of one after the other.
     std::size_t scheduled_ = 0;  // items; those that come late have levels of their own, behind
     bool joined_ = false;        // islands have, since
-    LargeArray<Due> order_, active_order_;
+    LargeArray<Scheduled> order_, active_order_;
     std::vector<std::size_t> level_end_, active_level_end_;
     bool whole_ = true;  // all islands are active
-    const LargeArray<Due>& due() const noexcept { return whole_ ? order_ : active_order_; }
-    const std::vector<std::size_t>& due_end() const noexcept {
+    const LargeArray<Scheduled>& scheduled() const noexcept { return whole_ ? order_ : active_order_; }
+    const std::vector<std::size_t>& scheduled_end() const noexcept {
         return whole_ ? level_end_ : active_level_end_;
     }
     std::vector<int> level_, next_level_;  // of items, and of bodies

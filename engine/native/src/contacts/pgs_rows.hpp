@@ -1,4 +1,4 @@
-// Rows laid out for sweeping: what projected Gauss–Seidel reads, one behind the other.
+// Rows laid out for iterating: what projected Gauss–Seidel reads, one behind the other.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 #include "contacts/disc.hpp"
 #include "contacts/friction_point.hpp"
+#include "contacts/pgs_kernel.hpp"
 #include "contacts/pivot_solver.hpp"
-#include "contacts/sweep_kernel.hpp"
 #include "linear/elementary.hpp"
 #include "linear/large_array.hpp"
 
@@ -17,9 +17,9 @@ namespace spook {
 /// The larger of two changes; what is not a number stays.
 inline double larger(double a, double b) noexcept { return a >= b || std::isnan(a) ? a : b; }
 
-/// One row as a sweep reads it: Jacobian of both ends, M⁻¹ Gᵀ, own inertia. An end that does not move is zero and
+/// One row as an iteration reads it: Jacobian of both ends, M⁻¹ Gᵀ, own inertia. An end that does not move is zero and
 /// belongs to a spare body behind the others, so that no row needs a branch.
-struct SweepRow {
+struct PgsRow {
     Vec6 first, second;            // G
     Vec6 first_push, second_push;  // M⁻¹ Gᵀ
     double own = 0.0;              // (G M⁻¹ Gᵀ + Sig)ᵢᵢ
@@ -27,25 +27,25 @@ struct SweepRow {
 };
 
 /// A body beyond the first two of a row.
-struct SweepBeyond {
+struct PgsFurtherBody {
     int body = 0;
     Vec6 row, push;  // G, M⁻¹ Gᵀ
 };
 
 /// One block of rows, and what is solved together in it.
-struct SweepBlock {
+struct PgsBlock {
     enum class Kind : unsigned char { bilateral, bounded, contact } kind = Kind::bounded;
-    int first = 0, second = 0;       // bodies
-    int row = 0, size = 0;           // rows_[row] … rows_[row + size)
-    int point = -1, end = -1;        // its friction points, one behind the other
-    int factor = -1;                 // of a bilateral block, in factors_
-    double step[3] = {0, 0, 0};      // of these: 1/lambda_max of their own part
-    int beyond = 0, beyond_end = 0;  // of its one row, in beyond_
+    int first = 0, second = 0;         // bodies
+    int row = 0, size = 0;             // rows_[row] … rows_[row + size)
+    int point = -1, end = -1;          // its friction points, one behind the other
+    int factor = -1;                   // of a bilateral block, in factors_
+    double step[3] = {0, 0, 0};        // of these: 1/lambda_max of their own part
+    int further = 0, further_end = 0;  // of its one row, in further_
 };
 
-/// Lays a system out for sweeping: rows one behind the other, velocities in one array. Memory is kept from use to
+/// Lays a system out for iterating: rows one behind the other, velocities in one array. Memory is kept from use to
 /// use, so that nothing is allocated once the largest system has been seen.
-class Sweeper {
+class PgsRows {
 public:
     void prepare(MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
         model_ = model;
@@ -60,25 +60,25 @@ public:
         bodies_[bodies] = {};
         rows_.clear();
         factors_.clear();
-        beyond_.clear();
+        further_.clear();
         blocks_.assign(system.rows.size(), {});
         for (std::size_t k = 0; k < points.size(); ++k) {
-            SweepBlock& block = blocks_[points[k].block];
+            PgsBlock& block = blocks_[points[k].block];
             if (block.point < 0) block.point = static_cast<int>(k);
             block.end = static_cast<int>(k) + 1;
         }
         for (std::size_t k = 0; k < blocks_.size(); ++k)
             add(system.rows[k], points, blocks_[k], static_cast<int>(bodies));
-        for (const SweepBlock& block : blocks_)
+        for (const PgsBlock& block : blocks_)
             for (int i = 0; i < block.size; ++i)
                 push(block, rows_[block.row + i], rows_[block.row + i].multiplier);
     }
 
-    /// One sweep; the largest change of a row, as a velocity. With `friction_only` all but tangents is held.
-    double sweep(std::vector<FrictionPoint>& points, bool friction_only) noexcept {
+    /// One iteration; the largest change of a row, as a velocity. With `friction_only` all but tangents is held.
+    double iterate(std::vector<FrictionPoint>& points, bool friction_only) noexcept {
         double change = 0.0;
-        for (const SweepBlock& block : blocks_) {
-            if (block.kind == SweepBlock::Kind::contact) {
+        for (const PgsBlock& block : blocks_) {
+            if (block.kind == PgsBlock::Kind::contact) {
                 if (!friction_only) change = larger(change, update_row(block, rows_[block.row]));
                 for (int k = block.point; k < block.end; ++k)
                     change = larger(change, update_rubbing(block, points[k], block.step[k - block.point]));
@@ -92,9 +92,9 @@ public:
     /// The update of one block of a joint.
     double update_joint(std::size_t block) noexcept { return update_joint(blocks_[block]); }
 
-    /// All bodies, and the spare one behind them, which stays at rest; their velocities, for who else sweeps.
-    LargeArray<SweptBody>& bodies() noexcept { return bodies_; }
-    const LargeArray<SweptBody>& bodies() const noexcept { return bodies_; }
+    /// All bodies, and the spare one behind them, which stays at rest; their velocities, for whatever else iterates.
+    LargeArray<PgsBody>& bodies() noexcept { return bodies_; }
+    const LargeArray<PgsBody>& bodies() const noexcept { return bodies_; }
     void write_velocities(MixedSystem& system) const {
         system.velocity.resize(bodies_.size() - 1);
         for (std::size_t b = 0; b < system.velocity.size(); ++b) system.velocity[b] = bodies_[b].velocity;
@@ -104,7 +104,7 @@ public:
         write_velocities(system);
         for (std::size_t k = 0; k < blocks_.size(); ++k)
             for (int i = 0; i < blocks_[k].size; ++i) {
-                const SweepRow& row = rows_[blocks_[k].row + i];
+                const PgsRow& row = rows_[blocks_[k].row + i];
                 system.rows[k].multiplier[i] = row.multiplier;
                 system.rows[k].lower[i] = row.lower;
                 system.rows[k].upper[i] = row.upper;
@@ -112,14 +112,14 @@ public:
     }
 
 private:
-    void add(const RowBlock& given, const std::vector<FrictionPoint>& points, SweepBlock& block, int spare) {
+    void add(const RowBlock& given, const std::vector<FrictionPoint>& points, PgsBlock& block, int spare) {
         block.first = given.first >= 0 ? given.first : spare;
         block.second = given.second >= 0 ? given.second : spare;
         block.row = static_cast<int>(rows_.size());
         block.size = given.size;
         bool bilateral = true;
         for (int i = 0; i < given.size; ++i) {
-            SweepRow& row = rows_.emplace_back();
+            PgsRow& row = rows_.emplace_back();
             if (given.first >= 0) {
                 row.first = row.first_push = given.first_jacobian[i];
                 solve_six(mass_factor_[given.first], row.first_push);
@@ -134,26 +134,26 @@ private:
             row.upper = given.upper[i];
             row.multiplier = given.multiplier[i];
             row.own = schur(row, row) + row.softness;
-            block.beyond = static_cast<int>(beyond_.size());
-            for (const Beyond& other : given.beyond) {
-                SweepBeyond& far =
-                    beyond_.emplace_back(SweepBeyond{other.body, other.jacobian, other.jacobian});
+            block.further = static_cast<int>(further_.size());
+            for (const FurtherBody& other : given.further) {
+                PgsFurtherBody& far =
+                    further_.emplace_back(PgsFurtherBody{other.body, other.jacobian, other.jacobian});
                 solve_six(mass_factor_[other.body], far.push);
                 row.own += dot(far.row, far.push);
             }
-            block.beyond_end = static_cast<int>(beyond_.size());
+            block.further_end = static_cast<int>(further_.size());
             bilateral = bilateral && row.lower == -unbounded && row.upper == unbounded;
         }
         if (block.point >= 0) {
-            block.kind = SweepBlock::Kind::contact;
+            block.kind = PgsBlock::Kind::contact;
             for (int k = block.point; k < block.end; ++k) {
                 if (points[k].size != 2) continue;
-                const SweepRow &one = rows_[block.row + points[k].row], &two = (&one)[1];
+                const PgsRow &one = rows_[block.row + points[k].row], &two = (&one)[1];
                 block.step[k - block.point] =
                     1.0 / (0.5 * (one.own + two.own) + length(0.5 * (one.own - two.own), schur(one, two)));
             }
         } else if (bilateral) {
-            block.kind = SweepBlock::Kind::bilateral;
+            block.kind = PgsBlock::Kind::bilateral;
             Mat6 whole{};
             for (int i = 0; i < 6; ++i) whole[7 * i] = 1.0;
             for (int i = 0; i < block.size; ++i)
@@ -167,28 +167,29 @@ private:
         }
     }
 
-    static double schur(const SweepRow& a, const SweepRow& b) noexcept {
+    static double schur(const PgsRow& a, const PgsRow& b) noexcept {
         return dot(a.first, b.first_push) + dot(a.second, b.second_push);
     }
 
-    double residual(const SweepBlock& block, const SweepRow& row) const noexcept {
+    double residual(const PgsBlock& block, const PgsRow& row) const noexcept {
         double left = dot(row.first, bodies_[block.first].velocity) +
                       dot(row.second, bodies_[block.second].velocity) + row.softness * row.multiplier -
                       row.right;
-        for (int k = block.beyond; k < block.beyond_end; ++k)
-            left += dot(beyond_[k].row, bodies_[beyond_[k].body].velocity);
+        for (int k = block.further; k < block.further_end; ++k)
+            left += dot(further_[k].row, bodies_[further_[k].body].velocity);
         return left;
     }
 
-    void push(const SweepBlock& block, const SweepRow& row, double impulse) noexcept {
+    void push(const PgsBlock& block, const PgsRow& row, double impulse) noexcept {
         Vec6 &v = bodies_[block.first].velocity, &w = bodies_[block.second].velocity;
         for (int a = 0; a < 6; ++a) v[a] += row.first_push[a] * impulse;
         for (int a = 0; a < 6; ++a) w[a] += row.second_push[a] * impulse;
-        for (int k = block.beyond; k < block.beyond_end; ++k)
-            for (int a = 0; a < 6; ++a) bodies_[beyond_[k].body].velocity[a] += beyond_[k].push[a] * impulse;
+        for (int k = block.further; k < block.further_end; ++k)
+            for (int a = 0; a < 6; ++a)
+                bodies_[further_[k].body].velocity[a] += further_[k].push[a] * impulse;
     }
 
-    double update_row(const SweepBlock& block, SweepRow& row) noexcept {
+    double update_row(const PgsBlock& block, PgsRow& row) noexcept {
         if (!(row.own > 0.0)) return std::isnan(row.own) ? row.own : 0.0;
         const double old = row.multiplier;
         row.multiplier = std::clamp(old - residual(block, row) / row.own, row.lower, row.upper);
@@ -198,14 +199,14 @@ private:
         return std::abs(change) * row.own;
     }
 
-    double update_joint(const SweepBlock& block) noexcept {
-        if (block.kind == SweepBlock::Kind::bilateral) return update_block(block);
+    double update_joint(const PgsBlock& block) noexcept {
+        if (block.kind == PgsBlock::Kind::bilateral) return update_block(block);
         double change = 0.0;
         for (int i = 0; i < block.size; ++i) change = larger(change, update_row(block, rows_[block.row + i]));
         return change;
     }
 
-    double update_block(const SweepBlock& block) noexcept {
+    double update_block(const PgsBlock& block) noexcept {
         Vec6 change{};
         double largest = 0.0;
         for (int i = 0; i < block.size; ++i) {
@@ -220,8 +221,8 @@ private:
         return largest;
     }
 
-    double update_rubbing(const SweepBlock& block, const FrictionPoint& point, double step) noexcept {
-        SweepRow &one = rows_[block.row + point.row], &two = rows_[block.row + point.row + point.size - 1];
+    double update_rubbing(const PgsBlock& block, const FrictionPoint& point, double step) noexcept {
+        PgsRow &one = rows_[block.row + point.row], &two = rows_[block.row + point.row + point.size - 1];
         const double normal = model_ == FrictionModel::box ? point.normal : rows_[block.row].multiplier;
         const double bound = point.coefficient * std::max(0.0, normal);
         if (model_ != FrictionModel::cone || point.size != 2) {
@@ -234,7 +235,7 @@ private:
         double d1 = b1 - step * residual(block, one);
         double d2 = b2 - step * residual(block, two);
         const double reach = length(d1, d2);
-        if (point.stretched) {
+        if (point.anisotropic) {
             const double own[3] = {one.own, schur(one, two), two.own};
             least_on_disc(own, b1, b2, residual(block, one), residual(block, two), bound, d1, d2);
         } else if (reach > bound) {
@@ -249,10 +250,10 @@ private:
 
     FrictionModel model_ = FrictionModel::cone;
     std::vector<Mat6> mass_factor_, factors_;
-    LargeArray<SweptBody> bodies_;
-    std::vector<SweepRow> rows_;
-    std::vector<SweepBeyond> beyond_;
-    std::vector<SweepBlock> blocks_;
+    LargeArray<PgsBody> bodies_;
+    std::vector<PgsRow> rows_;
+    std::vector<PgsFurtherBody> further_;
+    std::vector<PgsBlock> blocks_;
 };
 
 }  // namespace spook

@@ -17,7 +17,7 @@
 
 namespace spook {
 
-class FollowingBounds {
+class LoadDependentBounds {
 public:
     static constexpr int MOST_ROUNDS = 100;
     static constexpr double AGREED = 1e-11;  // of the pull or the load

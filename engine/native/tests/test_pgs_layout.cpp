@@ -1,10 +1,10 @@
-// What sweeps store of a contact depends on what others have; what they do to it does not, nor on where it lies.
+// What iterations store of a contact depends on what others have; what they do to it does not, nor on where it lies.
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
 
-#include "contacts/contact_sweeps.hpp"
+#include "contacts/pgs_solver.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -19,8 +19,8 @@ Vec3 any_vec(std::mt19937& random) {
     return {number(random), number(random), number(random)};
 }
 
-SweepContact between(int first, int second, std::mt19937& random) {
-    SweepContact c;
+PgsContact between(int first, int second, std::mt19937& random) {
+    PgsContact c;
     c.first = first, c.second = second;
     const Vec3 n = any_vec(random);
     c.normal = (1.0 / norm(n)) * n;
@@ -32,17 +32,17 @@ SweepContact between(int first, int second, std::mt19937& random) {
 }
 
 /// Contacts of which `kinds` says what some have: friction (1), give (2), a surface that moves (4), an ellipse (8).
-std::vector<SweepContact> contacts(unsigned kinds, std::mt19937& random) {
-    std::vector<SweepContact> all;
+std::vector<PgsContact> contacts(unsigned kinds, std::mt19937& random) {
+    std::vector<PgsContact> all;
     for (int k = 0; k < 120; ++k) {
         const int first = static_cast<int>(random() % bodies);
-        SweepContact c = between(
+        PgsContact c = between(
             first, random() % 6 == 0 ? -1 : (first + 1 + static_cast<int>(random() % 5)) % bodies, random);
         const unsigned own = kinds & random();
         if (own & 1) c.friction = 0.5, c.impulse[1] = 0.01;
         if (own & 2) c.softness = 0.1;
         if (own & 4) c.right[1] = 0.2, c.right[2] = -0.1;
-        if ((own & 8) && (own & 1)) c.stretched = true, c.tangent = 3.0 * c.tangent;
+        if ((own & 8) && (own & 1)) c.anisotropic = true, c.tangent = 3.0 * c.tangent;
         c.impulse[0] = random() % 2 ? 0.05 : 0.0;
         all.push_back(c);
     }
@@ -50,8 +50,8 @@ std::vector<SweepContact> contacts(unsigned kinds, std::mt19937& random) {
 }
 
 /// Velocities and impulses. `with_all`: another contact, far from these, has everything a contact can have, and a body that turns less about one axis.
-std::vector<double> swept(const std::vector<SweepContact>& all, Given given, bool with_all,
-                          FrictionModel model) {
+std::vector<double> solved(const std::vector<PgsContact>& all, Given given, bool with_all,
+                           FrictionModel model) {
     std::mt19937 random(9);
     MixedSystem system;
     Mat6 mass{};
@@ -63,33 +63,34 @@ std::vector<double> swept(const std::vector<SweepContact>& all, Given given, boo
         const Vec3 p = any_vec(random), l = any_vec(random);
         system.momentum.push_back({p.x, p.y, p.z, l.x, l.y, l.z});
     }
-    std::vector<SweepContact> list = all;
+    std::vector<PgsContact> list = all;
     if (with_all) {
-        SweepContact c = between(bodies, bodies + 1, random);
-        c.friction = 0.5, c.softness = 0.1, c.right[1] = 0.3, c.stretched = true, c.tangent = 2.0 * c.tangent;
+        PgsContact c = between(bodies, bodies + 1, random);
+        c.friction = 0.5, c.softness = 0.1, c.right[1] = 0.3, c.anisotropic = true,
+        c.tangent = 2.0 * c.tangent;
         list.insert(list.begin(), c);
     }
-    ContactSweeps sweeps;
-    sweeps.start(system, model);
+    PgsSolver solver;
+    solver.start(system, model);
     for (const int b : {0, bodies})
-        EXPECT(std::abs(system.mass[b][28] * sweeps.velocity(b)[4] - system.momentum[b][4]) < 1e-14);
+        EXPECT(std::abs(system.mass[b][28] * solver.velocity(b)[4] - system.momentum[b][4]) < 1e-14);
     const std::size_t half = given == Given::in_two_lots ? list.size() / 2 : list.size();
     for (std::size_t from = 0; from < list.size(); from += half) {
         const std::size_t end = std::min(list.size(), from + half);
         if (given != Given::one_by_one) {
-            for (std::size_t k = from; k < end; ++k) sweeps.announce(list[k].first, list[k].second);
-            sweeps.arrange();
+            for (std::size_t k = from; k < end; ++k) solver.announce(list[k].first, list[k].second);
+            solver.arrange();
         }
-        for (std::size_t k = from; k < end; ++k) EXPECT(sweeps.add(list[k]) == static_cast<int>(k));
+        for (std::size_t k = from; k < end; ++k) EXPECT(solver.add(list[k]) == static_cast<int>(k));
     }
-    sweeps.run(12, 0.0, 0.0, nullptr);
-    const RowsResidual worst = sweeps.worst(1e9);
+    solver.run(12, 0.0, 0.0, nullptr);
+    const RowsResidual worst = solver.worst(1e9);
     std::vector<double> out;
     for (int b = 0; b < bodies; ++b)
-        for (const double v : sweeps.velocity(b)) out.push_back(v + 0.0);
+        for (const double v : solver.velocity(b)) out.push_back(v + 0.0);
     const int others = with_all ? 1 : 0;
     for (int k = others; k < static_cast<int>(list.size()); ++k)
-        out.insert(out.end(), sweeps.impulse(k), sweeps.impulse(k) + 3);
+        out.insert(out.end(), solver.impulse(k), solver.impulse(k) + 3);
     if (!with_all) out.push_back(worst.row), out.push_back(worst.residual);
     return out;
 }
@@ -101,13 +102,13 @@ int main() {
     for (const FrictionModel model : {FrictionModel::cone, FrictionModel::box, FrictionModel::scaled_box})
         for (unsigned kinds = 0; kinds < 16; ++kinds)
             for (int round = 0; round < 4; ++round) {
-                const std::vector<SweepContact> all = contacts(kinds, random);
-                const std::vector<double> alone = swept(all, Given::one_by_one, false, model);
-                EXPECT(swept(all, Given::announced, false, model) == alone);
-                std::vector<double> beside = swept(all, Given::announced, true, model);
+                const std::vector<PgsContact> all = contacts(kinds, random);
+                const std::vector<double> alone = solved(all, Given::one_by_one, false, model);
+                EXPECT(solved(all, Given::announced, false, model) == alone);
+                std::vector<double> beside = solved(all, Given::announced, true, model);
                 EXPECT(std::equal(beside.begin(), beside.end(), alone.begin()));
-                const std::vector<double> lots = swept(all, Given::in_two_lots, false, model),
-                                          whole = swept(all, Given::in_two_lots, true, model);
+                const std::vector<double> lots = solved(all, Given::in_two_lots, false, model),
+                                          whole = solved(all, Given::in_two_lots, true, model);
                 EXPECT(std::equal(whole.begin(), whole.end(), lots.begin()));
             }
     return report();

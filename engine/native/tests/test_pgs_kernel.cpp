@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "contacts/contact_sweeps.hpp"
-#include "contacts/sweep_kernel.hpp"
+#include "contacts/pgs_kernel.hpp"
+#include "contacts/pgs_solver.hpp"
 #include "expect.hpp"
 #include "run/team.hpp"
 
@@ -14,28 +14,28 @@ using namespace spook;
 
 namespace {
 
-constexpr int bodies = 8, nobody = bodies;
+constexpr int bodies = 8, fixed_body = bodies;
 
-/// What a sweep leaves out: friction; what else a contact may have; inertia that differs with the axis.
+/// What an iteration leaves out: friction; what else a contact may have; inertia that differs with the axis.
 struct Kind {
     bool smooth, plain, round;
 };
 
 struct Four {
-    std::vector<SweptContact> contacts = std::vector<SweptContact>(4);
-    std::vector<SweptSlip> slips = std::vector<SweptSlip>(4);
-    std::vector<SweptRest> rests = std::vector<SweptRest>(4);
-    std::vector<SweptBody> masses = std::vector<SweptBody>(bodies + 1);
-    std::vector<SweptInertia> inertia = std::vector<SweptInertia>(bodies + 1);
+    std::vector<PackedContact> contacts = std::vector<PackedContact>(4);
+    std::vector<PackedFriction> slips = std::vector<PackedFriction>(4);
+    std::vector<PackedExtras> rests = std::vector<PackedExtras>(4);
+    std::vector<PgsBody> masses = std::vector<PgsBody>(bodies + 1);
+    std::vector<PgsInertia> inertia = std::vector<PgsInertia>(bodies + 1);
     double change[4] = {};
 
-    void solve(SweepFour with, Kind kind) {
-        SweptContact* to[4];
-        const SweptSlip* slip[4];
-        const SweptRest* rest[4];
+    void solve(SolveFour with, Kind kind) {
+        PackedContact* to[4];
+        const PackedFriction* slip[4];
+        const PackedExtras* rest[4];
         for (int i = 0; i < 4; ++i) to[i] = &contacts[i], slip[i] = &slips[i], rest[i] = &rests[i];
         with({to, kind.smooth ? nullptr : slip, kind.plain ? nullptr : rest, masses.data(),
-              kind.round ? nullptr : inertia.data(), nobody, change});
+              kind.round ? nullptr : inertia.data(), fixed_body, change});
     }
     /// The same but for the sign of zeros.
     bool equals(const Four& other) const {
@@ -70,7 +70,7 @@ Four random_four(std::mt19937& random, Kind kind) {
     const auto vec = [&] { return Vec3{number(random), number(random), number(random)}; };
     Four f;
     for (int b = 0; b < bodies; ++b) {
-        SweptBody& body = f.masses[b];
+        PgsBody& body = f.masses[b];
         for (double& v : body.velocity) v = one_in(6) ? 0.0 : number(random);
         body.inverse_mass = positive(random), body.round = positive(random);
         f.inertia[b] = {positive(random), 0.1 * number(random), 0.1 * number(random),
@@ -78,10 +78,10 @@ Four random_four(std::mt19937& random, Kind kind) {
         if (kind.round) f.inertia[b] = {body.round, 0.0, 0.0, body.round, 0.0, body.round};
     }
     for (int i = 0; i < 4; ++i) {
-        SweptContact& c = f.contacts[i];
-        SweptSlip& slip = f.slips[i];
-        SweptRest& rest = f.rests[i];
-        c.first = 2 * i, c.second = one_in(3) ? nobody : 2 * i + 1;
+        PackedContact& c = f.contacts[i];
+        PackedFriction& slip = f.slips[i];
+        PackedExtras& rest = f.rests[i];
+        c.first = 2 * i, c.second = one_in(3) ? fixed_body : 2 * i + 1;
         const Vec3 n = vec();
         c.normal = (1.0 / norm(n)) * n;
         const Vec3 t = cross(c.normal, vec());
@@ -105,10 +105,10 @@ Four random_four(std::mt19937& random, Kind kind) {
     return f;
 }
 
-SweepContact between(int first, int second, std::mt19937& random) {
+PgsContact between(int first, int second, std::mt19937& random) {
     std::uniform_real_distribution<double> number(-1.0, 1.0);
     const Vec3 n{number(random), number(random), number(random)};
-    SweepContact c;
+    PgsContact c;
     c.first = first, c.second = second;
     c.normal = (1.0 / norm(n)) * n;
     const Vec3 t = cross(c.normal, {0.3, 0.2, 0.9});
@@ -119,7 +119,7 @@ SweepContact between(int first, int second, std::mt19937& random) {
     return c;
 }
 
-/// Velocities and counts after sweeps over a large random heap, in which some contacts come late.
+/// Velocities and counts after iterations over a large random heap, in which some contacts come late.
 std::vector<double> heap(int threads, bool portable, FrictionModel model) {
     constexpr int count = 3000, all = 9000, late = 200;
     std::mt19937 random(5);
@@ -130,14 +130,14 @@ std::vector<double> heap(int threads, bool portable, FrictionModel model) {
     system.momentum.assign(count, Vec6{});
     for (Vec6& p : system.momentum)
         for (double& x : p) x = 1e-3 * static_cast<double>(random() % 2001) - 1.0;
-    use_portable_sweeps(portable);
+    use_portable_pgs(portable);
     Team team(threads);
-    ContactSweeps sweeps;
-    if (threads > 1) sweeps.help(&team);
-    sweeps.start(system, model);
+    PgsSolver solver;
+    if (threads > 1) solver.help(&team);
+    solver.start(system, model);
     const auto add = [&] {
         const int first = static_cast<int>(random() % count);
-        sweeps.add(between(
+        solver.add(between(
             first, random() % 10 == 0 ? -1 : (first + 1 + static_cast<int>(random() % 40)) % count, random));
     };
     for (int k = 0; k < all; ++k) add();
@@ -149,14 +149,14 @@ std::vector<double> heap(int threads, bool portable, FrictionModel model) {
         return true;
     };
     for (int turn = 0; turn < 3; ++turn) {
-        const FrictionReport report = sweeps.run(12, 1e-10, 0.02, more);
-        const RowsResidual worst = sweeps.worst(0.02);
-        out.insert(out.end(), {report.residual, static_cast<double>(report.sweeps), worst.residual,
-                               static_cast<double>(worst.row), sweeps.work()});
+        const FrictionReport report = solver.run(12, 1e-10, 0.02, more);
+        const RowsResidual worst = solver.worst(0.02);
+        out.insert(out.end(), {report.residual, static_cast<double>(report.pgs_iterations), worst.residual,
+                               static_cast<double>(worst.row), solver.work()});
     }
     for (int b = 0; b < count; ++b)
-        out.insert(out.end(), sweeps.velocity(b).begin(), sweeps.velocity(b).end());
-    use_portable_sweeps(false);
+        out.insert(out.end(), solver.velocity(b).begin(), solver.velocity(b).end());
+    use_portable_pgs(false);
     return out;
 }
 
@@ -169,10 +169,10 @@ int main() {
         const Kind kind{plain && round % 2 == 0, plain, round % 4 < 2}, whole{false, false, false};
         const Four start = random_four(random, kind);
         Four portable = start, fastest = start, vectors = start;
-        portable.solve(portable_sweep_four, kind);
-        fastest.solve(sweep_four(), kind);
+        portable.solve(portable_solve_four, kind);
+        fastest.solve(solve_four(), kind);
         EXPECT(fastest.same_as(portable));
-        vectors.solve(sweep_four(), whole);  // what is left out is nothing
+        vectors.solve(solve_four(), whole);  // what is left out is nothing
         EXPECT(vectors.equals(portable));
     }
     for (const FrictionModel model : {FrictionModel::cone, FrictionModel::box}) {

@@ -1,16 +1,16 @@
 // The contact stage's part for bodies that are sunk into what holds them, and come to the side of its next part.
 //
 // A body that lies a micron deep in the first of two tiles, as compliance and overlaps make it, would be stopped by the side
-// of the second. Swept as it would stand if it were lifted out of the first, it goes over the second. What does not lie
+// of the second. Cast as it would stand if it were lifted out of the first, it goes over the second. What does not lie
 // beneath the surface it is lifted to is no such part: it is met where it stands, however deep the body is sunk elsewhere,
 // or overlaps would breed others.
 //
-// Who falls onto the first tile is swept through it as well, and would come to the side of the second from below: what is met
-// first keeps a body off what it would meet only behind. And where edges lie on each other, as a body's and a tile's do when
+// What falls onto the first tile is cast through it as well, and would come to the side of the second from below: what is met
+// first occludes what a body would meet only behind it. And where edges lie on each other, as a body's and a tile's do when
 // a step begins there, both faces are as near: the one it moves past is no obstacle.
 #include <algorithm>
 
-#include "collision/sweep.hpp"
+#include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
 
@@ -19,13 +19,13 @@ namespace spook {
 namespace {
 
 constexpr double share = 0.25;            // of the overlap at which pairs count as met: less is none
-constexpr double same_face = 0.9;         // cosine of normals: what both lie on
-constexpr std::size_t most_before = 8;    // of the meetings of a body, that may keep it off later ones
-constexpr double together = 0.05;         // of a step: which of two meetings comes first is not known
-constexpr double same_way = 1.0 - 1e-12;  // the same of one face met twice
-constexpr double unheld = 3.0;            // of a fall in a step: what sinks before sweeps hold it
-constexpr double hum = 10.0;              // of that overlap: what they leave of motion where all is at rest
-constexpr double a_side = 0.5;  // cosine of the normal of a meeting: no more of it is along what holds
+constexpr double same_face_cosine = 0.9;  // cosine of normals: what both lie on
+constexpr std::size_t max_earlier = 8;    // of the meetings of a body, that may occlude later ones
+constexpr double simultaneous = 0.05;     // of a step: which of two meetings comes first is not known
+constexpr double same_direction_cosine = 1.0 - 1e-12;  // the same of one face met twice
+constexpr double free_fall_allowance = 3.0;  // of a fall in a step: what sinks before iterations hold it
+constexpr double residual_motion = 10.0;  // of that overlap: what they leave of motion where all is at rest
+constexpr double side_cosine = 0.5;  // cosine of the normal of a meeting: no more of it is along what holds
 
 /// How far the lowest point along n is above the origin, m; of a triangle infinite.
 double height(const Mover& of, double time, Vec3 n) noexcept {
@@ -33,15 +33,16 @@ double height(const Mover& of, double time, Vec3 n) noexcept {
 }
 
 /// Whether two meet with a side, seen from a face whose normal is n: what lands on another one falls as far, and meets it.
-bool meets_a_side(const Mover& one, const Mover& other, double time, Vec3 n) noexcept {
-    return std::abs(dot(n, separation(one.shape, one.at(time), other.shape, other.at(time)).normal)) < a_side;
+bool meets_side_face(const Mover& one, const Mover& other, double time, Vec3 n) noexcept {
+    return std::abs(dot(n, separation(one.shape, one.at(time), other.shape, other.at(time)).normal)) <
+           side_cosine;
 }
 
 }  // namespace
 
 /// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
-/// When a solve has answered it, as much as sweeps that count as settled may have left, or as the depth.
-double ContactStage::sunk_by(const Point& point, bool late) const {
+/// When a solve has answered it, as much as iterations that count as settled may have left, or as the depth.
+double ContactStage::depth_at_toi(const Point& point, bool late) const {
     const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking = std::max(0.0, -h * relative(point, point.contact.point.normal, velocity_, false));
     const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
@@ -51,11 +52,11 @@ double ContactStage::sunk_by(const Point& point, bool late) const {
 /// Puts the points of each body together: what holds it is asked of each that it would meet.
 void ContactStage::index_points() {
     std::vector<int>& begin = points_begin_;
-    begin.assign(unknown_.size() + 2, 0);
+    begin.assign(solver_index_.size() + 2, 0);
     const auto both = [this](auto&& each) {
         for (std::size_t k = 0; k < points_.size(); ++k)
             for (const int b : {points_[k].contact.first, points_[k].contact.second})
-                if (unknown_[b] >= 0) each(static_cast<std::size_t>(b), static_cast<int>(k));
+                if (solver_index_[b] >= 0) each(static_cast<std::size_t>(b), static_cast<int>(k));
     };
     both([&](std::size_t b, int) { ++begin[b + 2]; });
     for (std::size_t b = 2; b < begin.size(); ++b) begin[b] += begin[b - 1];
@@ -64,64 +65,67 @@ void ContactStage::index_points() {
 }
 
 /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
-/// the normal they touch with already, if they do. Between sweeps a body may also sink on the way, and to the side of another
-/// as far as settled sweeps may have left it falling.
-bool ContactStage::is_seam(const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                           const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing) const {
+/// the normal they touch with already, if they do. Between iterations a body may also sink on the way, and to the side of another
+/// as far as settled iterations may have left it falling.
+bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& other, const OpenPair& open,
+                                    const std::vector<Vec6>& velocity, double time, bool late,
+                                    Vec3 facing) const {
     if (!have_sides(moving.shape, other.shape)) return false;
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
-    const bool swept = options_.solver == SolverKind::iterative;
-    if (unknown_[body] < 0 || !(settling_ || swept || depth_[body] > least)) return false;
+    const bool by_pgs = options_.solver == SolverKind::iterative;
+    if (solver_index_[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least)) return false;
     const int end = points_begin_[static_cast<std::size_t>(body) + 1];
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
-        Vec3 n, leads;  // what holds it goes itself, m/s
+        Vec3 n, support_velocity;  // what holds it goes itself, m/s
         double depth = -unbounded, begun = 0.0, sinking = 0.0;
         for (; at < end && points_[points_of_[at]].contact.key >> feature_bits == pair; ++at) {
             const Point& point = points_[points_of_[at]];
-            if (point.strike >= 0.0) continue;
+            if (point.toi >= 0.0) continue;
             const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
-            const double deep = sunk_by(point, late);
+            const double deep = depth_at_toi(point, late);
             if (deep > depth) {
                 const int holder = point.contact.first == body ? point.contact.second : point.contact.first;
                 const Vec3 arm = point.contact.first == body ? point.second_arm : point.first_arm;
                 depth = deep, n = side * point.contact.point.normal;
-                leads = linear(velocity[holder]) + cross(angular(velocity[holder]), arm);
+                support_velocity = linear(velocity[holder]) + cross(angular(velocity[holder]), arm);
             }
             begun = std::max(begun, -gap);
-            sinking = std::max(sinking, sunk_by(point, false));
+            sinking = std::max(sinking, depth_at_toi(point, false));
         }
-        if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face)
+        if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face_cosine)
             continue;
-        if (settling_ || swept) {
+        if (iterating_ || by_pgs) {
             const double now = height(moving, 0.0, n), top = height(other, 0.0, -n);
             double falls = 0.0;
             for (const double part : {time, h}) {  // against what holds it, and against the other
-                const double rises = std::max(part * dot(n, leads), top - height(other, part, -n));
+                const double rises = std::max(part * dot(n, support_velocity), top - height(other, part, -n));
                 falls = std::max(falls, now + rises - height(moving, part, n));
             }
             const double left = h * options_.unsettled_residual;
-            double most = hum * slop;
-            if (settling_) most = std::max(begun, left + h * unheld * norm(linear(kick_[body])) + sinking);
-            else if (falls > most && meets_a_side(moving, other, time, n)) most = left;
+            double most = residual_motion * slop;
+            if (iterating_)
+                most =
+                    std::max(begun, left + h * free_fall_allowance * norm(linear(dv_ext_[body])) + sinking);
+            else if (falls > most && meets_side_face(moving, other, time, n)) most = left;
             falls = std::min(falls, most);
             depth = std::max(depth, begun + falls);
-            if (settling_) depth += slop;  // it met the other with as much
+            if (iterating_) depth += slop;  // it met the other with as much
         }
         if (!(depth > least)) continue;
         Pose out = moving.body;
         out.position += depth * n;
         const Mover lifted{moving.shape, moving.part, out, moving.velocity, moving.spin};
         const double above = height(lifted, 0.0, n) + height(other, 0.0, -n);
-        if (above > -least && first_touch(lifted, other, h, slop) < 0.0) return true;
+        if (above > -least && time_of_impact(lifted, other, h, slop) < 0.0) return true;
     }
     return false;
 }
 
 /// Whether `body`, that meets one after the other in this step, would not meet the later one if the earlier one stopped it:
 /// it falls onto a tile, and would be past its edge, below its top, when it came to the next one's side.
-bool ContactStage::keeps_off(const Meeting& earlier, const Meeting& later, int body,
-                             const std::vector<Vec6>& velocity) const {
+bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int body,
+                            const std::vector<Vec6>& velocity) const {
     const OpenPair &before = open_[earlier.open], &after = open_[later.open];
     const Pose before_first = moved(before.first, velocity), before_second = moved(before.second, velocity),
                after_first = moved(after.first, velocity), after_second = moved(after.second, velocity);
@@ -139,27 +143,27 @@ bool ContactStage::keeps_off(const Meeting& earlier, const Meeting& later, int b
     };
     const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier.time);
     const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later.time);
-    if (dot(n, side) > same_way) return false;
+    if (dot(n, side) > same_direction_cosine) return false;
     const double h = options_.time_step, slop = this->slop(after), level = height(held, earlier.time, n);
     if (!(level + height(other, earlier.time, -n) > -2.0 * (slop + this->slop(before)))) return false;
     const Mover& holder = before.first == body ? two : one;
-    const double leads = std::min(0.0, dot(n, holder.velocity)) * (h - earlier.time);
-    const double falls = level + leads - std::min(height(held, later.time, n), height(held, h, n));
+    const double support_path = std::min(0.0, dot(n, holder.velocity)) * (h - earlier.time);
+    const double falls = level + support_path - std::min(height(held, later.time, n), height(held, h, n));
     if (!(falls > 0.0)) return false;
     Pose out = moving.body;
     out.position += (falls + slop) * n;
-    return first_touch({moving.shape, moving.part, out, moving.velocity, moving.spin}, other, h, slop) < 0.0;
+    return time_of_impact({moving.shape, moving.part, out, moving.velocity, moving.spin}, other, h, slop) <
+           0.0;
 }
 
 /// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
 /// all the same is found again with the velocities of the solve.
-void ContactStage::leave_out_what_others_keep_off(std::vector<Meeting>& meetings,
-                                                  const std::vector<Vec6>& velocity) {
+void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity) {
     if (!swings_ || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
         for (const int b : {open_[meetings[at].open].first, open_[meetings[at].open].second})
-            if (unknown_[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
+            if (solver_index_[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
     });
@@ -167,13 +171,13 @@ void ContactStage::leave_out_what_others_keep_off(std::vector<Meeting>& meetings
         std::size_t end = from + 1;
         for (; end < meetings_of_.size() && meetings_of_[end].body == meetings_of_[from].body; ++end) {
             Meeting& later = meetings[meetings_of_[end].at];
-            for (std::size_t k = from; k < std::min(end, from + most_before) && !(later.time < 0.0); ++k) {
+            for (std::size_t k = from; k < std::min(end, from + max_earlier) && !(later.time < 0.0); ++k) {
                 Meeting& earlier = meetings[meetings_of_[k].at];
                 if (earlier.time < 0.0) continue;
                 const int body = meetings_of_[from].body;
-                if (keeps_off(earlier, later, body, velocity)) later.time = -1.0;
-                else if (later.time - earlier.time < together * options_.time_step &&
-                         keeps_off(later, earlier, body, velocity))
+                if (occludes(earlier, later, body, velocity)) later.time = -1.0;
+                else if (later.time - earlier.time < simultaneous * options_.time_step &&
+                         occludes(later, earlier, body, velocity))
                     earlier.time = -1.0;
             }
         }
@@ -185,7 +189,7 @@ void ContactStage::leave_out_what_others_keep_off(std::vector<Meeting>& meetings
 /// Takes out the points from `from` on of pairs that only graze: they touch with a side or an edge, and as they move no
 /// overlap comes of it. Two bodies whose edges lie on each other touch with either face, and the one they move past is no
 /// obstacle. Whether there are such pairs: they are open then.
-bool ContactStage::let_pass(std::size_t from) {
+bool ContactStage::skip_grazing(std::size_t from) {
     if (!swings_ || from == points_.size()) return false;
     const double h = options_.time_step;
     std::vector<IndexPair>& gone = arrays_.grazing;
@@ -201,7 +205,7 @@ bool ContactStage::let_pass(std::size_t from) {
             const double overlap = h * closing - std::max(0.0, contact.point.gap);
             if (overlap > most) most = overlap, deepest = end;
         }
-        if (most > 0.0 && passes_by(points_[deepest], most))
+        if (most > 0.0 && is_grazing(points_[deepest], most))
             gone.push_back({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)});
     }
     for (const IndexPair& pair : gone) {
@@ -215,7 +219,7 @@ bool ContactStage::let_pass(std::size_t from) {
 }
 
 /// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
-bool ContactStage::passes_by(const Point& point, double overlap) const {
+bool ContactStage::is_grazing(const Point& point, double overlap) const {
     const Contact& contact = point.contact;
     const IndexPair pair{static_cast<int>(contact.key >> (feature_bits + 24)),
                          static_cast<int>(contact.key >> feature_bits & 0xffffff)};
@@ -226,9 +230,9 @@ bool ContactStage::passes_by(const Point& point, double overlap) const {
     const int a = contact.first, b = contact.second;
     const Mover first = mover(pair.first, poses_[a], velocity_),
                 second = mover(pair.second, poses_[b], velocity_);
-    return first_touch(first, second, options_.time_step, slop(open)) < 0.0 ||
-           is_seam(first, a, second, open, velocity_, 0.0, true, contact.point.normal) ||
-           is_seam(second, b, first, open, velocity_, 0.0, true, contact.point.normal);
+    return time_of_impact(first, second, options_.time_step, slop(open)) < 0.0 ||
+           is_internal_edge(first, a, second, open, velocity_, 0.0, true, contact.point.normal) ||
+           is_internal_edge(second, b, first, open, velocity_, 0.0, true, contact.point.normal);
 }
 
 }  // namespace spook

@@ -1,9 +1,9 @@
-#include "contacts/friction_sweeps.hpp"
+#include "contacts/friction_pgs.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "contacts/sweep_rows.hpp"
+#include "contacts/pgs_rows.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
@@ -13,8 +13,8 @@ namespace {
 constexpr int search_rounds = 200;  // of pivoting: searches that end take fewer
 
 /// One per thread: its memory outlives a solve, its values do not.
-Sweeper& sweeper() {
-    static thread_local Sweeper own;
+PgsRows& pgs_rows() {
+    static thread_local PgsRows own;
     return own;
 }
 
@@ -30,15 +30,15 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
                                int iterations, double tolerance) {
     FrictionReport report;
     guess_unknown_normals(system, points);
-    Sweeper& sweeps = sweeper();
-    sweeps.prepare(system, points, model);
+    PgsRows& pgs = pgs_rows();
+    pgs.prepare(system, points, model);
     report.residual = unbounded;
-    while (report.sweeps < iterations && report.residual > tolerance) {
+    while (report.pgs_iterations < iterations && report.residual > tolerance) {
         Watch::look();
-        report.residual = sweeps.sweep(points, false);
-        ++report.sweeps;
+        report.residual = pgs.iterate(points, false);
+        ++report.pgs_iterations;
     }
-    sweeps.write(system);
+    pgs.write(system);
     if (system.rows.empty()) report.residual = 0.0;
     report.converged = report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
@@ -48,8 +48,8 @@ FrictionReport solve_iterative(MixedSystem& system, std::vector<FrictionPoint>& 
 }
 
 FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                            PivotSolver& solver, Patience& patience, int iterations, double tolerance) {
-    if (patience.waits()) return solve_iterative(system, points, model, iterations, tolerance);
+                            PivotSolver& solver, RetryBackoff& backoff, int iterations, double tolerance) {
+    if (backoff.waits()) return solve_iterative(system, points, model, iterations, tolerance);
     FrictionReport report;
     const RoundLimitKept kept(solver);
     solver.round_limit = search_rounds;
@@ -68,26 +68,27 @@ FrictionReport solve_hybrid(MixedSystem& system, std::vector<FrictionPoint>& poi
         report.finite = pivots.finite;
         if (!pivots.finite) return report;
         if (!pivots.converged && rows_residual(system, {}, model, tolerance).residual > tolerance) {
-            patience.failed();
+            backoff.failed();
             for (RowBlock& block : system.rows) block.multiplier.fill(0.0);  // they may be anything
-            FrictionReport swept = solve_iterative(system, points, model, iterations, tolerance);
-            swept.rounds += report.rounds, swept.pivots += report.pivots, swept.sweeps += report.sweeps;
-            return swept;
+            FrictionReport updated = solve_iterative(system, points, model, iterations, tolerance);
+            updated.rounds += report.rounds, updated.pivots += report.pivots,
+                updated.pgs_iterations += report.pgs_iterations;
+            return updated;
         }
-        patience.succeeded();
+        backoff.succeeded();
         if (points.empty()) return report;
         guess_unknown_normals(system, points);
 
-        Sweeper& sweeps = sweeper();
-        sweeps.prepare(system, points, model);
-        double largest = 0.0, sweep = unbounded;
-        for (int inner = 0; inner < iterations && sweep > 0.1 * tolerance; ++inner) {
+        PgsRows& pgs = pgs_rows();
+        pgs.prepare(system, points, model);
+        double largest = 0.0, change = unbounded;
+        for (int inner = 0; inner < iterations && change > 0.1 * tolerance; ++inner) {
             Watch::look();
-            sweep = sweeps.sweep(points, true);
-            if (inner == 0) largest = sweep;
-            ++report.sweeps;
+            change = pgs.iterate(points, true);
+            if (inner == 0) largest = change;
+            ++report.pgs_iterations;
         }
-        sweeps.write(system);
+        pgs.write(system);
         for (FrictionPoint& point : points) {
             const double normal = system.rows[point.block].multiplier[0];
             if (model != FrictionModel::box) point.normal = normal;

@@ -1,8 +1,8 @@
-// Sweeps island by island: what has lost its number is not settled, what comes last is not either, all rows are swept.
+// Iterations island by island: what has lost its number is not settled, what comes last is not either, all rows are updated.
 #include <cmath>
 #include <limits>
 
-#include "contacts/contact_sweeps.hpp"
+#include "contacts/pgs_solver.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -35,8 +35,8 @@ RowBlock row(int first, int second, bool bounded) {
     return block;
 }
 
-SweepContact on_the_ground(int body, double friction) {
-    SweepContact contact;
+PgsContact on_the_ground(int body, double friction) {
+    PgsContact contact;
     contact.first = body;
     contact.normal = {0, 0, 1};
     contact.tangent = {1, 0, 0};
@@ -55,11 +55,11 @@ void an_island_that_is_no_number_has_not_settled() {
                 MixedSystem system = falling(2);
                 system.momentum[0][broken] = NAN_;
                 if (kind < 2) system.rows = {row(0, -1, kind == 1), row(1, -1, kind == 1)};
-                ContactSweeps sweeps;
-                sweeps.start(system, model);
+                PgsSolver solver;
+                solver.start(system, model);
                 const double friction = kind == 3 ? 0.5 : 0.0;
-                if (kind >= 2) sweeps.add(on_the_ground(0, friction)), sweeps.add(on_the_ground(1, friction));
-                const FrictionReport report = sweeps.run(20, 1e-9, 1e-9, nothing_more);
+                if (kind >= 2) solver.add(on_the_ground(0, friction)), solver.add(on_the_ground(1, friction));
+                const FrictionReport report = solver.run(20, 1e-9, 1e-9, nothing_more);
                 EXPECT(!report.converged);
                 EXPECT(!report.finite);
             }
@@ -70,51 +70,51 @@ void a_row_that_is_no_number_has_not_settled() {
     MixedSystem system = falling(2);
     system.rows = {row(0, -1, true), row(1, -1, true)};
     system.rows[0].first_jacobian[0][1] = NAN_;
-    ContactSweeps sweeps;
-    sweeps.start(system, FrictionModel::cone);
-    const FrictionReport report = sweeps.run(20, 1e-9, 1e-9, nothing_more);
+    PgsSolver solver;
+    solver.start(system, FrictionModel::cone);
+    const FrictionReport report = solver.run(20, 1e-9, 1e-9, nothing_more);
     EXPECT(!report.converged);
     EXPECT(!report.finite);
 }
 
-/// Each time all is settled another body turns out to touch: after three late rounds the last one was never swept.
+/// Each time all is settled another body turns out to touch: after three late rounds the last one was never updated.
 void what_is_found_last_leaves_it_open() {
     for (const int late : {1, 2, 3, 4, 9}) {
         MixedSystem system = falling(12);
-        ContactSweeps sweeps;
-        sweeps.start(system, FrictionModel::cone);
-        sweeps.add(on_the_ground(0, 0.0));
-        int known = 1, sweep_end = 0;
-        const FrictionReport report = sweeps.run(4, 1e-9, 1e-9, [&](bool) {
-            if (++sweep_end > late) return false;
-            sweeps.add(on_the_ground(known++, 0.0));
+        PgsSolver solver;
+        solver.start(system, FrictionModel::cone);
+        solver.add(on_the_ground(0, 0.0));
+        int known = 1, asked = 0;
+        const FrictionReport report = solver.run(4, 1e-9, 1e-9, [&](bool) {
+            if (++asked > late) return false;
+            solver.add(on_the_ground(known++, 0.0));
             return true;
         });
         EXPECT(report.converged == (late <= 3));
         for (int body = 0; body < known; ++body) {
-            const bool swept = body < known - 1 || late <= 3;
-            EXPECT_NEAR(sweeps.velocity(body)[2], swept ? 0.0 : -1.0, 1e-15);
+            const bool updated = body < known - 1 || late <= 3;
+            EXPECT_NEAR(solver.velocity(body)[2], updated ? 0.0 : -1.0, 1e-15);
         }
     }
 }
 
-/// A row whose first two bodies do not move, and one or two beyond them that do: it is swept with their contacts.
-void a_row_that_begins_with_what_does_not_move_is_swept() {
+/// A row whose first two bodies do not move, and one or two beyond them that do: it is updated with their contacts.
+void a_row_that_begins_with_what_does_not_move_is_updated() {
     for (const bool two : {false, true}) {
         MixedSystem system = falling(3);
-        std::vector<Beyond> beyond{{1, {0, 0, 1, 0, 0, 0}}};
+        std::vector<FurtherBody> beyond{{1, {0, 0, 1, 0, 0, 0}}};
         if (two) beyond.push_back({2, {0, 0, 1, 0, 0, 0}});
         RowBlock wide = row(-1, -1, false);
-        wide.beyond = beyond;
+        wide.further = beyond;
         wide.right[0] = 0.25;
         system.rows = {wide};
-        ContactSweeps sweeps;
-        sweeps.start(system, FrictionModel::cone);
-        sweeps.add(on_the_ground(0, 0.0));
-        sweeps.add(on_the_ground(1, 0.0));
-        const FrictionReport report = sweeps.run(200, 1e-13, 1e-13, nothing_more);
+        PgsSolver solver;
+        solver.start(system, FrictionModel::cone);
+        solver.add(on_the_ground(0, 0.0));
+        solver.add(on_the_ground(1, 0.0));
+        const FrictionReport report = solver.run(200, 1e-13, 1e-13, nothing_more);
         EXPECT(report.converged);
-        sweeps.write(system);
+        solver.write(system);
         EXPECT_NEAR(system.velocity[0][2], 0.0, 1e-12);
         EXPECT_NEAR(system.velocity[1][2] + (two ? system.velocity[2][2] : 0.0), 0.25, 1e-12);
         EXPECT(system.velocity[1][2] > -1e-12);
@@ -128,6 +128,6 @@ int main() {
     an_island_that_is_no_number_has_not_settled();
     a_row_that_is_no_number_has_not_settled();
     what_is_found_last_leaves_it_open();
-    a_row_that_begins_with_what_does_not_move_is_swept();
+    a_row_that_begins_with_what_does_not_move_is_updated();
     return report();
 }

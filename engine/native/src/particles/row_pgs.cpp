@@ -1,20 +1,20 @@
-#include "particles/row_sweeps.hpp"
+#include "particles/row_pgs.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace spook {
 
-void RowSweeps::solve(const Nodes& nodes, DistanceRows& rows) noexcept {
+void RowPgs::solve(const Nodes& nodes, DistanceRows& rows) noexcept {
     std::fill(pushed_.begin(), pushed_.end(), Vec3{});  // M⁻¹ Gᵀ λ
     for (std::size_t k = 0; k < rows.row.size(); ++k) {
         const Vec3 impulse = rows.link[k].lambda * rows.link[k].u;
         pushed_[rows.row[k].a] -= nodes.w[rows.row[k].a] * impulse;
         pushed_[rows.row[k].b] += nodes.w[rows.row[k].b] * impulse;
     }
-    for (int sweep = 0; sweep < iterations; ++sweep) {
+    for (int iteration = 0; iteration < iterations; ++iteration) {
         double worst = 0.0;
-        ++work.sweeps;
+        ++work.pgs_iterations;
         for (std::size_t k = 0; k < rows.row.size(); ++k) {
             const Row& row = rows.row[k];
             Link& link = rows.link[k];

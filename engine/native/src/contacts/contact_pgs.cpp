@@ -1,0 +1,313 @@
+// The contact stage by projected Gauss–Seidel (PGS): resting contact for as many bodies as there are.
+#include <algorithm>
+#include <utility>
+
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+#include "linear/ahead.hpp"
+#include "linear/regularisation.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr int most_turns = 16;    // times the work of `iterations`, where a step would be unsettled otherwise
+constexpr int joint_turns = 4;    // the same where a joint is furthest off: all of them are updated each time
+constexpr double too_much = 1e6;  // times the energy there is
+constexpr double focus = 0.5;  // of the residual allowed: contacts that change less are unfinished alone then
+// Before points found late are solved for:
+constexpr int warm_start_iterations = 100;  // iterations at most
+constexpr double warm_started = 1e-6;       // of the speeds: what changes less is
+constexpr std::size_t few_points = 100;     // points of an island: so many are solved for again at less cost
+constexpr int many_rounds = 8;              //   unless that has been done so often
+
+}  // namespace
+
+/// Gives the PGS solver the points it does not have yet.
+void ContactStage::hand_over() {
+    const double h = options_.time_step;
+    for (std::size_t k = handed_over_; k < points_.size(); ++k)
+        pgs_.announce(solver_index_[points_[k].contact.first], solver_index_[points_[k].contact.second]);
+    pgs_.arrange();
+    for (; handed_over_ < points_.size(); ++handed_over_) {
+        Point& point = points_[handed_over_];
+        if (handed_over_ + ahead < points_.size()) {
+            const Contact& later = points_[handed_over_ + ahead].contact;
+            for (const int body : {later.first, later.second})
+                prefetch(velocity_[body]), prefetch(dv_ext_[body]);
+        }
+        const PairMaterial material = this->material(point.contact);
+        const ContactExtras& extras = this->extras(point);
+        PgsContact row;
+        row.first = solver_index_[point.contact.first];
+        row.second = solver_index_[point.contact.second];
+        row.normal = point.contact.point.normal;
+        row.tangent = extras.axis_scale[0] * point.tangent;
+        row.across = extras.axis_scale[1] * cross(row.normal, point.tangent);
+        row.anisotropic = extras.is_anisotropic();
+        row.first_arm = point.first_arm;
+        row.second_arm = point.second_arm;
+        row.softness = regularise(material.compliance, material.damping, h).softness;
+        row.slip_softness = material.slip_compliance / h;
+        row.friction = point.friction;
+        row.normal_before = point.before;
+        row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
+        for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangents[i] / extras.axis_scale[i];
+        if (conveys_ || row.first < 0 || row.second < 0) {
+            const Vec3 directions[3] = {row.normal, row.tangent, row.across};
+            for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
+            for (int i = 1; i < 3; ++i) row.right[i] -= surface_speed(point, directions[i]);
+        }
+        row.right[0] += resting_right(point);
+        pgs_.add(row);
+    }
+}
+
+/// How much deeper into what supports them bodies would go with the velocities so far.
+void ContactStage::predict_sinking() {
+    std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
+    for (const Point& point : points_) {
+        if (point.toi >= 0.0) continue;
+        const Contact& contact = point.contact;
+        const double closing = -relative(point, contact.point.normal, next_, false);
+        const double sinking = options_.time_step * closing - std::max(0.0, contact.point.gap);
+        for (const int b : {contact.first, contact.second})
+            predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
+    }
+}
+
+/// Pairs that meet because of what the iterations have found so far get rows in the same solve.
+bool ContactStage::find_more(bool over) {
+    const bool first = next_.empty();  // look of this step
+    if (first) next_ = velocity_;
+    // On the way bodies are skipped at the sides of others that they do meet in the end, and need not have changed since.
+    const bool was_settling = std::exchange(iterating_, !over);
+    const bool all = first || (was_settling && over && swings_);
+    changed_.assign(solver_index_.size(), all);
+    pgs_.visit_moved([&](int moving) {
+        const int b = body_of_[moving];
+        const Vec6& now = pgs_.velocity(moving);
+        changed_[b] = all || next_[b] != now;
+        next_[b] = now;
+    });
+    if (outrun(next_)) find_open_again();
+    if (swings_) predict_sinking();
+    const std::size_t known = points_.size();
+    const bool turned = find_turned(next_);
+    const std::size_t dissipated_energy = points_.size();
+    if (find_impacts(next_, true) > 0) move_impacts_to_start(dissipated_energy, next_);
+    else if (!turned) return false;
+    take_in(known);
+    return true;
+}
+
+/// Hands the points found since `known` to the PGS solver, with what they did in the step before.
+void ContactStage::take_in(std::size_t known) {
+    counters_.contacts += points_.size() - known;
+    for (std::size_t k = known; k < points_.size(); ++k) {
+        Point& point = points_[k];
+        const auto old =
+            std::lower_bound(cache_.begin(), cache_.end(), point.contact.key,
+                             [](const CachedContact& t, std::uint64_t key) { return t.contact.key < key; });
+        if (old == cache_.end() || old->contact.key != point.contact.key) continue;
+        point.before = old->normal;
+        point.compression_before = old->compression;
+        std::copy_n(old->tangent, 2, point.tangents);
+    }
+    hand_over();
+}
+
+/// Whether the iterations have come as near to their law as the method asks for; if not, notes which body is furthest off.
+bool ContactStage::is_settled(MixedSystem& system) {
+    unsettled_body_ = -1;
+    unsettled_by_ = 0.0;
+    if (!system.rows.empty()) pgs_.write(system);
+    const RowsResidual contact = pgs_.worst(focus * options_.unsettled_residual, options_.unsettled_residual),
+                       joint = rows_residual(system, {}, options_.friction);
+    residual_ = std::max(contact.residual, joint.residual);
+    joint_is_worst_ = joint.residual > contact.residual;
+    if (contact.row >= 0 && contact.residual >= joint.residual) {
+        const Contact& pair = points_[contact.row].contact;
+        blame(contact.residual, std::max(solver_index_[pair.first], solver_index_[pair.second]));
+    } else if (!system.rows.empty()) {
+        const RowBlock& block = system.rows[joint.row];
+        blame(joint.residual, std::max(block.first, block.second));
+    }
+    return unsettled_body_ < 0;
+}
+
+/// Whether the iterations have made far more energy than there is. No answer does, but where friction on a long arm loads the
+/// contact that it stems from, each iteration's may be larger than the one before.
+bool ContactStage::runs_away(const MixedSystem& system) const {
+    double speed = 0.0, had = 0.0, has = 0.0;  // of what moves as it is told, or along itself
+    for (std::size_t b = 0; has_external_drive_ && b < prescribed_.size(); ++b)
+        speed = std::max(speed, norm(linear(prescribed_[b])) +
+                                    radius(static_cast<int>(b)) * norm(angular(prescribed_[b])));
+    for (const Point& point : points_)
+        if (conveys_)
+            speed =
+                std::max({speed, std::abs(surface_speed(point, point.tangent)),
+                          std::abs(surface_speed(point, cross(point.contact.point.normal, point.tangent)))});
+    const auto energy = [](const Mat6& mass, const Vec6& v) {
+        double sum = 0.0;
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6; ++j) sum += 0.5 * v[i] * mass[6 * i + j] * v[j];
+        return sum;
+    };
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        if (solver_index_[b] < 0) continue;
+        const Mat6& mass = system.mass[solver_index_[b]];
+        had += energy(mass, velocity_[b]) + energy(mass, sum(velocity_[b], dv_ext_[b])) +
+               mass[0] * speed * speed;
+        has += energy(mass, pgs_.velocity(solver_index_[b]));
+    }
+    return !(has <= too_much * had);
+}
+
+/// The islands of the points, and which of them have points from `known` on: no solve has answered those yet.
+const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies, std::size_t known) {
+    arrays_.connected.begin(static_cast<int>(bodies));
+    for (const Point& point : points_)
+        arrays_.connected.tie(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+    const Islands& islands = arrays_.connected.find();
+    Unanswered& found = unanswered_;
+    found.open.assign(islands.count, 0);
+    found.points.assign(islands.count, 0);
+    found.island.clear();
+    found.largest = 0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        found.island.push_back(island_of(islands, points_[k]));
+        ++found.points[found.island[k]];
+        if (k >= known) found.open[found.island[k]] = 1;
+    }
+    for (int k = 0; k < islands.count; ++k)
+        if (found.open[k]) found.largest = std::max(found.largest, found.points[k]);
+    return found;
+}
+
+/// Where a solve sets many bodies in motion towards others, each solve would find a few pairs more that meet. Iterations find
+/// nearly all of them at a fraction of the cost, and the next solve starts from where they end. Islands that an earlier
+/// solve has answered, and no new point ties to others, stay as they are to the last bit.
+void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int round) {
+    if (resists_turning_) return;  // PGS over contacts knows no such friction
+    if (points_.size() <= few_points && round < many_rounds) return;
+    if (find_unanswered(system.mass.size(), known).largest <= few_points && round < many_rounds) return;
+    double speed = 0.0;
+    for (const Vec6& v : system.velocity) speed = std::max(speed, norm(linear(v)));
+    system.rows.clear();
+    pgs_.start(system, options_.friction);
+    next_.clear();
+    handed_over_ = 0;
+    hand_over();
+    const double enough = warm_started * speed;
+    const FrictionReport report =
+        pgs_.run(warm_start_iterations, enough, enough, [this](bool over) { return find_more(over); });
+    counters_.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+    late_impact_ = false;  // by velocities on the way: the solve will tell
+    std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
+    if (!report.finite) return;
+    warm_started_ = true;
+    const Unanswered& islands = find_unanswered(system.mass.size(), known);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        if (!islands.open[islands.island[k]]) continue;
+        Point& point = points_[k];
+        const double* impulse = pgs_.impulse(static_cast<int>(k));
+        point.solved = true;
+        point.normal = impulse[0];
+        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * extras(point).axis_scale[i];
+    }
+}
+
+/// `unfinished`: it ends unfinished, since few joints and contacts are better solved by rows, and directly if need be; or the
+/// iterations run away.
+bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
+    pgs_.start(system, options_.friction);
+    next_.clear();
+    late_impact_ = false;
+    handed_over_ = 0;
+    hand_over();
+    iterating_ = false;
+    const std::size_t begun = points_.size();
+    FrictionReport report;
+    residual_ = 0.0;
+    unsettled_body_ = -1;
+    unsettled_by_ = 0.0;
+    sunk_ = false;
+    for (bool again = true; again;) {
+        again = false;
+        double last = unbounded;
+        for (int turn = 0; turn < most_turns || pgs_.work() < most_turns * options_.iterations; ++turn) {
+            report =
+                pgs_.run(options_.iterations, options_.residual_tolerance,
+                         focus * options_.unsettled_residual, [this](bool over) { return find_more(over); });
+            counters_.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+            if ((report.finite && is_settled(system)) || report.converged) break;
+            const bool grows = residual_ > std::exchange(last, residual_) && system.rows.empty();
+            if (!report.finite || (grows && runs_away(system))) {
+                points_.resize(begun);  // what was met on that way is not
+                find_open();
+                return unfinished = ran_away_ = true;
+            }
+            if (turn + 1 >= joint_turns && joint_is_worst_) break;
+        }
+        pgs_.write(system);
+        if (!report.finite) break;
+        if (!late_impact_) {
+            if (needs_stop_impact(system, begun, next_)) return true;
+            break;
+        }
+        late_impact_ = false;  // it was one by velocities on the way
+        for (std::size_t b = 0; b < solver_index_.size(); ++b)
+            if (solver_index_[b] >= 0) next_[b] = pgs_.velocity(solver_index_[b]);
+        changed_.assign(solver_index_.size(), 1);
+        const std::size_t known = points_.size();
+        if (find_impacts(next_, true) > 0) move_impacts_to_start(known, next_);
+        if (needs_plastic_impact() || needs_stop_impact(system, begun, next_)) return true;
+        if (late_impact_) find_deferred_impacts(next_);
+        again = points_.size() > known;
+        if (again) take_in(known);
+    }
+    if (report.finite && pass_other_ends(system, system.rows.size())) return true;
+    unfinished = report.finite && !report.converged && (by_rows_ || unsettled_body_ >= 0) &&
+                 !system.rows.empty() && system.rows.size() + points_.size() <= few_rows;
+    by_rows_ = by_rows_ || unfinished;
+    if (unfinished) return true;
+    counters_.unsettled += !report.converged;
+
+    std::vector<double>& share = arrays_.share;
+    share.clear();
+    if (!report.converged) {
+        if (unsettled_body_ < 0) blame_sunk();
+        std::vector<char>& pushes = arrays_.pushes;
+        pushes.clear();
+        for (std::size_t k = 0; k < points_.size(); ++k) {
+            const double* z = pgs_.impulse(static_cast<int>(k));
+            pushes.push_back(std::any_of(z, z + 3, [](double each) { return each != 0.0; }));
+        }
+        shorten_unsettled(system, system.rows.size(), pushes, share);
+    }
+    mark_rows(system);  // by joints; of contacts those that push, or did in an impact
+    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+        if (solver_index_[b] >= 0 && event_time_[b] >= 0.0) has_rows_[solver_index_[b]] = 1;
+    cache_.clear();
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        double impulse[3];
+        std::copy_n(pgs_.impulse(static_cast<int>(k)), 3, impulse);
+        if (!share.empty())
+            for (double& z : impulse)
+                z *= share[std::max(solver_index_[point.contact.first], solver_index_[point.contact.second])];
+        const Vec3 across = cross(point.contact.point.normal, point.tangent);
+        const double* const axis_scale = extras(point).axis_scale;
+        cache_contact(system, point, impulse[0],
+                      (impulse[1] * axis_scale[0]) * point.tangent + (impulse[2] * axis_scale[1]) * across);
+        if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
+        for (const int body : {point.contact.first, point.contact.second})
+            if (solver_index_[body] >= 0) has_rows_[solver_index_[body]] = 1;
+    }
+    if (report.finite) correct_events(system);
+    order_by_key(cache_, unordered_, places_);
+    return report.finite;
+}
+
+}  // namespace spook

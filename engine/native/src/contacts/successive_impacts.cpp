@@ -1,0 +1,120 @@
+// Successive impacts: which comes next, and the free balls that are moved to its time.
+#include <algorithm>
+
+#include "contacts/contact_geometry.hpp"
+#include "contacts/contact_stage.hpp"
+
+namespace spook {
+
+/// How far a body has come since the step began, at a time from when on nothing has hit it.
+Vec6 ContactStage::path_until(std::size_t body, double time) const {
+    if (solver_index_[body] < 0) return sum(Vec6{}, prescribed_[body], time);
+    const double on = time - clock_[body];
+    const Vec6 way = sum(path_[body], velocity_[body], on);
+    return supported_[body] || jointed_[body] ? way : sum(way, dv_ext_[body], on);
+}
+
+/// The gap of a point at that time, with both bodies on their ways.
+double ContactStage::gap_at(const Point& point, double time) const {
+    const Contact& contact = point.contact;
+    const Vec3 n = contact.point.normal;
+    return point.begun + dot(contact_row(n, point.first_arm), path_until(contact.first, time)) -
+           dot(contact_row(n, point.second_arm), path_until(contact.second, time));
+}
+
+/// From when on the ways of both bodies of a point are straight, s.
+double ContactStage::last_impact_time(const Point& point) const noexcept {
+    return std::max(clock_[point.contact.first], clock_[point.contact.second]);
+}
+
+/// When a point that is approached closes, s. Forces are part of the ways: what they slow closes later.
+double ContactStage::closing_time(const Point& point) const {
+    const double from = last_impact_time(point), gap = std::max(0.0, gap_at(point, from));
+    if (gap == 0.0) return from;
+    const double speed = (gap - gap_at(point, from + options_.time_step)) / options_.time_step;
+    return from + gap / (speed > 0.0 ? speed : -point.approach);
+}
+
+/// An open point among balls that are moved by successive impacts is moved to the time of their last one.
+void ContactStage::move_to_last_impact(Point& point) {
+    for (const int body : {point.contact.first, point.contact.second})
+        if (solver_index_[body] >= 0 && event_time_[body] < 0.0) return;
+    const double time = last_impact_time(point), gap = gap_at(point, time);
+    if (point.toi < 0.0 && is_closed(point.contact, gap)) return;
+    point.event = true;
+    point.toi = time;
+    point.contact.point.gap = std::max(0.0, gap);
+}
+
+/// Forces act on a free ball until the time it is moved to, and the rest of them after it: what a fall towards a wall wins
+/// until then is lost on the way back.
+void ContactStage::apply_forces_before(std::size_t b, MixedSystem& system) {
+    const double lead = clock_[b] / options_.time_step;
+    if (supported_[b] || !(lead > toi_fraction_[b])) return;
+    const double part = (lead - toi_fraction_[b]) / (1.0 - toi_fraction_[b]);
+    toi_fraction_[b] = lead;
+    const Vec6 more = sum(Vec6{}, dv_ext_[b], part);
+    velocity_[b] = sum(velocity_[b], more);
+    for (double& k : dv_ext_[b]) k *= 1.0 - part;
+    const Mat6& mass = system.mass[solver_index_[b]];
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) system.momentum[solver_index_[b]][i] += mass[6 * i + j] * more[j];
+}
+
+/// Of successive impacts those to be answered next: of what may meet in this step the points that are approached, and closed
+/// when the first of them is. Free balls are moved there, as to the time of a single impact.
+void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points) {
+    arrays_.connected.begin(static_cast<int>(system.mass.size()));
+    for (const RowBlock& block : system.rows) arrays_.connected.tie(block);
+    for (const Point& point : points_)
+        arrays_.connected.tie(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+    for (const OpenPair& open : open_)
+        if (!open.has_met()) arrays_.connected.tie(solver_index_[open.first], solver_index_[open.second]);
+    const Islands& islands = arrays_.connected.find();
+    const auto is_impact = [](const Point& point) {
+        return point.bounce >= 0.0 && point.approach < -point.rounding;
+    };
+    std::vector<double>&first = filled(arrays_.impact.first, islands.count, unbounded),
+    &closing = filled(arrays_.impact.closing, points_.size(), unbounded);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        if (!is_impact(points_[k])) continue;
+        closing[k] = closing_time(points_[k]);
+        double& earliest = first[island_of(islands, points_[k])];
+        earliest = std::min(earliest, closing[k]);
+    }
+    std::vector<char>&hit = arrays_.impact.is_hit, &balls = arrays_.impact.balls;
+    hit.assign(solver_index_.size(), 0), balls.assign(islands.count, 1);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        const double now = first[island_of(islands, point)];
+        if (!is_impact(point) || (closing[k] > now && !is_closed(point.contact, gap_at(point, now))))
+            continue;
+        hit_points.push_back(k);
+        hit[point.contact.first] = hit[point.contact.second] = 1;
+    }
+    const auto island = [&](std::size_t b) {
+        return solver_index_[b] >= 0 ? islands.of_body[solver_index_[b]] : -1;
+    };
+    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+        if (island(b) >= 0) balls[island(b)] = balls[island(b)] && ball_[b] && !jointed_[b];
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        const int own = island(b);
+        if (own < 0 || first[own] == unbounded) continue;
+        if (const double time = std::min(first[own], options_.time_step); hit[b] && time > clock_[b]) {
+            path_[b] = path_until(b, time);
+            clock_[b] = time;
+            if (balls[own]) apply_forces_before(b, system);
+        }
+        if (!balls[own] || moves_along_forces(static_cast<int>(b))) continue;
+        event_time_[b] = clock_[b];
+        if (clock_[b] > 0.0) predicted_[b] = sum(Vec6{}, path_[b], 1.0 / clock_[b]);
+    }
+    for (Point& point : points_) move_to_last_impact(point);
+    for (const std::size_t k : hit_points) {
+        Point& point = points_[k];
+        point.approach = relative(point, point.contact.point.normal, velocity_, false);
+        if (point.event) point.bounce = material(point.contact).restitution;
+    }
+}
+
+}  // namespace spook
