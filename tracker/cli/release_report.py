@@ -8,7 +8,16 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from spook_tracker.tracker.judge.comparison_document import Change
-from spook_tracker.tracker.judge.release_notes import Changelog, Checked, Step, by_test, check, visible
+from spook_tracker.tracker.judge.release_notes import (
+    Changelog,
+    Checked,
+    Step,
+    alike,
+    by_test,
+    check,
+    told,
+    visible,
+)
 
 SHOWN = 3  # changes of one test in a list; the database has them all
 
@@ -29,6 +38,7 @@ def steps_between(history: Any, engine: str) -> tuple[list[Any], list[Step]]:
                 before=before.engine.version,
                 changes=tuple(change for change in found.changes if visible(change)),
                 asked=len(both),
+                alike=alike(found.changes),
             )
         )
     return runs, steps
@@ -43,10 +53,14 @@ def text_lines(engine: str, steps: Sequence[Step], changelog: Changelog | None) 
     lines: list[str] = []
     for step in steps:
         lines.append(f"{engine} {step.release} after {step.before}: {_count(len(step.changes), 'change')}")
-        for found in by_test(step.changes).values():
+        for test, found in by_test(step.changes).items():
+            if test in step.alike:
+                lines += [f"  {test}: {sentence}" for sentence in told(found)]
+                continue
             lines += [f"  {change.word:<14} {change.series}  {values(change)}" for change in found[:SHOWN]]
             if len(found) > SHOWN:
                 lines.append(f"  {'':<14} … and {len(found) - SHOWN} more of {found[0].test}")
+        lines += _unchanged(step)
     if changelog is None:
         return lines
     checked = check(steps, changelog)
@@ -55,6 +69,15 @@ def text_lines(engine: str, steps: Sequence[Step], changelog: Changelog | None) 
     lines += [f"  missed  {entry.release} {entry.says}" for entry in checked.missed]
     lines += [f"  unsaid  {release}: {_tests(changes)}" for release, changes in checked.unsaid]
     return lines
+
+
+def _unchanged(step: Step) -> list[str]:
+    """The models a release left alone: to the bit, or but for rounding."""
+    still = {test: found for test, found in step.alike.items() if test not in by_test(step.changes)}
+    exact = [test for test, (_, rounded) in still.items() if not rounded]
+    rounded = [f"{test} ({found[1]} of {sum(found)} values)" for test, found in still.items() if found[1]]
+    lines = [f"  the same bits: {', '.join(exact)}"] if exact else []
+    return lines + ([f"  but for rounding the same: {', '.join(rounded)}"] if rounded else [])
 
 
 def page(

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.judge.comparison_document import Change
+from spook_tracker.tracker.judge.model_words import Moved, severity, words
 
 SEEN = 1e-6  # relative: below it a value that changed is rounding to a reader of releases
 NOTHING = 1e-12  # of any unit: below it a value is zero to a reader of releases
@@ -29,6 +30,7 @@ class Step:
     before: str
     changes: tuple[Change, ...]  # that a reader can see, the worst first
     asked: int  # series measured in both
+    alike: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # model: same bits; rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +152,32 @@ def by_test(changes: Iterable[Change]) -> Mapping[str, list[Change]]:
     found: dict[str, list[Change]] = {}
     for change in changes:
         found.setdefault(change.test, []).append(change)
+    return found
+
+
+def told(changes: Iterable[Change]) -> list[str]:
+    """Changes of one model in words, worst first."""
+    return words(
+        Moved(
+            metric=change.metric,
+            unit=change.unit,
+            before=float("nan") if change.before is None else float(change.before),
+            after=float("nan") if change.after is None else float(change.after),
+            severity=severity(change.sentence),
+            became="" if change.before_outcome == change.after_outcome else change.sentence,
+        )
+        for change in changes
+    )
+
+
+def alike(changes: Iterable[Change]) -> dict[str, tuple[int, int]]:
+    """Of each model, how many values have the same bits and how many differ by rounding."""
+    found: dict[str, tuple[int, int]] = {}
+    for change in changes:
+        if change.rounding is not None:
+            same, rounded = found.get(change.test, (0, 0))
+            here = change.before == change.after
+            found[change.test] = same + here, rounded + (not here and not visible(change))
     return found
 
 

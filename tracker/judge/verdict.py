@@ -204,7 +204,9 @@ def _by_sensitivity(definition: SeriesDefinition, known: Sensitivity, old: float
             words = f"rounding: {moved:.2g} {unit}, and pushes of the last bits grow to {known.rounding:.2g}"
         return Verdict(word="same", sentence=words)
     told = f"moved by {moved:.3g} {unit}"
-    if known.step_error is not None and math.isfinite(known.step_error) and known.step_error > 0.0:
+    if known.step_error is not None and known.step_error <= known.rounding:
+        told += ": halving the time step does not move it"
+    elif known.step_error is not None and math.isfinite(known.step_error):
         told += f": {_times(moved / known.step_error)} what halving the time step changes"
     if known.scale and math.isfinite(known.scale) and unit == "m":
         told += f", {moved / known.scale:.2g} of the size"
