@@ -35,7 +35,10 @@ def test_a_motion_is_told_from_when_on_and_how_far_it_went() -> None:
         ]
     )
 
-    assert found == "moves otherwise from 0.05 s on: torso by 0.0005 m at 0.05 s (2 times); torso by 0.5 m at 5 s"
+    assert (
+        found
+        == "moves otherwise from 0.05 s on: torso by 0.0005 m at 0.05 s (2 times); torso by 0.5 m at 5 s"
+    )
 
 
 def test_more_bodies_than_three_are_counted() -> None:

@@ -18,6 +18,7 @@ from spook_tracker.tracker.website.diagrams import (
     view,
 )
 from spook_tracker.tracker.website.events import Event, of_test
+from spook_tracker.tracker.website.model_history import model_history
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
 from spook_tracker.tracker.website.replays import replay
@@ -39,6 +40,8 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     newest = max((t.nights[-1] for t in test.trends), default=book.tonight.index)
     charts = ladder_charts(test, peers=book.peers(test.name), earlier=book.earlier)
     contents = [("broken", "What is wrong tonight")] if found else []
+    history = model_history(test.trends)
+    contents += [("releases", "What changed with which version")] if history else []
     contents += [("scene", "The question"), ("versions", "Over versions")]
     contents += [("figures", "Figures")] if test.figures else []
     contents += [("error-time", "Error against run time")] if charts else []
@@ -59,6 +62,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "seen": shown(test, found, book),
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),
         "gates": gates,
+        "model_history": history,
         "contents": contents,
         "trends": [
             view(trend_chart(t, book.nights, events)) for t in [*judged, *break_points] if t not in first
