@@ -38,6 +38,7 @@ ELSEWHERE_LIMIT = 120.0  # s
 
 def run_model(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
     """Load the file, drive it for `duration` [s] and read what is asked for."""
+    mujoco.set_mju_user_warning(_unheard)
     if run.elsewhere:
         return _elsewhere(run, time_step, duration, time_limit)
     began = time.perf_counter()
@@ -61,6 +62,10 @@ def load(run: ModelRun) -> Any:
         assets = {name: Path(file).read_bytes() for name, file in run.model.assets.items()}
         return mujoco.MjModel.from_xml_string(path.read_text(encoding="utf-8"), assets)
     return mujoco.MjModel.from_xml_path(str(path))
+
+
+def _unheard(message: str) -> None:
+    """MuJoCo would print it and write a log where one stands; a state it resets is found by its counters."""
 
 
 def _line(error: Exception) -> str:

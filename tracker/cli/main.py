@@ -12,6 +12,7 @@ import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.ci import ci
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
+from spook_tracker.tracker.cli.models import models_command
 from spook_tracker.tracker.cli.options import (
     RED,
     UNUSABLE,
@@ -401,6 +402,7 @@ for command in (
     list_tests,
     show,
     explain,
+    models_command,
     export,
     import_files,
     db,

@@ -1,0 +1,70 @@
+"""The model files of a package are listed: models, parts of models, what is refused; and what an engine loads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.measure.model_files import ModelFileError
+from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at
+
+MODEL = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in {
+        "a/ball.xml": MODEL,
+        "a/part.xml": "<mujocoinclude/>",
+        "b/broken.xml": "<mujoco>",
+        "b/nonsense.xml": MODEL.replace("<geom", "<nonsense/><geom"),
+        "b/notes.txt": "",
+    }.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_a_folder_is_listed_and_each_file_is_what_it_is(folder: Path) -> None:
+    found = {path.name: looked_at(path).word for path in files_of(str(folder))}
+
+    assert found == {
+        "ball.xml": "model",
+        "part.xml": "part",
+        "broken.xml": "refused",
+        "nonsense.xml": "model",
+    }
+
+
+def test_an_installed_package_is_found_by_its_name_or_by_that_of_its_import() -> None:
+    assert files_of("msgspec") == []
+    assert files_of("_pytest") == files_of("pytest")
+    with pytest.raises(ModelFileError, match="no package 'no-such-thing' is installed"):
+        files_of("no-such-thing")
+
+
+def test_an_engine_loads_and_steps_what_it_can_and_says_why_not_the_rest(folder: Path) -> None:
+    pytest.importorskip(
+        "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+    )
+
+    found = {one.path.name: one for one in loaded(files_of(str(folder)), "mujoco", workers=1)}
+
+    assert {name: one.word for name, one in found.items()} == {
+        "ball.xml": "runs",
+        "part.xml": "part",
+        "broken.xml": "refused",
+        "nonsense.xml": "refused",
+    }
+    assert "mujoco refuses nonsense.xml" in found["nonsense.xml"].sentence
+
+
+def test_the_command_counts_them(folder: Path) -> None:
+    ran = CliRunner().invoke(main, ["models", str(folder)], prog_name="tracker")
+
+    assert ran.exit_code == 0
+    assert "4 files: 2 model" in ran.output
+    assert "part.xml" not in ran.output

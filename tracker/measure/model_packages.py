@@ -1,0 +1,99 @@
+"""The model files of an installed package or of a folder: which are models, and which an engine loads and steps.
+
+Each file is loaded in a process that is watched: what hangs, dies or takes too much memory costs its own line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import PackageNotFoundError, distribution, packages_distributions
+from pathlib import Path
+from typing import Literal
+
+import spook_tracker.tracker.measure.workers as crew
+from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.find import find
+from spook_tracker.engine.model_file import ModelFile, ModelRun
+from spook_tracker.engine.model_reading import ModelError, Reading, read
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
+
+Word = Literal["model", "part", "refused", "runs", "fails"]
+PARTS = ("no model by itself", "part of other models", "nothing in", "begins with <")
+STEPS = 10  # that a model must take to be said to run
+LIMITS = crew.Limits(seconds=60.0, memory=4 << 30)
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """One file and what it is."""
+
+    path: Path
+    word: Word
+    sentence: str = ""
+    format: str = ""
+    bodies: int = 0
+    files: int = 0
+
+
+def files_of(name: str) -> list[Path]:
+    """Every file that could be a model: of a folder, or of an installed package by its own or its import name."""
+    if Path(name).is_dir():
+        return sorted(path for path in Path(name).rglob("*") if path.suffix.lower() in SUFFIXES)
+    try:
+        found = distribution(name)
+    except (PackageNotFoundError, ValueError):
+        names = packages_distributions().get(name, ())
+        if not names:
+            raise ModelFileError(
+                f"no package {name!r} is installed here, and there is no such folder; install it with: pip install {name}"
+            ) from None
+        found = distribution(names[0])
+    files = [Path(str(found.locate_file(file))).resolve() for file in found.files or ()]
+    return sorted({path for path in files if path.suffix.lower() in SUFFIXES and path.is_file()})
+
+
+def looked_at(path: Path) -> Looked:
+    """What a file is, without an engine."""
+    try:
+        return _said(path, read(path), "model")
+    except ModelError as error:
+        part = any(words in str(error) for words in PARTS)
+        return Looked(path, "part" if part else "refused", str(error))
+
+
+def loaded(paths: Sequence[Path], engine: str, workers: int = 2) -> Iterator[Looked]:
+    """The same, each model also loaded and stepped by an engine."""
+    for path, answer in crew.answers(partial(_stepped, engine), list(paths), workers, LIMITS):
+        yield Looked(path, "fails", answer.failure) if isinstance(answer, crew.Lost) else answer
+
+
+def _said(path: Path, reading: Reading, word: Word, sentence: str = "") -> Looked:
+    return Looked(path, word, sentence, reading.format, reading.bodies, len(reading.files))
+
+
+def _stepped(engine: str, path: Path) -> Looked:
+    looked = looked_at(path)
+    if looked.word != "model":
+        return looked
+    reading = read(path)
+    model = ModelFile(
+        path=str(path),
+        format=reading.format,
+        digest=reading.digest,
+        time_step=reading.time_step,
+        watched=reading.watched,
+        assets={name: str(file) for name, file in reading.assets.items()},
+    )
+    asked = ModelRun(model=model)
+    try:
+        done = find(engine).simulate(asked, time_step=reading.time_step, duration=STEPS * reading.time_step)
+    except NotSupported as lack:
+        return _said(path, reading, "refused", str(lack))
+    except EngineError as error:
+        return _said(path, reading, "fails", str(error))
+    except Exception as error:
+        return _said(path, reading, "fails", f"{type(error).__name__}: {' '.join(str(error).split())[:200]}")
+    return _said(path, reading, "runs" if done.completed else "fails", done.failure)
