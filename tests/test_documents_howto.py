@@ -33,6 +33,11 @@ ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the tes
     "tracker ci change --history history --comment comment.md": "tests/test_team_workflow.py",
     "tracker run pendulum n_pendulum resting_stack --engine spook,mujoco --sweep": "tests/test_engine_mujoco.py",
     "tracker backfill --engine mujoco --newest 3": "tests/test_tracker_releases.py",
+    "tracker run --model robot.xml --engine mujoco --all": "tests/test_documents_upgrade.py",
+    "tracker backfill --engine mujoco 3.3.7 3.4.0 --model robot.xml": "tests/test_documents_upgrade.py",
+    "tracker models gymnasium --engine mujoco": "tests/test_tracker_model_packages.py",
+    "tracker backfill --engine mujoco 3.3.7 3.4.0": "tests/test_documents_upgrade.py",
+    "tracker nightly": "tests/test_documents_upgrade.py",
     "tracker releases mujoco": "tests/test_tracker_releases.py",
     "tracker run --executor dask://scheduler:8786": "tests/test_tracker_executors.py",
     "tracker db copy sqlite:///tracker.db postgresql://host/tracker": "tests/test_tracker_transfer.py",
@@ -98,6 +103,7 @@ def test_every_line_of_the_pages_runs_or_names_the_test_that_runs_it(team: Path)
         "choose-an-engine.md",
         "own-engine.md",
         "own-commits.md",
+        "upgrade.md",
     ]
     assert sorted(pages) == sorted(page.name for page in (DOCS / "how-to").glob("*.md"))
     lines = [line for page in pages for line in typed(f"docs/how-to/{page}") if line.startswith("tracker ")]
