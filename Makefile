@@ -6,7 +6,7 @@ OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -32,6 +32,7 @@ help:
 	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make past      a wrong commit planted in this history and found, and ten old commits asked: many builds"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
+	@echo "make pairs      how many unchanged changes are blocked beside their base, and how many slower ones found"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava"
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
@@ -133,6 +134,9 @@ mutation: develop
 	$(BIN)/python bench/mutation.py
 
 # asv and Otava stand in an environment of their own: Otava pins its NumPy.
+pairs: develop
+	$(BIN)/python bench/pairs.py --page docs/pairs.md
+
 detectors:
 	$(PYTHON) -m venv build/detectors
 	build/detectors/bin/pip install -q msgspec asv==0.6.6 apache-otava==0.8.0

@@ -30,6 +30,8 @@ from spook_tracker.tracker.cli.options import (
     workers_option,
     write,
 )
+from spook_tracker.tracker.cli.past import KEPT
+from spook_tracker.tracker.cli.settings import present
 
 HISTORY = click.option(
     "--history",
@@ -104,7 +106,24 @@ def night(
     metavar="V",
     default="fork-point",
     show_default=True,
-    help="What it is compared with; fork-point is the nearest measured commit it builds on.",
+    help="What it is compared with: a commit, or a name that the history knows; fork-point is where it leaves the "
+    "main line, or the nearest measured commit before where nothing says how commits are built.",
+)
+@click.option(
+    "--build",
+    metavar="COMMAND",
+    default="",
+    help="Shell command that builds a commit; by default [build] of tracker.toml.",
+)
+@click.option("--quick", is_flag=True, help="Leave out run times, where they are compared.")
+@click.option(
+    "--keep",
+    "folder",
+    metavar="DIR",
+    default=KEPT,
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Where commits are built.",
 )
 @click.option(
     "--comment",
@@ -121,21 +140,29 @@ def night(
 @database_option
 @click.pass_context
 def change(
-    context: click.Context, /, history: Path, base: str, comment_file: Path | None, accepted: Path | None,
-    database: str, **asked: Any,
+    context: click.Context, /, history: Path, base: str, build: str, quick: bool, folder: Path,
+    comment_file: Path | None, accepted: Path | None, database: str, **asked: Any,
 ) -> None:  # fmt: skip
-    """Measure a proposed change and compare it with the history; nothing of it is kept."""
-    from spook_tracker.tracker.cli.console import say
+    """Measure a proposed change beside its base, both built here; nothing of it is kept.
+
+    Values are compared exactly, run times between fresh processes of both, interleaved. Where nothing says how a commit
+    is built, the change is measured as it lies here and compared with the history, without run times.
+    """
+    from spook_tracker.tracker.cli.change import beside_its_base, run_options
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.cli.main import run_command
-    from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
-    from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
     from spook_tracker.tracker.library import compare
+    from spook_tracker.tracker.measure.builds import team_repository
 
     refuse_unwritable(comment_file)
     if comment_file:
         comment_file.write_text("", encoding="utf-8")
-    known, kept = _bring_in(history, database), True
+    known = _bring_in(history, database)
+    if team := team_repository(present().folder or Path.cwd(), present().build, build):
+        said = {name: asked[name] for name in ("engine", "catalogue") if _on_command_line(context, name)}
+        options = [*([] if quick else ["--sweep"]), *run_options(**{**asked, "named": said})]
+        document = beside_its_base(team, base, database, accepted_levels(accepted), options, folder.resolve())
+        return _compared(context, document, comment_file)
     same: dict[str, Any] = {"tests": (), "json_file": None, "junit_file": None}
     same |= dict.fromkeys(("sweep", "stability", "figures", "no_record", "everything"), False)
     code = _code_of(context, run_command, database=database, **same, **asked)
@@ -144,6 +171,20 @@ def change(
         context.exit(code)
     with history_of(database) as recorded:
         document = compare(recorded, base, "latest", accepted_levels(accepted))
+    return _compared(context, document, comment_file)
+
+
+def _on_command_line(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+
+
+def _compared(context: click.Context, document: Any, comment_file: Path | None) -> None:
+    """Say what a comparison came to, wherever it is read, and end with its exit code."""
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
+    from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
+
+    kept = True
     say(compare_table(document))
     if comment_file and (words := comment(document)):
         kept = write(comment_file, words + "\n")

@@ -17,7 +17,6 @@ from spook_tracker.tracker.cli.options import (
     model_option,
     workers_option,
 )
-from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 
 KEPT = ".tracker-releases"
 MEGABYTE = 1e6
@@ -92,6 +91,7 @@ def backfill(
     from spook_tracker.tracker.cli.console import say
 
     if engine is None:
+        from spook_tracker.tracker.cli.change import run_options
         from spook_tracker.tracker.cli.past import KEPT as COMMITS
         from spook_tracker.tracker.cli.past import backfill_commits
 
@@ -99,11 +99,7 @@ def backfill(
             raise click.UsageError(
                 "name commits to measure, or --engine NAME for the releases of another engine"
             )
-        asked = [*["--sweep"] * sweep, "--workers", str(workers)]
-        asked += [] if limit is None else ["--limit", str(limit)]
-        # Older commits do not know all options: what nobody asked for is left to them.
-        asked += [] if time_limit == TIME_LIMIT else ["--time-limit", str(time_limit)]
-        asked += [] if memory == MEMORY else ["--memory", str(memory)]
+        asked = [*["--sweep"] * sweep, *run_options(workers, limit, memory, time_limit)]
         backfill_commits(versions, tests, asked, folder or Path(COMMITS), database)
         return
     folder = folder or Path(KEPT)

@@ -89,7 +89,7 @@ def compare(
     same_machine = before.side.machine == after.side.machine
     if same_machine and before.side.run != after.side.run:
         changes += [_in_history(change, history) for change in run_times(before.samples, after.samples)]
-    changes = [_blamed(_accept(change, accepted, after.night), history.first_bad) for change in changes]
+    changes = [_blamed(accept(change, accepted, after.night), history.first_bad) for change in changes]
     changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
     verdict = overall(changes)
     return CompareDocument(
@@ -323,7 +323,7 @@ def _map_changes(before: ComparedRun, after: ComparedRun) -> list[Change]:
     return changes
 
 
-def _accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change:
+def accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change:
     """A red change at an accepted level is not red; it says who took it and why."""
     gone = (change.kind == "map" and change.word == "missing") or change.word == "removed"
     if not change.red or (change.after is None and not gone):

@@ -114,7 +114,7 @@ def rank_test(low: Sequence[float], high: Sequence[float]) -> float:
     pooled = sorted((*low, *high))
     ties = [pooled.count(value) for value in set(pooled)]
     if n + m <= EXACT_UP_TO and max(ties) == 1:
-        ways = _ways(n, m)
+        ways = ways_of_u(n, m)
         return sum(ways[math.ceil(u) :]) / sum(ways)
     total = n + m
     correction = sum(t**3 - t for t in ties) / (total * (total - 1.0))
@@ -126,12 +126,12 @@ def rank_test(low: Sequence[float], high: Sequence[float]) -> float:
 
 
 @lru_cache(maxsize=64)
-def _ways(n: int, m: int) -> tuple[int, ...]:
+def ways_of_u(n: int, m: int) -> tuple[int, ...]:
     """In how many orders of n low and m high values U is 0 … n m (Mann and Whitney's recursion)."""
     if n == 0 or m == 0:
         return (1,)
     total = [0] * (n * m + 1)
-    for shift, part in ((m, _ways(n - 1, m)), (0, _ways(n, m - 1))):
+    for shift, part in ((m, ways_of_u(n - 1, m)), (0, ways_of_u(n, m - 1))):
         for u, count in enumerate(part):
             total[u + shift] += count
     return tuple(total)

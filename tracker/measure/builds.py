@@ -85,6 +85,28 @@ class TeamRepository:
             reasons.append(f"its own questions: {error}" if reasons else str(error))
         raise CommitError(f"{commit[:12]} gives no answers; " + "; ".join(reasons))
 
+    def ask_its_own(self, commit: str, home: Path, tests: Sequence[str], *options: str) -> RunDocument:
+        """What it answers to its own questions. CommitError."""
+        return self._answer(commit, home, self.build_at(home), tests, options, ())
+
+    def ask_those_of(
+        self, other: Path, commit: str, home: Path, tests: Sequence[str], *options: str
+    ) -> RunDocument:
+        """What it answers to the questions of another checkout. CommitError where no files are said to be questions."""
+        questions = self.build_at(other).questions
+        if not questions:
+            raise CommitError(f"[{TABLE}] of {FILE} does not say which files are questions")
+        with _laid_over((*questions, FILE), other, home):
+            return self._answer(commit, home, self.build_at(home), tests, options, (*questions, FILE))
+
+    def has_local_changes(self) -> bool:
+        """Whether tracked files differ from the commit that is checked out."""
+        return _git(self.repository, "diff", "--quiet", "HEAD").returncode == 1
+
+    def first_ancestors(self, commit: str, most: int) -> list[str]:
+        """The commit and those before it on the line of first parents."""
+        return _git(self.repository, "rev-list", "--first-parent", f"-n{most}", commit).stdout.split()
+
     def measure(
         self, commit: str, folder: Path, tests: Sequence[str], *options: str
     ) -> tuple[RunDocument, str]:

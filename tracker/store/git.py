@@ -51,22 +51,24 @@ def tags(repository: Path) -> dict[str, str]:
     return found
 
 
-def fork_point(repository: Path, commit: str) -> set[str]:
-    """The commits of the main line that a commit builds on; empty where git cannot tell.
+def merge_base(repository: Path, commit: str) -> str:
+    """The commit at which a commit leaves the main line; empty where git cannot tell.
 
-    The main line is the branch a pull request is for (GITHUB_BASE_REF), else main or master.
+    The main line is the branch that a pull request is for, as the CI service says, else main or master.
     """
-    asked = os.environ.get("GITHUB_BASE_REF", "")
+    asked = os.environ.get("GITHUB_BASE_REF") or os.environ.get("CI_MERGE_REQUEST_TARGET_BRANCH_NAME")
     names = [f"origin/{asked}", asked] if asked else ["origin/main", "main", "origin/master", "master"]
-    for name in names:
-        base = (
-            _git(repository, "merge-base", "--end-of-options", name, commit)
-            if HASH.fullmatch(commit)
-            else None
-        )
+    for name in names if HASH.fullmatch(commit) else ():
+        base = _git(repository, "merge-base", "--end-of-options", name, commit)
         if base and HASH.fullmatch(base.strip()):
-            return set((_git(repository, "rev-list", base.strip()) or "").split())
-    return set()
+            return base.strip()
+    return ""
+
+
+def fork_point(repository: Path, commit: str) -> set[str]:
+    """The commits of the main line that a commit builds on; empty where git cannot tell."""
+    base = merge_base(repository, commit)
+    return set((_git(repository, "rev-list", base) or "").split()) if base else set()
 
 
 def order(repository: Path, hashes: Iterable[str]) -> list[str]:
