@@ -22,12 +22,22 @@ ROBOT = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body name="ball" pos="0 0 .1"><freejoint/><geom size=".1"/></body>
 <body name="arm" pos="1 0 1"><joint axis="0 1 0" damping=".1"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body>
 </worldbody><keyframe><key name="home" qpos="0 0 .1 1 0 0 0 .1"/></keyframe></mujoco>"""
-STRONGER = """import mujoco
-step = mujoco.mj_step
+STRONGER = """import importlib.util, sys
+from importlib.machinery import PathFinder
+from pathlib import Path
+
+here = Path(__file__).resolve().parent.parent
+spec = PathFinder.find_spec("mujoco", [place for place in sys.path if Path(place).resolve() != here])
+true = importlib.util.module_from_spec(spec)
+sys.modules["mujoco"] = true
+spec.loader.exec_module(true)
+step = true.mj_step
+
 def stronger(m, d, count=1):
     m.opt.gravity[2] = -9.9
     step(m, d, count)
-mujoco.mj_step = stronger
+
+true.mj_step = stronger
 """
 
 
@@ -43,7 +53,9 @@ def team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         told = place / f"mujoco-{version}.dist-info"
         told.mkdir(parents=True, exist_ok=True)
         (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: mujoco\nVersion: {version}\n")
-        (place / "sitecustomize.py").write_text(STRONGER if version == "3.4.0" else "")
+        if version == "3.4.0":
+            (place / "mujoco").mkdir(exist_ok=True)
+            (place / "mujoco/__init__.py").write_text(STRONGER)
         return place
 
     monkeypatch.setattr(releases, "released", lambda engine: ("3.3.6", "3.3.7", "3.4.0"))
