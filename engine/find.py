@@ -84,13 +84,21 @@ def find(name: str) -> Any:
         if point.name == name:
             return _faced(_loaded(name, point.load))
     module, _, attribute = name.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:  # the console script does not look where one stands
-        sys.path.insert(0, here)
+    look_beside()
     found = _loaded(name, lambda: _module(module))
     if attribute:
         found = _loaded(name, lambda: getattr(found, attribute))
     return _faced(getattr(found, "ENGINE", found))
+
+
+def look_beside(folder: str = "") -> None:
+    """Let modules be found in `folder` and in the one where one stands, where the console script does not look.
+
+    Only once such a module is wanted: until then none of them can stand in for one of ours or of Python's.
+    """
+    for place in filter(None, (folder, str(Path.cwd()))):
+        if place not in sys.path:
+            sys.path.insert(0, place)
 
 
 def _module(name: str) -> Any:

@@ -69,7 +69,7 @@ def test_no_night_is_measured_in_vain_when_the_record_cannot_be_read(
     def measured(*asked: Any, **named: Any) -> None:
         raise AssertionError("it was measured")
 
-    monkeypatch.setattr("spook_tracker.tracker.measure.run.run", measured)
+    monkeypatch.setattr("spook_tracker.tracker.measure.apart.run", measured)
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(main, [*command, "--mutants", "nowhere.json", "--db", "sqlite:///tracker.db"])
 

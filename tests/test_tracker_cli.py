@@ -208,8 +208,11 @@ def test_compare_ends_with_2_for_an_unknown_version_and_for_no_data(two_versions
 
 
 def test_compare_ends_with_3_where_nothing_can_be_compared(monkeypatch, two_versions):
-    monkeypatch.setattr("spook_tracker.tracker.measure.machine.float_environment", lambda: "another")
-    measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
+    Path("elsewhere.py").write_text(
+        "import spook_tracker.tracker.measure.machine as machine\nfrom toy_engine import build_info, simulate\n"
+        "machine.float_environment = lambda: 'another'\n"
+    )
+    measure(monkeypatch, "--engine", "elsewhere", VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
     shown = tracker("compare", "1.1.0", "1.2.0")
 
     assert shown.exit_code == 3

@@ -99,15 +99,12 @@ def test_a_run_that_hangs_ends_by_its_time_limit() -> None:
     }
 
 
-def test_interrupted_before_anything_was_finished_nothing_is_recorded(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
+def test_interrupted_before_anything_was_finished_nothing_is_recorded() -> None:
+    Path("interrupted_engine.py").write_text(
+        "from toy_engine import build_info\ndef simulate(*asked, **more): raise KeyboardInterrupt\n"
+    )
 
-    monkeypatch.setattr(measuring, "perform", interrupted)
-
-    done = tracker("run", "--workers", "0")
+    done = tracker("run", "--workers", "0", "--engine", "interrupted_engine")
 
     assert (done.exit_code, stored()) == (2, [])
     assert "interrupted; nothing of this command was recorded" in done.stderr

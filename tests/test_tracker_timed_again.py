@@ -24,6 +24,7 @@ from spook_tracker.tracker.store.record import add_again
 
 ASKED: dict[str, Any] = {
     "catalogue": "toy_timed:CATALOGUE", "engine": "spook_tracker.engine", "sweep": True, "workers": 0, "repeats": 2,
+    "apart": False,
 }  # fmt: skip
 THRICE = ASKED | {"repeats": 3}  # once or twice a side prove nothing
 NIGHTS = 30

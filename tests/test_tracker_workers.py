@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -59,10 +60,19 @@ def test_an_error_of_ours_is_raised_and_ends_everything():
 
 
 def children(of: int) -> set[int]:
-    found = subprocess.run(
-        ["ps", "-o", "pid=", "--ppid", str(of)], capture_output=True, text=True, check=False
-    )
-    return {int(word) for word in found.stdout.split()}
+    """The processes below one, all the way down."""
+    below: dict[int, set[int]] = {}
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            below.setdefault(int(place.read_text().rpartition(")")[2].split()[1]), set()).add(
+                int(place.parent.name)
+            )
+    found, ahead = set(), [of]
+    while ahead:
+        new = below.get(ahead.pop(), set()) - found
+        found |= new
+        ahead += new
+    return found
 
 
 def alive(pids: set[int]) -> set[int]:

@@ -29,12 +29,12 @@ __all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish",
 def run(
     tests: Iterable[str] = (), *, watch: Callable[[Any], None] | None = None, **asked: Any
 ) -> RunDocument:
-    """Put the questions (all, or those named) to the engine; nothing is recorded.
+    """Put the questions (all, or those named) to the engine, in a process of its own; nothing is recorded.
 
-    `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers …) and of
+    `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers, apart …) and of
     tracker.measure.run.Questions (catalogue, engine, limit, patience, every_setting, limits).
     """
-    from spook_tracker.tracker.measure.run import run as measure
+    from spook_tracker.tracker.measure.apart import run as measure
 
     source, request = _asked(tests, asked)
     return measure(source, request, watch or (lambda progress: None))
@@ -47,13 +47,21 @@ def time_again(
     **asked: Any,
 ) -> RunDocument:
     """The document with the ladders of these tests timed once more; `asked` as for the run it comes from."""
-    from spook_tracker.tracker.measure.again import timed_again
+    from spook_tracker.tracker.measure.apart import timed_again
 
     source, request = _asked((), asked)
     return timed_again(source, request, document, tests, watch or (lambda progress: None))
 
 
-WHERE = ("catalogue", "engine", "limit", "patience", "every_setting", "limits")  # fields of Questions
+WHERE = (
+    "catalogue",
+    "engine",
+    "limit",
+    "patience",
+    "every_setting",
+    "limits",
+    "folder",
+)  # fields of Questions
 
 
 def _asked(tests: Iterable[str], asked: dict[str, Any]) -> tuple[Any, Any]:

@@ -308,7 +308,9 @@ def list_tests(
     from spook_tracker.tracker.cli.report_catalogue import catalogue_table
     from spook_tracker.tracker.measure.run import Questions
 
-    source = Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine))
+    source = Questions(
+        catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
+    )
     found = {
         name: test
         for name, test in source.tests().items()
@@ -343,7 +345,10 @@ def show(test: str, as_json: bool, engine: str, catalogue: str) -> None:
     from spook_tracker.tracker.measure.run import Questions, select
 
     tests = select(
-        Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine)).tests(), [test]
+        Questions(
+            catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
+        ).tests(),
+        [test],
     )
     if as_json:
         from spook_tracker.tracker.cli.report_json import show_json
@@ -367,7 +372,9 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
     from spook_tracker.tracker.measure.ladder import saved_by_leaving_out, stage_costs
     from spook_tracker.tracker.measure.run import Questions, select
 
-    source = Questions(catalogue=catalogue, engine=engine, limits=present().limits_of(engine))
+    source = Questions(
+        catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
+    )
     tests = select(source.tests(), [test])
     costs = saved = None
     if cost:

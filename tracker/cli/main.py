@@ -136,6 +136,7 @@ def run_command(
             kept = False
             continue
         _print_run(document, everything)
+        kept &= _answered(document)
         if json_file:
             kept &= write(_of_engine(json_file, name, names), _json(document))
         if junit_file:
@@ -257,6 +258,7 @@ def nightly(
                 catalogue=catalogue,
                 engine=first,
                 limits=present().limits_of(first),
+                folder=present().modules,
                 limit=limit,
                 figures=True,
                 sweep=not quick,
@@ -274,7 +276,7 @@ def nightly(
     for sentence in report.notes:
         say(f"note: {sentence}")
     _say_published(report.published, out)
-    return _end(report.red, kept)
+    return _end(report.red, _answered(report.document) and kept)
 
 
 @main.command(epilog=example("tracker engines"))
@@ -414,10 +416,17 @@ for command in (
 def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
-    from spook_tracker.tracker.measure.run import Interrupted, Questions, run
+    from spook_tracker.tracker.measure.apart import run
+    from spook_tracker.tracker.measure.run import Interrupted, Questions
 
     engine = engine.strip()
-    source = Questions(catalogue=catalogue, engine=engine, limit=limit, limits=present().limits_of(engine))
+    source = Questions(
+        catalogue=catalogue,
+        engine=engine,
+        limit=limit,
+        limits=present().limits_of(engine),
+        folder=present().modules,
+    )
     if database is None:
         with watching("measuring") as step, terminated_is_interrupted():
             return run(source, request, lambda p: step(p.done, p.total, p.test, p.finished, p.failed))
@@ -442,6 +451,14 @@ def _print_run(document: Any, everything: bool) -> None:
     from spook_tracker.tracker.cli.report_table import pass_table
 
     say(pass_table(document, everything))
+
+
+def _answered(document: Any) -> bool:
+    """Whether the engine supports anything that was asked; if not, that is said: nothing is no green."""
+    if any(sample.outcome != "not_supported" for sample in document.samples):
+        return True
+    complain(f"nothing was measured: {document.engine.name} supports none of the values asked for")
+    return False
 
 
 def _red(document: Any) -> bool:

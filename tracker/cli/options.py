@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -216,7 +217,7 @@ def workers_option(command: Command) -> Command:
             default=2,
             show_default=True,
             type=click.IntRange(0, 256),
-            help="Processes that measure values, each watched; 0: this one, where nothing can be ended.",
+            help="Processes that measure values, each watched; 0: the one that asks, where no piece can be ended.",
         ),
     ):
         command = option(command)
@@ -285,13 +286,22 @@ class OneLineErrors(click.Group):
         except BrokenPipeError:
             sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - nobody reads any more
             code = GREEN
-        except Exception as error:
+        except SystemExit as ended:
+            if _of_click(ended):  # it answers a shell that completes words
+                raise
+            code = _unusable(ended)
+        except BaseException as error:
             code = _unusable(error)
         sys.exit(code if isinstance(code, int) else GREEN)
 
 
-def _unusable(error: Exception) -> int:
-    """Say what went wrong and return the exit code."""
+def _of_click(ended: SystemExit) -> bool:
+    *_, (frame, _) = traceback.walk_tb(ended.__traceback__)
+    return str(frame.f_globals.get("__name__", "")).startswith("click.")
+
+
+def _unusable(error: BaseException) -> int:
+    """Say what went wrong and return the exit code: no module that is imported has a say in it."""
     if os.environ.get("TRACKER_DEBUG"):
         raise error
     from spook_tracker.tracker.document.errors import TrackerError
@@ -302,6 +312,12 @@ def _unusable(error: Exception) -> int:
     if isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
         complain(f"{where}{error.strerror or error}; check the path and its permissions")
+        return UNUSABLE
+    if not isinstance(error, Exception):
+        *_, last = traceback.extract_tb(error.__traceback__)
+        complain(
+            f"{type(error).__name__} {error} in {last.filename}, line {last.lineno}: nothing may end the tracker"
+        )
         return UNUSABLE
     complain(f"{type(error).__name__}: {error}; this is a defect: TRACKER_DEBUG=1 shows where")
     return UNUSABLE

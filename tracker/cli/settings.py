@@ -23,7 +23,6 @@ What a command line or an environment variable says goes before it.
 
 from __future__ import annotations
 
-import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -68,6 +67,11 @@ class Settings:
     build: Build | None = None
     folder: Path | None = None  # of tracker.toml
 
+    @property
+    def modules(self) -> str:
+        """The folder in which engine and catalogue are looked for beside the one where one stands; none if empty."""
+        return str(self.folder or "")
+
     def limits_of(self, engine: str) -> tuple[tuple[str, Any], ...]:
         """They are the team's own engine's; another one that is asked beside it is not held to them."""
         return self.limits if engine == self.values.get("engine", "spook").split(",")[0] else ()
@@ -100,9 +104,6 @@ def read(here: Path) -> Settings:
             )
         if type(value) not in KINDS[name]:
             raise SettingsError(f"{file}: {name} must be {WORDS[KINDS[name][-1]]}, not {value!r}")
-    folder = str(file.parent)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)  # engine and catalogue are modules of that folder
     if models:
         own = str(file.relative_to(here) if file.is_relative_to(here) else file)
         said["catalogue"] = f"{said.get('catalogue', 'standard')},{own}"

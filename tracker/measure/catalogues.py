@@ -11,14 +11,12 @@ The folder one stands in is looked at, too: a team's own questions need no insta
 from __future__ import annotations
 
 import importlib
-import sys
 from collections.abc import Iterator, Mapping
 from importlib.metadata import entry_points
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
-from spook_tracker.engine.find import thrown
+from spook_tracker.engine.find import look_beside, thrown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
@@ -93,7 +91,6 @@ def _loaded(name: str) -> Any:
     module, _, attribute = name.partition(":")
     if not all(module.split(".")) or "\0" in module:
         raise ImportError(f"{module!r} is no name of a module")
-    here = str(Path.cwd())
-    if not module.startswith("spook_tracker.") and here not in sys.path:
-        sys.path.insert(0, here)  # the console script does not look where one stands
+    if not module.startswith("spook_tracker."):
+        look_beside()
     return getattr(importlib.import_module(module), attribute or "CATALOGUE")

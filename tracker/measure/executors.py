@@ -12,16 +12,15 @@ Run times are never taken there: they need a machine of which is known that it i
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
+from spook_tracker.engine.find import look_beside
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import Machine
 from spook_tracker.tracker.measure.machine import machine
@@ -117,9 +116,7 @@ def _executor(name: str) -> Iterator[Executor]:
             yield executor
         return
     module, _, factory = name.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
+    look_beside()
     try:
         made = getattr(import_module(module), factory or "executor")()
     except (ImportError, AttributeError, TypeError, ValueError) as error:

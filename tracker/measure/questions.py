@@ -11,7 +11,7 @@ from typing import Any
 import spook_tracker.tracker.measure.catalogues as catalogues
 import spook_tracker.tracker.measure.limits as limits
 import spook_tracker.tracker.measure.others as others
-from spook_tracker.engine.find import EngineMissing, find
+from spook_tracker.engine.find import EngineMissing, find, look_beside
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.measure.question import NoAnswer
@@ -37,6 +37,7 @@ class Questions:
     patience: float | None = None  # s after which a piece of work begins no further simulation
     every_setting: bool = True  # whether single values are asked in each setting of another engine
     limits: limits.Limits = ()  # a team's own, by series
+    folder: str = ""  # where engine and catalogue are looked for beside the folder one stands in
 
     def tests(self) -> Mapping[str, ScalarTest]:
         """What is asked, by name; found once."""
@@ -44,6 +45,7 @@ class Questions:
 
     @cached_property
     def _tests(self) -> Mapping[str, ScalarTest]:
+        look_beside(self.folder)
         found = catalogues.find(self.catalogue)
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
@@ -57,6 +59,7 @@ class Questions:
 
     def module(self) -> Any:
         """The engine: simulate, build_info, and its configurations if it is not ours."""
+        look_beside(self.folder)
         try:
             return find(self.engine)
         except EngineMissing as error:

@@ -74,6 +74,9 @@ class Request:
     time_limit: float = crew.Limits.seconds  # s for one piece of work
     memory_limit: int = crew.Limits.memory  # bytes for one piece of work
     repeats: int | Repeats = 5  # of each timing
+    apart: bool = (
+        True  # in a process of its own (tracker.measure.apart): a gate that what is measured cannot open
+    )
     executor: str = executors.PROCESS  # where values are measured, as `executors.answers` knows it
 
 
