@@ -34,7 +34,7 @@ class Simulate(Protocol):
 
 
 Better = Literal["smaller_magnitude", "larger", "smaller", "inside"]
-Role = Literal["gate", "companion", "reported"]
+Role = Literal["gate", "companion", "reported", "explaining"]
 
 
 class Estimate(float):
@@ -90,6 +90,7 @@ class Metric:
     gate       decides green or red by `limit`
     companion  keeps the gate honest; its `limit` and `set_point` are ours
     reported   shown and followed, no limit
+    explaining says why a run time of the same configuration is what it is: told beside it, never red, no limit
 
     `limit` is a magnitude (smaller_magnitude), a bound (larger, smaller) or a band (inside). `set_point` is
     the band theory lets us expect, far tighter than the limit: leaving it is a regression even inside the
@@ -330,6 +331,9 @@ class ScalarTest:
     iteration_tolerance: float = (
         0.1  # relative: how many more sweeps, pivots, corrections are not yet more work
     )
+    counter_roles: Mapping[str, Literal["gate", "explaining"]] = field(
+        default_factory=dict
+    )  # of the engine's counters: more of it is more work, or only says why a run time changed
 
     def questions(self) -> tuple[Asked, ...]:
         """What is asked apart from how: each quantity once for every time step and parameters.
@@ -356,6 +360,6 @@ class ScalarTest:
 
     def metrics(self) -> tuple[tuple[Measurement, Metric], ...]:
         """Every metric with the measurement it belongs to, gates first."""
-        order = {"gate": 0, "companion": 1, "reported": 2}
+        order = {"gate": 0, "companion": 1, "reported": 2, "explaining": 3}
         pairs = [(measurement, metric) for measurement in self.measurements for metric in measurement.metrics]
         return tuple(sorted(pairs, key=lambda pair: order[pair[1].role]))

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import math
 
+import pytest
+
+import spook_tracker.tracker.measure.instructions as instructions
 from spook_tracker.tracker.measure import machine as module
 from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
 from spook_tracker.tracker.measure.machine import float_environment, machine
@@ -44,3 +49,48 @@ def test_instructions_are_counted_or_none():
         assert counter.count > 1000
     else:
         assert not counter.count
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (errno.EACCES, "the kernel does not allow it here (kernel.perf_event_paranoid is "),
+        (errno.ENOENT, "the processor shows no counter, as in most virtual machines"),
+        (errno.ENOSYS, "the kernel refuses: "),
+    ],
+)
+def test_why_instructions_are_not_counted_is_said(
+    monkeypatch: pytest.MonkeyPatch, error: int, words: str
+) -> None:
+    class Refusing:
+        @staticmethod
+        def syscall(*_: object) -> int:
+            ctypes.set_errno(error)
+            return -1
+
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Refusing)
+    instructions.why_not.cache_clear()
+    try:
+        assert instructions.why_not().startswith(words)
+        assert not instructions.can_count()
+        assert InstructionCounter().count is None
+    finally:
+        instructions.why_not.cache_clear()
+
+
+def test_the_counter_counts_what_the_kernel_lets_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clock of the task stands in for the processor's counter, which virtual machines do not show."""
+    software, task_clock = 1, 1
+    monkeypatch.setattr(instructions, "HARDWARE", software)
+    monkeypatch.setattr(instructions, "RETIRED_INSTRUCTIONS", task_clock)
+    counter = InstructionCounter()
+    if counter.count is None:
+        pytest.skip(f"no perf events here: {instructions._open()[1]}")
+    with counter.counting():
+        sum(range(10_000))
+    few = counter.count
+    with counter.counting():
+        sum(range(1_000_000))
+    counter.close()
+
+    assert counter.count > 5 * few > 0

@@ -30,6 +30,7 @@ from spook_tracker.tracker.judge.compare import (
     side_of,
 )
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.explaining import EXPLAINING, beside_run_times
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.pairs import BLOCKS, SMALLEST, Decision, Paired, to_be_repeated
 from spook_tracker.tracker.judge.series_history import is_read_off
@@ -137,6 +138,7 @@ def compare_by_pairs(
             if decided[key] != "open":
                 del left[key]
     changes = [_told(c, times | tested, decided) for c in document.changes]
+    changes = beside_run_times(changes, before.samples, after.samples)
     changes, why_not = _by_old_questions(sides, before, changes, by_old)
     changes = [accept(c, accepted, after.night) for c in changes]
     verdict = overall(changes)
@@ -183,6 +185,8 @@ def _rungs(before: Samples, after: Samples) -> dict[str, tuple[tuple[str, ...], 
     tolerance: dict[str, float] = {}
     for key, (definition, sample) in after.items():
         if key not in before or before[key][0].test_version != definition.test_version:
+            continue
+        if definition.role == EXPLAINING:
             continue
         timed = sample.timing is not None and before[key][1].timing is not None
         if timed:

@@ -9,7 +9,7 @@ import click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 KINDS = ("scalar", "ladder", "order", "time", "break_point", "work", "map", "run_time")
-ROLES = ("gate", "companion", "reported")
+ROLES = ("gate", "companion", "reported", "explaining")
 
 
 def test_option(command: Command) -> Command:

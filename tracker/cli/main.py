@@ -451,6 +451,12 @@ def _print_run(document: Any, everything: bool) -> None:
     from spook_tracker.tracker.cli.report_table import pass_table
 
     say(pass_table(document, everything))
+    timed = [sample.timing for sample in document.samples if sample.timing is not None]
+    if timed and not any(timing.instructions for timing in timed):
+        from spook_tracker.tracker.measure.instructions import why_not
+
+        if why := why_not():
+            say(f"note: retired instructions are not counted: {why}")
 
 
 def _answered(document: Any) -> bool:

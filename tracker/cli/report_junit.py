@@ -13,7 +13,7 @@ from spook_tracker.tracker.cli.report_compare import red_line
 from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
-from spook_tracker.tracker.judge.standing import is_red
+from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
 from spook_tracker.tracker.judge.tonight import Finding
 
 ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -37,7 +37,7 @@ def junit_of_run(run: RunDocument) -> str:
     """The judged values of a run."""
     cases = defaultdict(list)
     for definition, sample in pairs(run):
-        if definition.role == "reported":
+        if definition.role in FOLLOWED:
             continue
         words = f"{measured(definition, sample)}, limit {limit(definition)}"
         if not sample.set_point_held:

@@ -17,12 +17,12 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
 )
 from spook_tracker.tracker.document.wording import clock
-from spook_tracker.tracker.judge.standing import HAVE_VALUES, against_limit, count, is_red, standing
+from spook_tracker.tracker.judge.standing import FOLLOWED, HAVE_VALUES, against_limit, count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
 NAMED = 24  # columns that tell one metric's configurations apart; where fewer are left, the margin goes
-ROLES = {"gate": 0, "companion": 1, "reported": 2}
+ROLES = {"gate": 0, "companion": 1, "reported": 2, "explaining": 3}
 Pair = tuple[SeriesDefinition, Sample]
 
 
@@ -116,7 +116,7 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
     """The table with its heading and its verdict, ready to print."""
     shown = [pair for pair in pairs(run) if pair[0].kind == "scalar" or _asked_alone(pair[0])]
     if not everything:
-        judged = [pair for pair in shown if pair[0].role != "reported"]
+        judged = [pair for pair in shown if pair[0].role not in FOLLOWED]
         # An engine that is only shown has no gates; what has a limit is what a reader asks for.
         shown = judged or [pair for pair in shown if pair[0].limit is not None]
     lines = [title(run), ""]
@@ -227,7 +227,7 @@ def failures(run: RunDocument) -> list[str]:
     return [
         f"{definition.key}: {sample.outcome.replace('_', ' ')}: {clean(sample.failure)}"
         for definition, sample in pairs(run)
-        if sample.failure and definition.role != "reported"
+        if sample.failure and definition.role not in FOLLOWED
     ]
 
 

@@ -87,7 +87,7 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     metric: Name
     description: Text
     unit: Text
-    role: Literal["gate", "companion", "reported"]
+    role: Literal["gate", "companion", "reported", "explaining"]
     better: Literal["smaller_magnitude", "larger", "smaller", "inside"]
     kind: Literal["scalar", "ladder", "order", "time", "break_point", "work"]
     time_step: float | None  # s
@@ -103,6 +103,9 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     aliases: tuple[str, ...] = ()  # earlier keys of the same series
     time_tolerance: float = 0.0  # of a ladder: relative change of its run time below which none is told
     iteration_tolerance: float = 0.1  # relative growth of its iteration counts that is not yet more work
+    counter_roles: dict[
+        str, Literal["gate", "explaining"]
+    ] = {}  # of its counters, where it is not the usual one
     sensitivity: Sensitivity | None = None  # of a value without a reference: what a difference of it means
 
 

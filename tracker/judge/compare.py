@@ -18,6 +18,7 @@ from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesD
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
+from spook_tracker.tracker.judge.explaining import beside_run_times, calm
 from spook_tracker.tracker.judge.known import Known, known
 from spook_tracker.tracker.judge.lane import (
     Records,
@@ -36,7 +37,7 @@ from spook_tracker.tracker.judge.series_history import (
     red_class,
 )
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
-from spook_tracker.tracker.judge.standing import NO_VALUE, honest, standing
+from spook_tracker.tracker.judge.standing import FOLLOWED, NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import OVERALL, RED, WORD_RANK, Class, Overall, Word
@@ -89,6 +90,7 @@ def compare(
     same_machine = before.side.machine == after.side.machine
     if same_machine and before.side.run != after.side.run:
         changes += [_in_history(change, history) for change in run_times(before.samples, after.samples)]
+    changes = beside_run_times(list(map(calm, changes)), before.samples, after.samples)
     changes = [_blamed(accept(change, accepted, after.night), history.first_bad) for change in changes]
     changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
     verdict = overall(changes)
@@ -138,7 +140,7 @@ def overall(changes: Sequence[Change]) -> Overall:
         return "regressed"
     compared = [c for c in changes if c.word not in ("not_comparable", "new", "not_measured")]
     values = [change for change in changes if change.kind not in TIMES]
-    if not compared or any(c.word == "not_comparable" and c.role != "reported" for c in values):
+    if not compared or any(c.word == "not_comparable" and c.role not in FOLLOWED for c in values):
         return "not_comparable"
     told = [change for change in compared if change.kind not in TIMES] or compared
     return "identical" if all(change.word == "identical" for change in told) else "same"
@@ -359,7 +361,7 @@ def _notes(before: ComparedRun, after: ComparedRun, changes: Sequence[Change]) -
         ]
         notes += not_compared(told)
     lost = sum(
-        change.before_outcome in NO_VALUE and change.after_outcome in NO_VALUE and change.role != "reported"
+        change.before_outcome in NO_VALUE and change.after_outcome in NO_VALUE and change.role not in FOLLOWED
         for change in changes
     )
     if lost:

@@ -34,7 +34,7 @@ class Change(Struct, frozen=True, kw_only=True):
     test: Name
     metric: Name
     configuration: Name
-    role: Literal["gate", "companion", "reported"]
+    role: Literal["gate", "companion", "reported", "explaining"]
     kind: Literal["scalar", "ladder", "order", "time", "break_point", "work", "map", "run_time"]
     unit: Text
     word: Word

@@ -102,7 +102,7 @@ def at_least(blocks: tuple[int, ...], u: int) -> float:
 @lru_cache(maxsize=64)
 def _orders(blocks: tuple[int, ...]) -> tuple[int, ...]:
     """In how many orders U is 0, 1, 2, … over all blocks."""
-    total = (1,)
+    total: tuple[int, ...] = (1,)
     for size in blocks:
         ways = ways_of_u(size, size)
         found = [0] * (len(total) + len(ways) - 1)

@@ -25,6 +25,7 @@ from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
+from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.slower import Usual, only_followed
@@ -127,7 +128,13 @@ def blame(bad: Run, good: Run | None) -> str:
 def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepted] = ()) -> dict[str, Told]:
     """Every series with the verdict of each of its nights, by key."""
     return {
-        key: Told(key, found.definition, tuple(judge_history(key, found.definition, found.points, accepted)))
+        key: Told(
+            key,
+            found.definition,
+            tuple(
+                calm_nights(found.definition, judge_history(key, found.definition, found.points, accepted))
+            ),
+        )
         for key, found in histories.items()
     }
 

@@ -17,6 +17,7 @@ from spook_tracker.tracker.document.run_document import Point, Sample, SeriesDef
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 NOT_SUPPORTED = "not_supported"  # outside the order: an engine cannot be asked this
+FOLLOWED = ("reported", "explaining")  # roles of which nothing is expected
 HAVE_VALUES = ("value", "unsettled", "out_of_limit")
 NO_VALUE = ("not_finite", "diverged", "crashed", "timed_out", "missing")
 NO_NUMBER = frozenset({*NO_VALUE, NOT_SUPPORTED})
@@ -31,14 +32,14 @@ def honest(sample: Sample) -> Sample:
 
 def expected(definition: SeriesDefinition) -> bool:
     """Whether theory or a limit expects something of this series."""
-    return definition.role != "reported" and not (definition.limit is None and definition.set_point is None)
+    return definition.role not in FOLLOWED and not (definition.limit is None and definition.set_point is None)
 
 
 def standing(definition: SeriesDefinition, sample: Sample) -> Class:
     """fail, watch (set point left inside the limit), pass, or followed where nothing is expected."""
     if sample.outcome == NOT_SUPPORTED:
         return "none"
-    if definition.role == "reported":
+    if definition.role in FOLLOWED:
         return "followed"
     sample = honest(sample)
     if not sample.passed:

@@ -10,6 +10,7 @@ from typing import Any
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.events import name_of
+from spook_tracker.tracker.judge.explaining import beside_findings
 from spook_tracker.tracker.judge.lane import Records, histories, line_of
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
 from spook_tracker.tracker.judge.series_history import (
@@ -119,7 +120,7 @@ def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
                 news=judged.news,
             )
         )
-    return worst_first(findings)
+    return worst_first(beside_findings(findings))
 
 
 def to_be_timed_again(findings: Sequence[Finding]) -> list[str]:

@@ -5,7 +5,8 @@ more block operation is more work, tonight. How many rounds an iteration takes m
 data does, and gets the tolerance that the test declares. Work is compared where the answers are the same and the
 build flags are. Each counter is judged by itself: fewer of one hide no more of another. Points of contact, samples read
 and evaluations of a search are not work of the engine's: the scene, what is observed and where a scene breaks decide
-them, and with equal answers they are equal.
+them, and with equal answers they are equal. A test may say of any counter whether it gates or explains
+(`ScalarTest.counter_roles`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import chain
 
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import EngineVersion, Sample, SeriesDefinition
@@ -69,16 +71,18 @@ def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[Series
         facts = tuple(sorted([f"{d.key} {d.test_version}" for d, _ in members]))
         answers = _hash(*sorted([f"{d.key} {s.value!r} {s.state_hash}" for d, s in members]))
         tolerance = max(d.iteration_tolerance for d, _ in members)
+        roles = dict(chain.from_iterable(d.counter_roles.items() for d, _ in members))
         done: dict[str, int] = {}
         for _, sample in members:
             for name, count in sample.counters.items():
-                if name in JUDGED:
+                if name in JUDGED or name in roles:
                     done[name] = done.get(name, 0) + count
         for counter, count in done.items():
             asked = (test, configuration, family, counter)
             allowed = tolerance if counter in ITERATIONS else 0.0
+            explains = roles.get(counter) == "explaining"
             definition = _definition(
-                asked, members[0][0].title, facts, allowed, engine.compiler, engine.flags
+                asked, members[0][0].title, facts, allowed, engine.compiler, engine.flags, explains
             )
             found[definition.key] = (
                 definition,
@@ -98,13 +102,14 @@ def _definition(
     tolerance: float,
     compiler: str,
     flags: str,
+    explains: bool,
 ) -> SeriesDefinition:
     """The series of a sum; from night to night it is mostly the same."""
     test, configuration, family, counter = place
     return SeriesDefinition(
         key=f"{test}/{configuration}/work:{family}:{counter}", test=test, title=title, configuration=configuration,
         metric=f"work:{family}:{counter}", description=f"{counter.replace('_', ' ')} counted in the {family}", unit="1",
-        role="reported", better="smaller", kind="work", time_step=None, parameters={}, limit=None,
+        role="explaining" if explains else "reported", better="smaller", kind="work", time_step=None, parameters={}, limit=None,
         limit_source="", set_point=None, set_point_source="", reference=None, tolerance=0.0,
         relative_tolerance=tolerance, test_version=_hash(*facts, compiler, flags),
     )  # fmt: skip

@@ -27,6 +27,7 @@ OWN_PACKAGES = ("scalar_tests",)
 INSTALLED = "spook_tracker."
 WORDING = {
     "conclusion",
+    "counter_roles",
     "definition",
     "formerly",
     "iteration_tolerance",

@@ -1,11 +1,13 @@
 """Retired instructions of this thread in user mode, where the machine counts them (Linux perf events).
 
-They tell two builds apart where the clock is too noisy; on machines without a counter every reading is None.
+They tell two builds apart where the clock is too noisy. Where nothing can be counted every reading is None, and
+`why_not` says why: most virtual machines show no counter to their guests.
 """
 
 from __future__ import annotations
 
 import ctypes
+import errno
 import functools
 import os
 import platform
@@ -13,6 +15,7 @@ import struct
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 # perf_event_attr of linux/perf_event.h: type, size, config, …, flags; the rest of its 112 bytes is zero.
 SYSTEM_CALL = {"x86_64": 298, "aarch64": 241}
@@ -25,7 +28,7 @@ class InstructionCounter:
     """Counts inside `counting()`; `count` is None where nothing can be counted."""
 
     def __init__(self) -> None:
-        self._file = _open()
+        self._file, _ = _open()
         self.count: int | None = None if self._file < 0 else 0
 
     @contextmanager
@@ -53,25 +56,48 @@ class InstructionCounter:
 
 
 @functools.lru_cache(maxsize=1)
-def can_count() -> bool:
-    """Whether this machine lets us count; asked once."""
+def why_not() -> str:
+    """Why this machine does not let us count, in a sentence without its full stop; empty where it does. Asked once."""
+    file, reason = _open()
+    if file < 0:
+        return reason
+    os.close(file)
     counter = InstructionCounter()
     with counter.counting():
         sum(range(100))
     counter.close()
-    return bool(counter.count)
+    return "" if counter.count else "the counter of this machine stands still"
 
 
-def _open() -> int:
-    """A perf event of this thread, or -1."""
+def can_count() -> bool:
+    """Whether this machine lets us count."""
+    return not why_not()
+
+
+def _open() -> tuple[int, str]:
+    """A perf event of this thread, or −1 and why there is none."""
     number = SYSTEM_CALL.get(platform.machine())
     if sys.platform != "linux" or number is None:
-        return -1
+        return -1, f"there is no perf_event_open for {sys.platform} on {platform.machine()}"
     flags = DISABLED | EXCLUDE_KERNEL | EXCLUDE_HYPERVISOR
     attribute = struct.pack("<IIQQQQQ", HARDWARE, ATTRIBUTE_SIZE, RETIRED_INSTRUCTIONS, 0, 0, 0, flags)
     attribute = attribute.ljust(ATTRIBUTE_SIZE, b"\0")
     try:
         library = ctypes.CDLL(None, use_errno=True)
-        return int(library.syscall(number, attribute, 0, -1, -1, 0))
-    except (OSError, AttributeError):
-        return -1
+        file = int(library.syscall(number, attribute, 0, -1, -1, 0))
+    except (OSError, AttributeError) as error:
+        return -1, f"perf_event_open cannot be called: {error}"
+    return file, "" if file >= 0 else _reason(ctypes.get_errno())
+
+
+def _reason(error: int) -> str:
+    """What the kernel means by refusing."""
+    if error in (errno.EACCES, errno.EPERM):
+        try:
+            level = Path("/proc/sys/kernel/perf_event_paranoid").read_text(encoding="ascii").strip()
+        except OSError:
+            level = "unknown"
+        return f"the kernel does not allow it here (kernel.perf_event_paranoid is {level}, a container may forbid it)"
+    if error in (errno.ENOENT, errno.EOPNOTSUPP, errno.ENODEV):
+        return "the processor shows no counter, as in most virtual machines"
+    return f"the kernel refuses: {os.strerror(error)}"

@@ -241,6 +241,7 @@ def _series(
         test_version=version,
         time_tolerance=ladder.time_tolerance,
         iteration_tolerance=test.iteration_tolerance,
+        counter_roles=dict(test.counter_roles),
     )
 
 

@@ -80,7 +80,7 @@ def _metric(metric: Metric, gates: bool) -> Metric:
     gate = metric.role == "gate"
     return replace(
         metric,
-        role="gate" if gate and gates else "reported",
+        role="gate" if gate and gates else "explaining" if metric.role == "explaining" else "reported",
         limit=metric.limit if gate else None,
         limit_source=metric.limit_source if gate else "",
         set_point=None,

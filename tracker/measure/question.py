@@ -179,6 +179,7 @@ def metric_series(name: str, test: ScalarTest, measurement: Measurement, metric:
         relative_tolerance=metric.relative_tolerance,
         test_version=definition_hash(measurement.measure, facts),
         iteration_tolerance=test.iteration_tolerance,
+        counter_roles=dict(test.counter_roles),
     )
 
 
@@ -319,6 +320,7 @@ def study(
         relative_tolerance=metric.relative_tolerance,
         test_version=definition_hash(question.study, (question.name, question.unit, question.better)),
         iteration_tolerance=test.iteration_tolerance,
+        counter_roles=dict(test.counter_roles),
     )
     if found is not None:
         witness.counters["evaluations"] = found.evaluations

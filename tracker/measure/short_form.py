@@ -48,6 +48,7 @@ class ShortResult(Struct, frozen=True, kw_only=True):
     better: Better = "smaller_magnitude"
     limit: float | tuple[float, float] | None = None
     outcome: OutcomeClass = "value"
+    explaining: bool = False  # says why a run time of its test changed, and is never red
     noisy: bool = False  # judged by statistics, as run times are, and not exactly
     seconds: tuple[float, ...] = ()  # run time of each repeat; the value is the shortest, and noisy
     failure: Text = ""
@@ -135,11 +136,13 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
         raise DocumentError(f"{origin}: {key} has no value; say in its outcome what became of it")
     if isinstance(result.limit, tuple) != (result.better == "inside") and result.limit is not None:
         raise DocumentError(f'{origin}: {key}: a limit of two numbers and better "inside" belong together')
+    if result.explaining and result.limit is not None:
+        raise DocumentError(f"{origin}: {key}: what only explains has no limit")
     metric = Metric(
         name=result.metric,
         description=result.description,
         unit=result.unit,
-        role="reported" if result.limit is None else "gate",
+        role="explaining" if result.explaining else "reported" if result.limit is None else "gate",
         better=result.better,
         limit=result.limit,
     )

@@ -115,7 +115,11 @@ class TestHistory:
 
     def reported(self) -> list[Trend]:
         """Scalars that are only followed."""
-        return [t for t in self.trends if t.definition.role == "reported" and t.definition.kind == "scalar"]
+        return [
+            t
+            for t in self.trends
+            if t.definition.role in ("reported", "explaining") and t.definition.kind == "scalar"
+        ]
 
     def of_kind(self, kind: str) -> list[Trend]:
         """Series of a kind: ladder, order, time, break_point."""

@@ -1,0 +1,120 @@
+"""What explains a run time and does not decide: counts of iterations, retired instructions, beside the time itself.
+
+One more iteration that makes a step faster is no regression, and one less that makes it slower no comfort: the time
+gates, the count says why. Which is which a test declares (`Metric(role="explaining")`, `ScalarTest.counter_roles`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace as replaced
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.judge.calibration import geometric_mean
+from spook_tracker.tracker.judge.comparison_document import Change
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.series_history import Judged
+    from spook_tracker.tracker.judge.tonight import Finding
+
+EXPLAINING = "explaining"
+TIMES = ("time", "run_time")
+Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
+
+
+def calm(change: Change) -> Change:
+    """A change of what explains is told, and never red."""
+    if change.role != EXPLAINING or not change.red:
+        return change
+    return msgspec.structs.replace(
+        change,
+        word="changed",
+        red=False,
+        stands="followed",
+        name="",
+        sentence=f"{change.sentence}, does not decide",
+    )
+
+
+def calm_nights(definition: SeriesDefinition, nights: Sequence[Judged]) -> Sequence[Judged]:
+    """The same of a history."""
+    if definition.role != EXPLAINING:
+        return nights
+    return [
+        msgspec.structs.replace(
+            night,
+            state="green",
+            verdict=msgspec.structs.replace(
+                night.verdict, word="changed", name="", sentence=f"{night.verdict.sentence}, does not decide"
+            ),
+        )
+        if night.red or night.verdict.red
+        else night
+        for night in nights
+    ]
+
+
+def beside_run_times(changes: Sequence[Change], before: Samples, after: Samples) -> list[Change]:
+    """Changes in which every run time says what of its test and configuration explains it."""
+    why: dict[tuple[str, str], list[str]] = {}
+    for change in changes:
+        old, new = change.before, change.after
+        if change.role == EXPLAINING and old is not None and new is not None and old != new:
+            words = f"{_name(change.metric)} {old:.6g} → {new:.6g}"
+            why.setdefault((change.test, change.configuration), []).append(words)
+    told = []
+    for change in changes:
+        if change.kind in TIMES and change.role != EXPLAINING:
+            counted = _instructions(change, before, after)
+            if parts := [*counted, *why.get((change.test, change.configuration), ())]:
+                change = msgspec.structs.replace(change, sentence=f"{change.sentence}; {', '.join(parts)}")
+        told.append(change)
+    return told
+
+
+def _instructions(change: Change, before: Samples, after: Samples) -> list[str]:
+    """Retired instructions of a ladder's rungs on one side against the other, where both sides counted them."""
+    metric = change.metric.removesuffix(":run-time")
+    ratios = []
+    for key, (definition, sample) in after.items():
+        place = (definition.test, definition.configuration, definition.metric)
+        if place == (change.test, change.configuration, metric) and key in before:
+            old, new = before[key][1].timing, sample.timing
+            if old and new and old.instructions and new.instructions:
+                ratios.append(new.instructions / old.instructions)
+    if not ratios:
+        return []
+    mean = geometric_mean(ratios)
+    return [f"instructions {100.0 * (mean - 1.0):+.1f} %"] if math.isfinite(mean) else []
+
+
+def beside_findings(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings of a night in which every run time says what of its test and configuration changed and explains it."""
+    why: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        definition, judged = finding.definition, finding.judged
+        if definition is None or judged is None or definition.role != EXPLAINING or judged.against is None:
+            continue
+        old, new = judged.against.sample.value, judged.night.sample.value
+        if old != new:
+            words = f"{_name(definition.metric)} {old:.6g} → {new:.6g}"
+            why.setdefault((definition.test, definition.configuration), []).append(words)
+    told = []
+    for finding in findings:
+        definition = finding.definition
+        timed = definition is not None and definition.kind == "time" and definition.role != EXPLAINING
+        parts = why.get((definition.test, definition.configuration)) if timed and definition else None
+        if parts:
+            sentence = f"{finding.verdict.sentence}; {', '.join(parts)}"
+            finding = replaced(finding, verdict=msgspec.structs.replace(finding.verdict, sentence=sentence))
+        told.append(finding)
+    return told
+
+
+def _name(metric: str) -> str:
+    """Of a counter without its family."""
+    return metric.rpartition(":")[2].replace("_", " ")
