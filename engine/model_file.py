@@ -56,8 +56,9 @@ class ModelRun:
     """One simulation of a model: what `simulate` is given in place of a scene.
 
     The Result's observables are, of the watched bodies B at the samples S: position (S, B, 3) m, orientation
-    (S, B, 4), both from the world; speed (B,) m/s of the end, size () m of what moves, and of the last state
-    overlap () m, load () N carried by contacts with what does not move over the weight of what moves. With
+    (S, B, 4), both from the world; speed (B,) m/s of the end, size () m of what moves,
+    energy (S, 2) J, potential and kinetic, where an engine tells it, violation (S,) of equality constraints and joint
+    limits in m or rad, and of the last state overlap () m, load () N carried by contacts with what does not move over the weight of what moves. With
     `until_settled` the run ends early: settled () is the time [s] it did, NaN if it did not, and creep (B,) m/s. With
     `timed`: load_seconds, step_seconds and worst_step_seconds, real_time_factor, megabytes.
     """
@@ -68,4 +69,7 @@ class ModelRun:
     push: float = 0.0  # of the size a second and a body, as random changes of velocity in every step
     seed: int = 0
     timed: bool = False
+    accurate: bool = False  # the engine's most accurate setting in place of the file's
+    conservative: bool = False  # without all that takes or gives energy but gravity and springs
+    gain: float = 1.0  # times the file's own, of its servos
     elsewhere: bool = False  # in a process of its own

@@ -62,6 +62,7 @@ class Reading:
     keyframes: tuple[str, ...] = ()
     bodies: int = 0  # that move
     stands_free: bool = False  # everything that moves is free: nothing but contacts carries it
+    driven: bool = False  # it has actuators
     assets: dict[str, Path] = field(default_factory=dict)  # a URDF's meshes, by the name after the last slash
 
 
@@ -184,6 +185,7 @@ class _Reader:
             bodies,
             _step(steps[-1], self.path) if steps else TIME_STEP,
             keyframes=tuple(key.get("name") or str(place) for place, key in enumerate(keys)),
+            driven=any(len(actuators) for actuators in root.findall("actuator")),
         )
 
     def expand(self, element: ElementTree.Element, main: Path, file: Path, within: tuple[Path, ...]) -> None:
@@ -301,6 +303,7 @@ class _Reader:
         time_step: float,
         keyframes: tuple[str, ...] = (),
         assets: dict[str, Path] | None = None,
+        driven: bool = False,
     ) -> Reading:
         every = list(_moving(bodies, "", (), False))
         if not every:
@@ -319,6 +322,7 @@ class _Reader:
             bodies=len(every),
             stands_free=all(body.free for body in tops),
             assets=assets or {},
+            driven=driven,
         )
 
     def digest(self) -> str:

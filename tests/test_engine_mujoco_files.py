@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cache
 from pathlib import Path
@@ -10,10 +11,11 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine.find import find
+from spook_tracker.engine.method import PLAIN
 from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun, Watched
 from spook_tracker.engine.model_reading import read
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests.model_file import cost, motion, rest
+from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import Asked, turns
 
 pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'")
@@ -163,6 +165,49 @@ def test_what_blows_up_is_diverged_though_mujoco_would_start_again(tmp_path: Pat
 
     assert found.status == "diverged"
     assert "mujoco reset a state it calls bad" in found.failure
+
+
+PENDULUM = """<mujoco><option integrator="Euler" timestep=".005"/><worldbody><body name="bob"><joint axis="0 1 0" damping="1"/>
+<geom type="sphere" size=".1" pos=".5 0 0" mass="1"/></body></worldbody></mujoco>"""
+
+
+def test_the_books_of_a_damped_pendulum_balance_without_its_damping(tmp_path: Path) -> None:
+    asked = Asked(model=_model(tmp_path, PENDULUM), duration=1.0)
+    found = books.measure(asked, _simulate())
+
+    damped, free = (
+        _run(asked.model, 1.0, samples=(0.0, 1.0), conservative=on)["position"] for on in (False, True)
+    )
+    assert abs(found["energy_drift"]) < 0.02  # of semi-implicit Euler, which neither wins nor loses for good
+    assert found["energy_drift"].step_error > 1e-5
+    assert damped.shape == free.shape
+    turned = [_run(asked.model, 0.3, conservative=on)["orientation"][-1, 0] for on in (False, True)]
+    assert turns(turned[1], np.array([1.0, 0, 0, 0])) > 1.3 * turns(turned[0], np.array([1.0, 0, 0, 0]))
+
+
+def test_euler_falls_to_the_finest_run_with_order_one(tmp_path: Path) -> None:
+    asked = Asked(model=_model(tmp_path, PENDULUM), duration=1.0)
+    errors = [ladder.error(asked, _simulate(), h, PLAIN) for h in (0.02, 0.01, 0.005)]
+
+    assert [a / b for a, b in itertools.pairwise(errors)] == pytest.approx([2.0, 2.0], abs=0.4)
+    assert ladder.resolved(asked, _simulate())["resolved_time"] == 1.0
+
+
+def test_the_longest_step_of_an_oscillator_is_that_of_semi_implicit_euler(tmp_path: Path) -> None:
+    """h ω < 2: with 100 rad/s and .001 s twenty times the step; near it the swing grows beyond all reach."""
+    spring = """<mujoco><option gravity="0 0 0" timestep=".001" integrator="Euler"/><worldbody><body name="mass">
+<joint type="slide" axis="1 0 0" stiffness="10000" springref=".1"/><geom type="sphere" size=".1" mass="1"/></body></worldbody></mujoco>"""
+    found = ladder.longest_step(Asked(model=_model(tmp_path, spring), duration=2.0), _simulate())
+
+    assert found.value == pytest.approx(20.0, rel=0.15)
+    assert found.resolution <= ladder.BRACKET
+
+
+def test_gains_of_what_has_no_servos_are_not_asked(tmp_path: Path) -> None:
+    asked = Asked(model=_model(tmp_path, SPIN.format(actuator="motor", more="")), duration=0.1)
+
+    with pytest.raises(NotSupported, match="no position servos"):
+        ladder.stiffest_gain(asked, _simulate())
 
 
 def test_turns_are_angles_whatever_the_sign_of_the_quaternion() -> None:

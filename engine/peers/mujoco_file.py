@@ -13,6 +13,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from spook_tracker.engine.result import Result
 Array = npt.NDArray[np.float64]
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 READS = ("MJCF", "URDF")
+DAMPING = ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly")  # of joints and tendons
 CALM = 1e-3  # of the size a second: nothing faster, nothing turning faster than that at its rim
 CALM_FOR = 0.5  # s
 LOOK = 0.02  # s between two looks at whether all is calm
@@ -74,8 +76,6 @@ def _line(error: Exception) -> str:
 
 def _elsewhere(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
     """The same in a process of its own."""
-    from dataclasses import replace
-
     asked = pickle.dumps((replace(run, elsewhere=False), time_step, duration, time_limit))
     done = subprocess.run(
         [sys.executable, "-m", __name__], input=asked, capture_output=True, timeout=ELSEWHERE_LIMIT
@@ -94,6 +94,7 @@ class _Simulation:
     def __init__(self, run: ModelRun, model: Any, time_step: float, time_limit: float | None) -> None:
         self.run, self.model, self.step, self.limit = run, model, time_step, time_limit
         model.opt.timestep = time_step
+        _set(model, run)
         self.data = mujoco.MjData(model)
         if run.model.keyframe:
             mujoco.mj_resetDataKeyframe(model, self.data, self._key(run.model.keyframe))
@@ -145,7 +146,7 @@ class _Simulation:
         if run.until_settled:
             every = max(1, round(LOOK / self.step))
             looks |= set(range(every, total, every))
-        positions, turns = [], []
+        positions, turns, energies, violations = [], [], [], []
         recent: deque[tuple[int, Array]] = deque()
         calm_since: int | None = None
         settled, creep = float("nan"), np.full(len(self.bodies), np.nan)
@@ -159,6 +160,11 @@ class _Simulation:
             if mark in marks:
                 positions.append(self.data.xpos[self.bodies].copy())
                 turns.append(self.data.xquat[self.bodies].copy())
+                violations.append(self.violation())
+                if run.conservative:
+                    mujoco.mj_energyPos(self.model, self.data)
+                    mujoco.mj_energyVel(self.model, self.data)
+                    energies.append(np.array(self.data.energy))
             if not run.until_settled:
                 continue
             recent.append((mark, self.data.xpos[self.bodies].copy()))
@@ -174,7 +180,11 @@ class _Simulation:
         if not run.samples and status == "completed":
             positions.append(self.data.xpos[self.bodies].copy())
             turns.append(self.data.xquat[self.bodies].copy())
-        return self.told(status, positions, turns, settled, creep, load_seconds)
+        found = self.told(status, positions, turns, settled, creep, load_seconds)
+        more = {"violation": np.array(violations)} | (
+            {"energy": np.array(energies)} if run.conservative else {}
+        )
+        return replace(found, observables={**found.observables, **more})
 
     def advance(self, to: int) -> None:
         """Step to that many steps; in one call where nothing changes on the way."""
@@ -222,6 +232,15 @@ class _Simulation:
         spin = d.cvel[bodies, :3]
         arm = d.xipos[bodies] - d.subtree_com[np.asarray(m.body_rootid)[bodies]]
         return np.linalg.norm(d.cvel[bodies, 3:] + np.cross(spin, arm), axis=1), np.linalg.norm(spin, axis=1)
+
+    def violation(self) -> float:
+        """The largest of equality constraints and of joint limits, as they were at the start of the last step."""
+        d = self.data
+        kinds, places = np.asarray(d.efc_type)[: d.nefc], np.asarray(d.efc_pos)[: d.nefc]
+        equal = kinds == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        limit = kinds == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+        held = np.concatenate([np.abs(places[equal]), np.maximum(0.0, -places[limit]), [0.0]])
+        return float(held.max())
 
     def calm(self) -> bool:
         moving, turning = self.speeds(self.moving)
@@ -307,6 +326,34 @@ class _Simulation:
         return overlap, held / (strength * float(np.asarray(m.body_mass)[self.moving].sum()))
 
 
+def _set(model: Any, run: ModelRun) -> None:
+    """The settings of a run that are not the file's."""
+    if run.accurate:
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        model.opt.tolerance = min(1e-12, model.opt.tolerance)
+        model.opt.iterations = max(200, model.opt.iterations)
+    if run.gain != 1.0:
+        servos = _servos(model)
+        if not servos.any():
+            raise NotSupported("the model has no position servos")
+        model.actuator_gainprm[servos, 0] *= run.gain
+        model.actuator_biasprm[servos, 1:3] *= run.gain
+    if run.conservative:
+        off = mujoco.mjtDisableBit
+        model.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_ACTUATION)
+        model.opt.disableflags |= int(off.mjDSBL_FRICTIONLOSS)
+        model.opt.density = model.opt.viscosity = 0.0
+        for name in DAMPING:
+            if hasattr(model, name):
+                getattr(model, name)[:] = 0.0
+
+
+def _servos(model: Any) -> Any:
+    """Actuators that ask a position: whose force falls as their length grows."""
+    gain, bias = np.asarray(model.actuator_gainprm)[:, 0], np.asarray(model.actuator_biasprm)[:, 1]
+    return (gain > 0.0) & np.isclose(gain, -bias)
+
+
 class _Driven:
     """The controls over time."""
 
@@ -342,9 +389,7 @@ def _driven(drive: Drive, model: Any, data: Any) -> _Driven:
 
 def holding(model: Any, data: Any) -> Array:
     """Controls that ask position servos to stay where they are; all others get none."""
-    gain, bias = np.asarray(model.actuator_gainprm)[:, 0], np.asarray(model.actuator_biasprm)[:, 1]
-    servo = (gain > 0.0) & np.isclose(gain, -bias)
-    wanted = np.where(servo, np.asarray(data.actuator_length), 0.0)
+    wanted = np.where(_servos(model), np.asarray(data.actuator_length), 0.0)
     limited = np.asarray(model.actuator_ctrllimited).astype(bool)
     low, high = np.asarray(model.actuator_ctrlrange).T if model.nu else (np.zeros(0), np.zeros(0))
     return np.where(limited, np.clip(wanted, low, high), wanted)

@@ -39,7 +39,7 @@ class Asked:
         return tuple(t for t in CHECKPOINTS if t <= self.duration + 1e-9) or (self.duration,)
 
 
-def simulated(simulate: Simulate, asked: Asked, duration: float, refined: int = 1, **run: Any) -> Result:
+def simulated(simulate: Simulate, asked: Asked, duration: float, refined: float = 1, **run: Any) -> Result:
     """One run of the model, with its own time step divided by `refined`."""
     step = asked.model.time_step / refined
     return simulate(ModelRun(model=asked.model, **run), time_step=step, duration=duration)  # type: ignore[arg-type]
@@ -55,6 +55,18 @@ def turns(orientation: Array, start: Array) -> Array:
     )
     angle: Array = 2.0 * np.arctan2(np.linalg.norm(vector, axis=-1), scalar)
     return angle
+
+
+def apart(one: Result, other: Result, size: float) -> Array:
+    """The largest distance [m] of any watched body in two runs, at each sample both reached: of its place, or of its rim
+    where it has turned, for a body often begins at its joint and only turns."""
+    places, others = (np.asarray(run.partial["position"]) for run in (one, other))
+    turned, else_turned = (np.asarray(run.partial["orientation"]) for run in (one, other))
+    both = min(len(places), len(others))
+    moved = np.linalg.norm(places[:both] - others[:both], axis=-1)
+    rim = 0.5 * size * turns(turned[:both], else_turned[:both])
+    found: Array = np.maximum(moved, rim).max(axis=-1)
+    return found
 
 
 def spread(value: float, others: Sequence[float]) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Estimate, Metric, Simulate
 from spook_tracker.scalar_tests.model_file.facts import (
     BEYOND,
@@ -16,6 +17,7 @@ from spook_tracker.scalar_tests.model_file.facts import (
     UNPREDICTABLE,
     Array,
     Asked,
+    apart,
     simulated,
     turns,
 )
@@ -66,7 +68,9 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
         for seed in range(1, PUSHED + 1)
     ]
     halved = simulated(simulate, asked, end, refined=2, samples=tuple(times))
-    grown = np.max([_grown(run, other) for other in pushed], axis=0)  # of any watched body, at each time, m
+    grown = np.max(
+        [_grown(run, other, size) for other in pushed], axis=0
+    )  # of any watched body, at each time, m
     lost = np.flatnonzero(grown > UNPREDICTABLE * size)
     known = times[int(lost[0])] if len(lost) else end
     found: dict[str, float] = {"predictable_time": Estimate(known, rounding=end / GRID * 2.0, scale=end)}
@@ -86,19 +90,15 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     return found
 
 
-def _partial(run: object, name: str) -> Array:
-    return np.asarray(run.partial[name])  # type: ignore[attr-defined]
-
-
-def _read(run: object) -> Array:
+def _read(run: Result) -> Array:
     """Distance [m] of each watched body from its start, at each sample that was reached."""
-    there = _partial(run, "position")
+    there = np.asarray(run.partial["position"])
     moved: Array = np.linalg.norm(there - there[:1], axis=-1)
     return moved
 
 
-def _turned(run: object) -> Array:
-    there = _partial(run, "orientation")
+def _turned(run: Result) -> Array:
+    there = np.asarray(run.partial["orientation"])
     return turns(there, there[:1])
 
 
@@ -107,9 +107,9 @@ def _apart(values: Array, row: int, column: int, value: float) -> float:
     return abs(float(values[row, column]) - value) if row < len(values) else math.inf
 
 
-def _grown(run: object, other: object) -> Array:
-    """The largest distance [m] of any watched body in two runs, at each time; infinite where the other broke off."""
-    one, two = _partial(run, "position"), _partial(other, "position")
-    apart = np.full(len(one), np.inf)
-    apart[: len(two)] = np.max(np.linalg.norm(one[: len(two)] - two, axis=-1), axis=-1)
-    return apart
+def _grown(run: Result, other: Result, size: float) -> Array:
+    """How far two runs are apart at each time; infinite where the other broke off."""
+    grown = np.full(len(run.partial["position"]), np.inf)
+    reached = apart(run, other, size)
+    grown[: len(reached)] = reached
+    return grown

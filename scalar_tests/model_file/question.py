@@ -9,7 +9,7 @@ from functools import partial
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.model_file import ModelFile
 from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
-from spook_tracker.scalar_tests.model_file import cost, motion, rest
+from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import LONGEST_REST, PUSH, Asked
 
 Measure = Callable[[Asked, Simulate], Mapping[str, float]]
@@ -25,6 +25,7 @@ def test_of(
     tolerance: float = 0.0,
     files: int = 1,
     bodies: int = 0,
+    driven: bool = False,
 ) -> ScalarTest:
     """The test of a model watched for `duration` [s]; beyond `tolerance` [m, rad] a change is red."""
     asked = Asked(model=model, duration=duration)
@@ -69,9 +70,23 @@ def test_of(
             part(
                 "rest", rest.metrics(asked, stands_free), rest.measure, "as the file has it, until all rests"
             ),
+            part(
+                "books",
+                books.METRICS,
+                books.measure,
+                "once with nothing that takes or gives energy, once as the file has it",
+            ),
+            part(
+                "finest",
+                (ladder.RESOLVED_TIME,),
+                ladder.resolved,
+                "with Runge-Kutta, an eighth and a sixteenth of the step",
+            ),
             part("repeated", cost.REPEATABILITY, cost.repeatability, "three times the same"),
             part("cost", cost.COST, cost.cost, "the clock looked at after each step"),
         ),
+        ladders=(ladder.ladder(asked),),
+        stability=ladder.studies(asked, driven),
         example=_no_scene,
         as_given=True,
     )

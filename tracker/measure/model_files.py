@@ -133,6 +133,7 @@ def _test(name: str, said: Mapping[str, Any], reading: Reading, folder: Path, or
         tolerance=float(said.get("tolerance", 0.0)),
         files=len(reading.files),
         bodies=reading.bodies,
+        driven=reading.driven,
     )
 
 
