@@ -32,7 +32,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 
 HOSTILE = "<img src=x onerror=alert(1)></script><script>alert('x')</script> {{7*7}} %{x} =cmd() ../ \u202egnp.exe\x00 🚀"
-START = datetime(2026, 10, 1, 3, 17, tzinfo=UTC)
+START = datetime(2025, 10, 1, 3, 17, tzinfo=UTC)
 STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)
 SEVEN = {  # name: title, unit, limit, values of plain and of its companion, question
     "beam": (

@@ -95,7 +95,7 @@ def test_a_run_is_taken_out_with_everything_measured_in_it(tmp_path):
     told = CliRunner().invoke(main, ["db", "remove", "run-spook-0001", "--db", url])
 
     assert told.exit_code == 0, told.output
-    assert told.output.startswith("removed run run-spook-0001 of spook 0.1.1, 2026-10-02 03:17 UTC, with ")
+    assert told.output.startswith("removed run run-spook-0001 of spook 0.1.1, 2025-10-02 03:17 UTC, with ")
     with session_on(url) as session:
         assert [run.id for run in History(session).runs()] == ["run-spook-0000", "run-spook-0002"]
     database = open_database(url, readonly=True)

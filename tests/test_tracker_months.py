@@ -43,7 +43,7 @@ def night(day, value=1.0, month="11"):
 
 def test_what_went_out_comes_in_again_whole(desk, tmp_path):
     first, months = desk("first"), tmp_path / "history"
-    nights = [night(1, 0.1), night(2, "nan"), night(1, -0.0, month="12")]
+    nights = [night(1, 0.1), night(2, "nan"), night(1, -0.0, month="10")]
     for document in nights:
         record(first, document)
 
@@ -51,7 +51,7 @@ def test_what_went_out_comes_in_again_whole(desk, tmp_path):
     second = desk("second")
     counted = import_months(second, sorted(months.iterdir()))
 
-    assert [path.name for path in written] == ["2026-11.jsonl.xz", "2026-12.jsonl.xz"]
+    assert [path.name for path in written] == ["2026-10.jsonl.xz", "2026-11.jsonl.xz"]
     assert counted == (3, 0)
     old, new = History(first), History(second)
     assert [encode(new.document(n.id)) for n in nights] == [encode(old.document(n.id)) for n in nights]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -257,12 +258,15 @@ def judged_again(
     """
     from spook_tracker.tracker.store.record import add_again
 
-    findings = judge(History(session), document.id, accepted)
+    findings = judge(History(session, ahead=NO_TIME), document.id, accepted)
     if seem_slower := to_be_timed_again(findings):
         document = time_again(document, seem_slower, **asked)
         add_again(session, document)
-        findings = judge(History(session), document.id, accepted)
+        findings = judge(History(session, ahead=NO_TIME), document.id, accepted)
     return document, findings
+
+
+NO_TIME = timedelta()  # by which a run may be dated ahead of a night that has just been recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -272,7 +276,7 @@ class NightlyReport:
     document: RunDocument
     findings: list[Finding]
     published: Any
-    notes: tuple[str, ...] = ()  # entries of accepted.toml that do nothing
+    notes: tuple[str, ...] = ()  # entries of accepted.toml that do nothing, runs dated ahead
 
     @property
     def red(self) -> bool:
@@ -321,11 +325,12 @@ def nightly(
         store(session, document)
         tell(document)
         document, findings = judged_again(session, document, accepted, **asked)
-        history = History(session)
+        history = History(session, ahead=NO_TIME)
         tell(findings)
         notes = idle_entries(history, document.id, findings, accepted)
         drop_old_figures(session, history)  # once they have been compared
-    with History.open(database) as history:
+    with History.open(database, NO_TIME) as history:
+        notes += [history.dated_ahead()] if history.ahead else []
         offered = database if with_database else ""
         published = publish(history, out, accepted, offered, title, home_page, mutants, colour, documents)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

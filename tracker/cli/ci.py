@@ -24,6 +24,7 @@ from spook_tracker.tracker.cli.options import (
     executor_option,
     limit_option,
     mutants_option,
+    recorded_runs,
     refuse_unwritable,
     source_options,
     website_options,
@@ -87,7 +88,7 @@ def night(
     same = {"json_file": None, "junit_file": None, "with_database": False}
     code = _code_of(context, nightly, out=out, accepted=accepted, database=database, **same, **asked)
     with history_of(database) as kept:
-        run = kept.resolve("latest")
+        run = kept.resolve(recorded_runs()[-1])  # by its id: whatever its clock, or another's, has said
         findings = judge(kept, run.id, accepted_levels(accepted))
         _tell(night_markdown(run, findings, site), commands_of(findings))
         try:
@@ -170,7 +171,7 @@ def change(
         _tell("No history yet: this run has nothing to be compared with.\n", [])
         context.exit(code)
     with history_of(database) as recorded:
-        document = compare(recorded, base, "latest", accepted_levels(accepted))
+        document = compare(recorded, base, recorded_runs()[0], accepted_levels(accepted))
     return _compared(context, document, comment_file)
 
 
@@ -193,13 +194,30 @@ def _compared(context: click.Context, document: Any, comment_file: Path | None) 
 
 
 def _bring_in(folder: Path, database: str) -> int:
-    """Record what the folder holds; returns how many runs that is."""
-    from spook_tracker.tracker.store.database import session_on
-    from spook_tracker.tracker.store.months import import_months, is_month
+    """Record what the folder holds; returns how many runs that is.
+
+    A SQLite file beside it is a copy of it: one that cannot be read, or says otherwise, is set aside and made again.
+    """
+    from spook_tracker.tracker.document.errors import DatabaseUnusable
+    from spook_tracker.tracker.store.database import session_on, set_aside
+    from spook_tracker.tracker.store.history import History
+    from spook_tracker.tracker.store.months import import_months, is_month, refuse_other
 
     files = sorted(path for path in folder.glob("*") if is_month(path)) if folder.is_dir() else []
-    with session_on(database) as session:
-        stored, present = import_months(session, files)
+
+    def bring() -> tuple[int, int]:
+        with session_on(database) as session:
+            refuse_other(History(session), files)
+            session.rollback()
+            return import_months(session, files)
+
+    try:
+        stored, present = bring()
+    except DatabaseUnusable as error:
+        if (aside := set_aside(database)) is None:
+            raise
+        complain(f"{error}; it is set aside as {aside.name} and made again from {folder}")
+        stored, present = bring()
     click.echo(f"history: {stored} runs recorded, {present} were there already")
     return stored + present
 

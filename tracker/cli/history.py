@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from spook_tracker.tracker.cli.options import (
     RED,
     UNUSABLE,
     accepted_option,
+    complain,
     database_option,
     example,
     refuse_unwritable,
@@ -29,11 +32,15 @@ from spook_tracker.tracker.cli.options import (
 from spook_tracker.tracker.cli.settings import present
 
 
-def history_of(database: str) -> Any:
-    """The history in a database, for reading."""
+@contextmanager
+def history_of(database: str) -> Iterator[Any]:
+    """The history in a database, for reading; what is dated ahead is said."""
     from spook_tracker.tracker.store.history import History
 
-    return History.open(database)
+    with History.open(database) as history:
+        if history.ahead:
+            complain(history.dated_ahead())
+        yield history
 
 
 def accepted_levels(file: Path | None = None) -> Any:

@@ -310,11 +310,10 @@ def publish(
     database: str,
 ) -> None:
     """Build the website from what is recorded."""
-    from spook_tracker.tracker.cli.history import accepted_levels
-    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.library import publish as build
 
-    with History.open(database) as history:
+    with history_of(database) as history:
         offered = database if with_database else ""
         levels = accepted_levels(accepted)
         report = build(history, out, levels, offered, title, home_page, mutants, colour, documents)
@@ -340,14 +339,13 @@ def report(
     import tempfile
 
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import accepted_levels
-    from spook_tracker.tracker.library import History
+    from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.website.printed import one_file, print_pdf
 
     if pdf is None and html is None:
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
     refuse_unwritable(pdf, html)
-    with History.open(database) as history:
+    with history_of(database) as history:
         text = one_file(history, accepted_levels(accepted), title, home_page, colour)
     kept = html is None or write(html, text)
     if html is not None and kept:

@@ -279,7 +279,9 @@ class OneLineErrors(click.Group):
             complain(f"{error.format_message()} (see: {command} --help)")
             code = UNUSABLE
         except (click.Abort, KeyboardInterrupt) as error:
-            kept = _recorded[-1] if _recorded else "nothing of this command was recorded"
+            kept = "nothing of this command was recorded"
+            if _recorded:
+                kept = f"run {_recorded[-1]} is recorded (see: tracker compare previous {_recorded[-1]})"
             ended = error.__cause__ or error  # click makes an Abort of every interruption
             complain(str(ended) if getattr(ended, "recorded", False) else f"interrupted; {kept}")
             code = UNUSABLE
@@ -323,12 +325,19 @@ def _unusable(error: BaseException) -> int:
     return UNUSABLE
 
 
-_recorded: list[str] = []  # what this command has recorded: an interruption after that must not deny it
+_recorded: list[
+    str
+] = []  # ids of what this command has recorded: an interruption after that must not deny it
 
 
 def recorded(run_id: str) -> None:
     """Remember that a run is stored, whatever happens to the command from now on."""
-    _recorded.append(f"run {run_id} is recorded (see: tracker compare previous {run_id})")
+    _recorded.append(run_id)
+
+
+def recorded_runs() -> tuple[str, ...]:
+    """Ids of the runs that this command has recorded, in that order."""
+    return tuple(_recorded)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 TrackerError            exit code 2
 ├── DatabaseError       the database cannot be opened, read or written
+│   └── DatabaseUnusable    what it holds is of no use
 ├── DocumentError       a run document is not valid
 ├── UnknownName         (LookupError) no such version, run or series, or more than one
 └── NotComparable       exit code 3: both exist, but comparing them would say nothing
@@ -23,6 +24,10 @@ class TrackerError(Exception):
 
 class DatabaseError(TrackerError):
     """The database cannot be opened, read or written."""
+
+
+class DatabaseUnusable(DatabaseError):
+    """What the database holds is damaged, of a later tracker, or no history; opening it again will not help."""
 
 
 class DocumentError(TrackerError, ValueError):

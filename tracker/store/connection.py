@@ -18,7 +18,7 @@ from sqlalchemy import URL, Engine, create_engine, event, exc, make_url
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
-from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.document.errors import DatabaseError, DatabaseUnusable
 from spook_tracker.tracker.store.reader import LOCK_TIMEOUT, SAFE, address
 
 DEFAULT = "sqlite:///tracker.db"
@@ -146,7 +146,7 @@ def _said(context: Any) -> DatabaseError | None:
     """Whatever the driver raises, anywhere, as one sentence; what concurrent writers cause is for `record`."""
     if isinstance(context.sqlalchemy_exception, exc.IntegrityError):
         return None
-    return DatabaseError(sentence(shown(context.engine.url), context.original_exception))
+    return said_of(shown(context.engine.url), context.original_exception)
 
 
 @contextmanager
@@ -157,7 +157,13 @@ def in_words(where: Engine | Session) -> Iterator[None]:
     except (exc.SQLAlchemyError, sqlite3.Error, OSError) as error:
         engine = where if isinstance(where, Engine) else where.get_bind().engine
         name = shown(engine.url)
-        raise DatabaseError(sentence(name, error)) from error
+        raise said_of(name, error) from error
+
+
+def said_of(name: str, error: Exception) -> DatabaseError:
+    """What the driver raised as an error of ours."""
+    said = sentence(name, error)
+    return (DatabaseUnusable if " is damaged" in said else DatabaseError)(said)
 
 
 def sentence(name: str, error: Exception) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from spook_tracker.tracker.document.errors import DatabaseError, TrackerError
+from spook_tracker.tracker.document.errors import DatabaseUnusable, TrackerError
 
 if TYPE_CHECKING:
     from sqlalchemy import URL
@@ -39,7 +39,7 @@ def told_of_damage(url: str | URL | None) -> Iterator[None]:
         fault = _fault(place)
         if fault is None:
             raise
-        raise DatabaseError(
+        raise DatabaseUnusable(
             f"the database {shown(place)} is damaged: {fault:.300}; restore it from a copy (tracker db check says more)"
         ) from error
 

@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import URL, Connection, Engine, inspect, text
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.document.errors import DatabaseError
+from spook_tracker.tracker.document.errors import DatabaseError, DatabaseUnusable
 from spook_tracker.tracker.store.connection import (
     ONE_WRITER,
     connected,
@@ -64,6 +64,21 @@ def open_database(url: str | URL | None = None, readonly: bool = False) -> Engin
         engine.dispose()
         raise
     return engine
+
+
+def set_aside(url: str) -> Path | None:
+    """Give the SQLite file of a database another name, which is returned; None if it is no such file."""
+    place = database_url(url)
+    file = Path(str(place.database))
+    if not is_file(place) or not file.is_file():
+        return None
+    number = 1
+    while (aside := file.with_name(f"{file.name}.set-aside-{number}")).exists():
+        number += 1
+    for end in ("", "-wal", "-shm"):
+        if (part := file.with_name(file.name + end)).exists():
+            part.rename(f"{aside}{end}")
+    return aside
 
 
 @contextmanager
@@ -152,7 +167,7 @@ def _check_file(url: URL, readonly: bool) -> None:
     except OSError as error:
         raise DatabaseError(f"{path} cannot be read: {error.strerror}") from None
     if start and start != b"SQLite format 3\0":
-        raise DatabaseError(f"{path} is not a SQLite database, or it is damaged; restore it from a copy")
+        raise DatabaseUnusable(f"{path} is not a SQLite database, or it is damaged; restore it from a copy")
 
 
 def _one_moment(engine: Engine) -> Connection:
@@ -173,13 +188,13 @@ def _current(connection: Any) -> str | None:
 def _refuse_strange(connection: Connection, revision: str | None) -> None:
     name = shown(connection.engine.url)
     if revision is not None and revision not in known_revisions():
-        raise DatabaseError(
+        raise DatabaseUnusable(
             f"{name} has schema revision {revision[:40]}, this tracker knows up to {head()}; "
             "update the tracker"
         )
     tables = set(inspect(connection).get_table_names()) - {"alembic_version"}  # empty: all the way down
     if revision is None and (strange := sorted(tables)):
-        raise DatabaseError(
+        raise DatabaseUnusable(
             f"{name} holds something else (a table {strange[0][:40]!r}); choose another database"
         )
 
@@ -190,7 +205,7 @@ def _refuse_triggers(connection: Connection) -> None:
         query = text("SELECT name FROM sqlite_master WHERE type = 'trigger'")
         name = connection.execute(query).scalar()
         if name is not None:
-            raise DatabaseError(
+            raise DatabaseUnusable(
                 f"{shown(connection.engine.url)} holds a trigger {name[:40]!r}, "
                 "which is not the tracker's; drop it"
             )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
 
+A_DAY = timedelta(days=1)  # by which clocks may differ, and time zones be mistaken
 LAST = "9999"  # sorts after every time: commits whose time is unknown
 Body = TypeVar("Body")
 RUN = (
@@ -62,13 +64,21 @@ Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definit
 
 
 class History:
-    """What is stored, as of the moment the history is made. `repository`: where git may know tags."""
+    """What is stored, as of the moment the history is made. `repository`: where git may know tags.
 
-    def __init__(self, source: Session | Reader, repository: Path | None = None) -> None:
+    A run that says it began later than that, by more than `ahead`, is among `ahead` and in nobody's history: some
+    clock was wrong, and until its day came it would be the newest. By its id it can be read and removed.
+    """
+
+    def __init__(
+        self, source: Session | Reader, repository: Path | None = None, ahead: timedelta = A_DAY
+    ) -> None:
         self._reader = source if hasattr(source, "rows") else SessionReader(source)
         self.repository = repository or Path.cwd()
-        self._runs = self._read_runs()
-        self._by_id = {run.id: run for run in self._runs}
+        every, latest = self._read_runs(), datetime.now(UTC) + ahead
+        self._runs = tuple(run for run in every if run.started_at <= latest)
+        self.ahead = tuple(run for run in every if run.started_at > latest)
+        self._by_id = {run.id: run for run in every}
         self._canonical = self._read_names()
         self._definitions: dict[int, SeriesDefinition] = {}
         self._with_maps: frozenset[str] | None = None
@@ -76,17 +86,17 @@ class History:
 
     @classmethod
     @contextmanager
-    def open(cls, database: str) -> Iterator[History]:
+    def open(cls, database: str, ahead: timedelta = A_DAY) -> Iterator[History]:
         """The history in a database, for reading: sqlite:///FILE or postgresql://…"""
         with told_of_damage(database):
             if (reader := file_reader(database)) is not None:
                 with closing(reader):
-                    yield cls(reader)
+                    yield cls(reader, ahead=ahead)
                 return
         from spook_tracker.tracker.store.database import session_on
 
         with session_on(database, readonly=True) as session:
-            yield cls(session)
+            yield cls(session, ahead=ahead)
 
     def runs(self, engine: str | None = None) -> tuple[RunInfo, ...]:
         """All runs, or those of one engine, ancestors first; dirty and unversioned builds at the end."""
@@ -108,7 +118,20 @@ class History:
 
     def resolve(self, name: str) -> RunInfo:
         """The run `name` stands for: see tracker/store/versions.py. UnknownName if none or several."""
+        if name in {run.id for run in self.ahead}:
+            return self._by_id[name]
         return resolve(self._runs, name, lambda tag: git.commit(self.repository, tag))
+
+    def dated_ahead(self) -> str:
+        """A sentence that names the runs dated ahead and the way out; empty if there are none."""
+        if not self.ahead:
+            return ""
+        first = self.ahead[0]
+        many = f"{len(self.ahead)} runs are" if len(self.ahead) > 1 else "1 run is"
+        return (
+            f"{many} dated ahead of this clock and left out, such as {first.id}, {first.started}; where that is "
+            f"wrong: tracker db remove {first.id}"
+        )
 
     def samples(self, run_id: str) -> dict[str, tuple[SeriesDefinition, Sample]]:
         """Every sample of a run with its definition in that run, by the key the series has today."""
@@ -167,8 +190,10 @@ class History:
         place = {run.key: i for i, run in enumerate(self._runs)}
         for run, series_id, definition, sample in self._read_samples(where, {}, evidence):
             key = self._canonical.get(series_id, definition.key)
+            here = place.get(run.key)
+            if here is None:  # dated ahead
+                continue
             points = gathered.setdefault(key, {})
-            here = place[run.key]
             if here not in points or definition.key == key:
                 points[here] = definition, sample
         result = {}
@@ -340,7 +365,7 @@ class History:
         query += (BESIDE if evidence else "") + (f" WHERE {where}" if where else "")
         stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
         definitions = self._read_definitions(row[2] for row in stored)
-        runs = {run.key: run for run in self._runs}
+        runs = {run.key: run for run in self._by_id.values()}
         made: dict[Any, Sample] = {}  # what says the same night after night is one object
         found = []
         for row in stored:

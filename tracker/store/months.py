@@ -17,8 +17,9 @@ import msgspec
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.document.errors import DatabaseUnusable, DocumentError
 from spook_tracker.tracker.document.json_form import encode
+from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import History
@@ -71,6 +72,22 @@ def import_months(session: Session, paths: Iterable[Path]) -> tuple[int, int]:
             else:
                 present += 1
     return stored, present
+
+
+def refuse_other(history: History, paths: Iterable[Path]) -> None:
+    """DatabaseUnusable if a run is stored otherwise than these files have it: where they travel, they are believed."""
+    known = {run.id for run in (*history.runs(), *history.ahead)}
+    for path in paths:
+        for line in _lines(path):
+            if (run_id := _peek(line, path).id) in known:
+                kept, stored = decoded(line, str(path)), history.document(run_id)
+                if _measured(kept) != _measured(stored):
+                    raise DatabaseUnusable(f"the database holds another run {run_id} than {path}")
+
+
+def _measured(run: RunDocument) -> RunDocument:
+    """Without its drawings, which a database drops after some nights, and the same whatever order it is stored in."""
+    return msgspec.structs.replace(run, figures=(), maps=(), trajectories=())
 
 
 def is_month(path: Path) -> bool:

@@ -9,6 +9,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from sqlalchemy.orm import Session
@@ -17,8 +18,9 @@ from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import readable
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
-from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.history import A_DAY, History
 from spook_tracker.tracker.store.record import record_together
+from spook_tracker.tracker.store.rows import moment
 from spook_tracker.tracker.store.versions import RunInfo
 
 TOGETHER = 5_000  # samples, and a little more, in one transaction
@@ -79,13 +81,21 @@ def import_files(session: Session, paths: Iterable[Path]) -> Imported:
     """
     files = list(_files(paths))
     for file in files:
-        read_document(file)
+        refuse_ahead(read_document(file), str(file))
     stored: list[str] = []
     present: list[str] = []
     for runs in _together(map(read_document, files)):
         for run, new in zip(runs, record_together(session, runs), strict=True):
             (stored if new else present).append(run.id)
     return Imported(tuple(stored), tuple(present))
+
+
+def refuse_ahead(run: RunDocument, origin: str) -> None:
+    """DocumentError if a run is dated ahead of this clock by more than clocks differ."""
+    if moment(run.started) > datetime.now(UTC) + A_DAY:
+        raise DocumentError(
+            f"{origin}: the run {run.id} is dated {run.started}, more than a day ahead of this clock; some clock is wrong"
+        )
 
 
 def _together(runs: Iterable[RunDocument]) -> Iterator[list[RunDocument]]:
